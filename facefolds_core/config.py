@@ -1,0 +1,52 @@
+"""The files through which parameters reach the stages.
+
+The stage `configure` splits params.yaml into one small file a stage, `data/<subject>/config/<stage>.json`, with the
+subject's overrides merged in. Each stage depends on its own file only, so a change of one section (or of one subject's
+override) reruns what it must and nothing else.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_json
+from facefolds_core.params import STAGE_SECTIONS, Overrides, Params, Section, Subject
+
+S = TypeVar("S", bound=Section)
+_REMEDY = "run `dvc repro`, which writes it from params.yaml"
+
+
+def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
+    """Write `subject.json` and one file for each stage; returns their paths."""
+    core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
+    values = {"subject": core}
+    values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
+    for name, value in values.items():
+        write_json(folder / f"{name}.json", value)
+    return [folder / f"{name}.json" for name in values]
+
+
+def _read(kind: type[S], path: Path) -> S:
+    try:
+        return kind.model_validate_json(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy=_REMEDY) from None
+    except (ValidationError, UnicodeDecodeError) as error:
+        raise UserError("garbled stage configuration", file=path, found=str(error), remedy=_REMEDY) from None
+
+
+def read_subject(folder: Path) -> Subject:
+    """The subject's own keys (without overrides)."""
+    return _read(Subject, folder / "subject.json")
+
+
+def read_stage(kind: type[S], folder: Path) -> S:
+    """The section of one stage, by its class: `read_stage(TrainParams, folders.config)`."""
+    name = next(name for name, section in STAGE_SECTIONS.items() if section is kind)
+    return _read(kind, folder / f"{name}.json")
+
+

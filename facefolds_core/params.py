@@ -1,0 +1,388 @@
+"""The validated form of params.yaml: the only place that knows its keys.
+
+`load_params` reads and checks the file; `Params.for_subject` merges a subject's overrides into the stages' sections.
+Nothing below `stages/` reads a raw dictionary of parameters.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from facefolds_core.errors import UserError
+from facefolds_core.presets import PRESETS
+
+
+class Section(BaseModel):
+    """Base of all sections: frozen, unknown keys refused, no silent conversion of strings to numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+T = TypeVar("T", bound="Section")
+
+Positive = Annotated[int, Field(ge=1)]
+
+
+class HoldoutEvery(Section):
+    """Hold out every n-th camera of those that remain after culling, in the order of the capture."""
+
+    every: Annotated[int, Field(ge=2)]
+
+
+class FrameRange(Section):
+    """Which frames of a segment to use: positions in its sorted list of frames, as in Python's range.
+
+    Attributes:
+        start: first position.
+        stop: one past the last position; null means to the end.
+        step: take every step-th frame.
+    """
+
+    start: Annotated[int, Field(ge=0)] = 0
+    stop: Annotated[int, Field(ge=1)] | None = None
+    step: Positive = 1
+
+
+class CaptureParams(Section):
+    """`capture`: the embedded actor (ignored for other sources).
+
+    Attributes:
+        cameras: number of cameras of the rig.
+        frames: number of frames.
+        height, width: of the images, pixels.
+        fps: frames a second.
+        seed: of the procedural skin, hair and room.
+    """
+
+    cameras: Annotated[int, Field(ge=3)] = 24
+    frames: Positive = 12
+    height: Annotated[int, Field(ge=16)] = 192
+    width: Annotated[int, Field(ge=16)] = 128
+    fps: Annotated[float, Field(gt=0)] = 30.0
+    seed: int = 0
+
+
+class NormalizeParams(Section):
+    """`normalize`.
+
+    Attributes:
+        long_side, short_side: images are area-downsampled to fit into this box (aspect kept, never enlarged).
+        max_elevation, max_azimuth: cameras beyond are culled; degrees, seen from the subject.
+        display_colour: apply Multiface's display colour correction.
+        stabilize: move each frame's cameras by the head pose so that the head stands still. Cameras then move from
+            frame to frame, which the static background and held-out scoring do not expect: see docs/subjects.md.
+    """
+
+    long_side: Annotated[int, Field(ge=16)] = 768
+    short_side: Annotated[int, Field(ge=16)] = 500
+    max_elevation: Annotated[float, Field(gt=0, le=90)] = 45.0
+    max_azimuth: Annotated[float, Field(gt=0, le=180)] = 90.0
+    display_colour: bool = False
+    stabilize: bool = False
+
+
+class TrainParams(Section):
+    """`train`: a preset, and any of its values overridden.
+
+    Attributes:
+        preset: a name from facefolds_core/presets.py; its values fill the keys that are not given.
+        device: "auto" takes CUDA where there is one.
+        seed: of initialisation and ray sampling.
+        layers: N, number of manifolds.
+        level_halfwidth: the N levels lie within this distance of the face surface, units.
+        manifold_layers, manifold_width: hidden layers of the manifold predictor.
+        texture_layers, texture_width: hidden layers of the texture predictor.
+        latent_dim: frame latents.
+        uv_frequencies, level_frequencies, view_frequencies: octaves of the positional encodings.
+        search_samples: M, samples a ray for the first crossings.
+        rays: rays a batch.
+        iterations: Adam steps.
+        lr_manifold, lr_texture: initial learning rates.
+        decay_manifold, decay_texture: factors by which the rates fall each `decay_interval` iterations, exponentially.
+        lambda_view, lambda_reg: weights of |view term|^2 and of |manifold weights|^2.
+        checkpoint_seconds: a checkpoint is written this often.
+    """
+
+    preset: str = "quick"
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    seed: int = 0
+    layers: Annotated[int, Field(ge=1, le=64)]
+    level_halfwidth: Annotated[float, Field(gt=0, lt=0.2)]
+    manifold_layers: Positive
+    manifold_width: Positive
+    texture_layers: Positive
+    texture_width: Positive
+    latent_dim: Positive
+    uv_frequencies: Annotated[int, Field(ge=0)]
+    level_frequencies: Annotated[int, Field(ge=0)]
+    view_frequencies: Annotated[int, Field(ge=0)]
+    search_samples: Annotated[int, Field(ge=8)]
+    rays: Positive
+    iterations: Positive
+    lr_manifold: Annotated[float, Field(ge=0)]
+    lr_texture: Annotated[float, Field(gt=0)]
+    decay_manifold: Annotated[float, Field(gt=0, le=1)]
+    decay_texture: Annotated[float, Field(gt=0, le=1)]
+    decay_interval: Positive
+    lambda_view: Annotated[float, Field(ge=0)]
+    lambda_reg: Annotated[float, Field(ge=0)]
+    checkpoint_seconds: Annotated[float, Field(gt=0)] = 60.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_from_preset(cls, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        name = value.get("preset", "quick")
+        if name not in PRESETS:
+            raise ValueError(f"unknown preset {name!r}; there are {', '.join(sorted(PRESETS))}")
+        return {**PRESETS[name], **value}
+
+
+class SampleParams(Section):
+    """`sample`.
+
+    Attributes:
+        resolution: R; each layer is sampled at R x R directions over the hemisphere.
+    """
+
+    resolution: Annotated[int, Field(ge=8, le=4096)] = 512
+
+
+class ReconstructParams(Section):
+    """`reconstruct`: screened Poisson, trimmed to the sampled sheet.
+
+    Attributes:
+        method: "poisson".
+        resolution: samples a side that Poisson sees (the R x R grid is thinned to it); null takes all.
+        depth: of the octree.
+        point_weight: of the samples (screening).
+        trim: vertices farther than this many sample spacings from the samples are removed.
+    """
+
+    method: Literal["poisson"] = "poisson"
+    resolution: Annotated[int, Field(ge=8)] | None = None
+    depth: Annotated[int, Field(ge=4, le=12)] = 8
+    point_weight: Annotated[float, Field(ge=0)] = 4.0
+    trim: Annotated[float, Field(gt=0)] = 2.0
+
+
+class DecimateParams(Section):
+    """`decimate`.
+
+    Attributes:
+        resolution: R^m; each layer keeps at most R^m x R^m vertices.
+    """
+
+    resolution: Annotated[int, Field(ge=4, le=2048)] = 64
+
+
+class TextureParams(Section):
+    """`texture`.
+
+    Attributes:
+        resolution: R^t; texels a side of each layer's texture.
+    """
+
+    resolution: Annotated[int, Field(ge=8, le=4096)] = 512
+
+
+class MeshCodec(Section):
+    """Draco.
+
+    Attributes:
+        quantization_bits: of positions and texture coordinates; 0 stores the floats exactly (the paper's setting).
+        compression_level: 0 (fastest, the paper's) to 10.
+    """
+
+    quantization_bits: Annotated[int, Field(ge=0, le=30)] = 0
+    compression_level: Annotated[int, Field(ge=0, le=10)] = 0
+
+
+class VideoCodec(Section):
+    """Texture video.
+
+    Attributes:
+        codec: "h264".
+        crf: constant rate factor; smaller is better and larger.
+        preset: encoder speed.
+    """
+
+    codec: Literal["h264"] = "h264"
+    crf: Annotated[int, Field(ge=0, le=51)] = 18
+    preset: str = "medium"
+
+
+class CompressParams(Section):
+    mesh: MeshCodec = MeshCodec()
+    video: VideoCodec = VideoCodec()
+
+
+class EvaluateParams(Section):
+    """`evaluate`.
+
+    Attributes:
+        background: RGB in [0, 1] shown where the asset is transparent.
+        device: as in `train`.
+        sheet_frames: frames shown for each held-out camera in the contact sheet.
+    """
+
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    sheet_frames: Positive = 3
+
+
+class Overrides(Section):
+    """Stage sections that a subject may override, key by key."""
+
+    capture: dict[str, Any] = {}
+    normalize: dict[str, Any] = {}
+    train: dict[str, Any] = {}
+    sample: dict[str, Any] = {}
+    reconstruct: dict[str, Any] = {}
+    decimate: dict[str, Any] = {}
+    texture: dict[str, Any] = {}
+    compress: dict[str, Any] = {}
+    evaluate: dict[str, Any] = {}
+
+
+class Subject(Overrides):
+    """One entry of `subjects`: where a capture is, what of it to use, and overrides of stage sections.
+
+    Attributes:
+        source: "actor" (generated), "multiface" or "transforms".
+        path: folder of the capture; for "actor" the generator's package.
+        segment: Multiface segment; null takes the only one.
+        frames: a range of positions, or a list of frame names; null takes all.
+        holdout: camera names, or {every: n}.
+        front: for captures without a tracked mesh, the name of a camera that faces the subject upright.
+        krt_size: [width, height] of the images that KRT refers to; null finds out.
+        pixel_centres: where the capture's K puts the centre of the first pixel, 0 or 0.5; null takes the source's habit.
+        fps: frames a second; null takes the source's (30 for Multiface).
+    """
+
+    source: Literal["actor", "multiface", "transforms"]
+    path: str
+    segment: str | None = None
+    frames: FrameRange | tuple[str, ...] | None = None
+    holdout: tuple[str, ...] | HoldoutEvery = HoldoutEvery(every=12)
+    front: str | None = None
+    krt_size: tuple[int, int] | None = None
+    pixel_centres: Literal[0.0, 0.5] | None = None
+    fps: Annotated[float, Field(gt=0)] | None = None
+
+
+STAGE_SECTIONS: dict[str, type[Section]] = {
+    "capture": CaptureParams,
+    "normalize": NormalizeParams,
+    "train": TrainParams,
+    "sample": SampleParams,
+    "reconstruct": ReconstructParams,
+    "decimate": DecimateParams,
+    "texture": TextureParams,
+    "compress": CompressParams,
+    "evaluate": EvaluateParams,
+}
+
+
+class Params(Section):
+    """All of params.yaml.
+
+    Attributes:
+        subjects: name -> subject.
+        sections: stage -> its section as given (defaults are filled in by `stage`).
+    """
+
+    subjects: dict[str, Subject]
+    sections: dict[str, dict[str, Any]]
+    path: str
+
+    def subject(self, name: str) -> Subject:
+        if name not in self.subjects:
+            raise UserError(
+                f"no subject named {name!r}",
+                file=self.path,
+                place="subjects",
+                expected=", ".join(sorted(self.subjects)),
+                found=name,
+                remedy="add it under `subjects` (docs/subjects.md), or name one that is there",
+            )
+        return self.subjects[name]
+
+    def stage(self, stage: str, subject: str) -> Section:
+        """The section of `stage` for `subject`: params.yaml's values, then the subject's overrides."""
+        overrides: dict[str, Any] = getattr(self.subject(subject), stage)
+        merged = _merge(self.sections.get(stage, {}), overrides)
+        place = f"{stage} (for subject {subject})" if overrides else stage
+        return _validate(STAGE_SECTIONS[stage], merged, self.path, place)
+
+
+def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in override.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged
+
+
+def _validate(kind: type[T], value: Any, file: str | Path, place: str) -> T:
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join([place, *(str(part) for part in first["loc"])])
+        raise UserError(
+            "a parameter is wrong",
+            file=file,
+            place=where,
+            expected=first["msg"],
+            found=repr(first["input"]),
+            remedy="mend it; docs/subjects.md and facefolds_core/params.py describe all keys",
+        ) from None
+
+
+def load_params(path: str | Path = "params.yaml") -> Params:
+    """Read and check params.yaml, every subject's merged sections included.
+
+    Raises:
+        UserError: if the file is missing, is not YAML, or a key or value is wrong; names the line or the key.
+    """
+    path = Path(path)
+    try:
+        value = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(
+            "file not found", file=path, remedy="run the command in the project's root folder, which has params.yaml"
+        ) from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = None if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
+        found = getattr(error, "problem", None) or str(error)
+        raise UserError(
+            "garbled YAML", file=path, place=place, expected="valid YAML", found=found, remedy="mend this line"
+        ) from None
+    if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
+        raise UserError(
+            "no subjects", file=path, expected="a mapping with a `subjects` section", remedy="see docs/subjects.md"
+        )
+    unknown = sorted(set(value) - {"subjects"} - set(STAGE_SECTIONS))
+    if unknown:
+        raise UserError(
+            "unknown sections",
+            file=path,
+            place=", ".join(map(str, unknown)),
+            expected=", ".join(["subjects", *STAGE_SECTIONS]),
+            remedy="remove or rename them",
+        )
+    sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
+    subjects = {
+        str(name): _validate(Subject, entry, path, f"subjects.{name}") for name, entry in value["subjects"].items()
+    }
+    params = Params(subjects=subjects, sections=sections, path=str(path))
+    for name in subjects:
+        for stage in STAGE_SECTIONS:
+            params.stage(stage, name)
+    return params

@@ -1,0 +1,44 @@
+"""Training presets: named sets of values for the `train` section of params.yaml."""
+
+from __future__ import annotations
+
+from typing import Any
+
+PAPER: dict[str, Any] = {
+    # FaceFolds, "Training details" and "Architecture Details".
+    "layers": 12,
+    "level_halfwidth": 0.03,
+    "manifold_layers": 3,
+    "manifold_width": 128,
+    "texture_layers": 8,
+    "texture_width": 256,
+    "latent_dim": 32,
+    "uv_frequencies": 10,
+    "level_frequencies": 4,
+    "view_frequencies": 4,
+    "search_samples": 256,
+    "rays": 32768,
+    "iterations": 500_000,
+    "lr_manifold": 7e-4,
+    "lr_texture": 1e-3,
+    "decay_manifold": 0.05,
+    "decay_texture": 0.20,
+    "decay_interval": 200_000,
+    "lambda_view": 1.0,
+    "lambda_reg": 1e-4,
+}
+
+QUICK: dict[str, Any] = {
+    **PAPER,
+    "manifold_width": 64,
+    "texture_layers": 4,
+    "texture_width": 96,
+    "search_samples": 48,
+    "rays": 2048,
+    "iterations": 2_000,
+    "lr_manifold": 7e-4,
+    "lr_texture": 4e-3,
+    "decay_interval": 2_000,
+}
+
+PRESETS: dict[str, dict[str, Any]] = {"paper": PAPER, "quick": QUICK}
