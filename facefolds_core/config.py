@@ -48,5 +48,3 @@ def read_stage(kind: type[S], folder: Path) -> S:
     """The section of one stage, by its class: `read_stage(TrainParams, folders.config)`."""
     name = next(name for name, section in STAGE_SECTIONS.items() if section is kind)
     return _read(kind, folder / f"{name}.json")
-
-

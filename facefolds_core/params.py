@@ -260,7 +260,8 @@ class Subject(Overrides):
         holdout: camera names, or {every: n}.
         front: for captures without a tracked mesh, the name of a camera that faces the subject upright.
         krt_size: [width, height] of the images that KRT refers to; null finds out.
-        pixel_centres: where the capture's K puts the centre of the first pixel, 0 or 0.5; null takes the source's habit.
+        pixel_centres: where the capture's K puts the centre of the first pixel, 0 or 0.5; null takes the source's
+            habit.
         fps: frames a second; null takes the source's (30 for Multiface).
     """
 
@@ -271,7 +272,7 @@ class Subject(Overrides):
     holdout: tuple[str, ...] | HoldoutEvery = HoldoutEvery(every=12)
     front: str | None = None
     krt_size: tuple[int, int] | None = None
-    pixel_centres: Literal[0.0, 0.5] | None = None
+    pixel_centres: Annotated[float, Field(ge=0, le=0.5, multiple_of=0.5)] | None = None
     fps: Annotated[float, Field(gt=0)] | None = None
 
 

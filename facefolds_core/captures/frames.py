@@ -1,8 +1,8 @@
 """Images of one size in one Arrow file, memory-mapped: never one file a picture.
 
 Columns: `camera` int32, `frame` int32 (indices into the scene's lists), `pixels` fixed-size binary of H*W*C bytes
-(row-major, RGB or one channel). Height, width and channels stand in the schema's metadata. Rows may come in any order and
-need not be complete (masks exist for some images only).
+(row-major, RGB or one channel). Height, width and channels stand in the schema's metadata. Rows may come in any order
+and need not be complete (masks exist for some images only).
 """
 
 from __future__ import annotations
@@ -29,18 +29,21 @@ def write_frames(path: str | Path, shape: tuple[int, int, int], rows: Iterable[t
     """
     size = shape[0] * shape[1] * shape[2]
     metadata = {name: str(n) for name, n in zip(("height", "width", "channels"), shape, strict=True)}
-    schema = pa.schema(
-        [("camera", pa.int32()), ("frame", pa.int32()), ("pixels", pa.binary(size))], metadata=metadata
-    )
-    with atomic_file(path) as temporary, pa.OSFile(str(temporary), "wb") as sink, pa.ipc.new_file(sink, schema) as writer:
+    fields = [("camera", pa.int32()), ("frame", pa.int32()), ("pixels", pa.binary(size))]
+    schema = pa.schema(fields, metadata=metadata)
+    with (
+        atomic_file(path) as temporary,
+        pa.OSFile(str(temporary), "wb") as sink,
+        pa.ipc.new_file(sink, schema) as writer,
+    ):
         for camera, frame, image in rows:
             if image.shape != shape or image.dtype != np.uint8:
                 raise ValueError(f"image of {image.dtype} {image.shape}, expected uint8 {shape}")
             pixels = pa.FixedSizeBinaryArray.from_buffers(
                 pa.binary(size), 1, [None, pa.py_buffer(np.ascontiguousarray(image))]
             )
-            batch = pa.record_batch([pa.array([camera], pa.int32()), pa.array([frame], pa.int32()), pixels], schema=schema)
-            writer.write_batch(batch)
+            columns = [pa.array([camera], pa.int32()), pa.array([frame], pa.int32()), pixels]
+            writer.write_batch(pa.record_batch(columns, schema=schema))
 
 
 class FrameStore:

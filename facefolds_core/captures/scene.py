@@ -7,7 +7,8 @@ A folder with
 - `surface.npz`: tracked mesh in normalised coordinates, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32.
 
-Normalised world: the subject is at the origin, faces +x, up is +z, its left is +y; camera centres are about 1 unit away.
+Normalised world: the subject is at the origin, faces +x, up is +z, its left is +y; camera centres are about 1 unit
+away.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Pinhole cameras, in the one convention of this project (docs/conventions.md).
 
 - Camera axes are OpenCV's: x right, y down, z forward. `w2c` maps world to camera: X_c = R X_w + t.
-- Image coordinates are continuous: pixel (column i, row j) covers [i, i+1) x [j, j+1), its centre is (i + 0.5, j + 0.5).
-  Sources that put pixel centres at whole numbers are shifted when they are read.
+- Image coordinates are continuous: pixel (column i, row j) covers [i, i+1) x [j, j+1), its centre is
+  (i + 0.5, j + 0.5). Sources that put pixel centres at whole numbers are shifted when they are read.
 - Geometry is float64 numpy up to the training loop.
 """
 
@@ -62,7 +62,8 @@ class Camera:
         """Rays through pixels.
 
         Args:
-            pixels: (..., 2) continuous image coordinates (x, y); by default the centres of all pixels, (height, width, 2).
+            pixels: (..., 2) continuous image coordinates (x, y); by default the centres of all pixels,
+                (height, width, 2).
 
         Returns:
             origins (..., 3) and unit directions (..., 3), in the world.
@@ -100,7 +101,11 @@ def check_camera(camera: Camera, file: object, place: str) -> None:
     remedy = "mend the calibration of this camera, or take the camera out of the capture"
     if not (np.isfinite(camera.K).all() and np.isfinite(camera.w2c).all()):
         raise UserError(
-            "the camera has numbers that are not finite", file=str(file), place=place, expected="finite K and [R|t]", remedy=remedy
+            "the camera has numbers that are not finite",
+            file=str(file),
+            place=place,
+            expected="finite K and [R|t]",
+            remedy=remedy,
         )
     K = camera.K
     if min(K[0, 0], K[1, 1]) <= 0 or abs(np.linalg.det(K)) < 1e-9 or not np.allclose(K[2], [0, 0, 1]):

@@ -39,9 +39,7 @@ class Similarity:
 
     def after(self, first: Similarity) -> Similarity:
         """The transform that applies `first` and then `self`."""
-        return Similarity(
-            self.scale * first.scale, self.rotation @ first.rotation, self.apply(first.translation)
-        )
+        return Similarity(self.scale * first.scale, self.rotation @ first.rotation, self.apply(first.translation))
 
     def to_json(self) -> dict[str, Any]:
         return {

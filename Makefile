@@ -1,0 +1,33 @@
+# make repro   set up, then run the pipeline for every subject in params.yaml
+# make test    set up, then run the tests
+# make lint    ruff, mypy and the layer check
+# make clean   remove the environment and all results
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.installed
+
+.PHONY: repro test lint bench clean
+
+repro: $(READY)
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
+
+test: $(READY)
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m stages.doctor
+	@touch $(READY)
+
+clean:
+	rm -rf $(VENV) .dvc/tmp .dvc/cache data/*/ dvc.lock

@@ -1,0 +1,37 @@
+"""Check that this machine has what pip cannot install; name what is missing and how to get it."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+
+SYSTEM_LIBRARIES = {
+    # shared object -> (who needs it, Debian/Ubuntu package, Fedora package)
+    "libGL.so.1": ("pymeshlab", "libgl1", "mesa-libGL"),
+    "libOpenGL.so.0": ("pymeshlab", "libopengl0", "libglvnd-opengl"),
+}
+
+
+def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRARIES) -> list[str]:
+    """One line for each system library that cannot be loaded (Linux; elsewhere the wheels bring their own)."""
+    if not sys.platform.startswith("linux"):
+        return []
+    lines = []
+    for name, (user, debian, fedora) in libraries.items():
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            lines.append(f"{name} (for {user}): `apt-get install {debian}` (Debian, Ubuntu) or `dnf install {fedora}`")
+    return lines
+
+
+def main() -> None:
+    missing = missing_libraries()
+    if missing:
+        text = "\n  ".join(missing)
+        sys.exit(f"doctor: system libraries are missing; install them and run the same command again:\n  {text}")
+    print("doctor: all system libraries are here")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""params.yaml: presets, overrides, and every kind of mistake in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.config import read_stage, read_subject, write_configs
+from facefolds_core.errors import UserError
+from facefolds_core.params import CompressParams, TextureParams, TrainParams, load_params
+from facefolds_core.presets import PRESETS
+
+MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
+
+
+def params_file(folder: Path, text: str) -> Path:
+    path = folder / "params.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_the_projects_own_file_is_valid(project_root: Path) -> None:
+    params = load_params(project_root / "params.yaml")
+    assert list(params.subjects) == ["actor"]
+
+
+def test_a_preset_fills_what_is_not_given(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL + "train: {preset: paper, iterations: 7}\n"))
+    train = params.stage("train", "a")
+    assert isinstance(train, TrainParams)
+    assert train.iterations == 7
+    assert train.rays == PRESETS["paper"]["rays"]
+
+
+def test_a_subject_overrides_one_nested_key(tmp_path: Path) -> None:
+    text = "subjects:\n  a: {source: actor, path: x, compress: {video: {crf: 30}}}\n  b: {source: actor, path: x}\n"
+    params = load_params(params_file(tmp_path, text + "compress: {video: {crf: 20, preset: slow}}\n"))
+    own, other = params.stage("compress", "a"), params.stage("compress", "b")
+    assert isinstance(own, CompressParams) and isinstance(other, CompressParams)
+    assert (own.video.crf, own.video.preset) == (30, "slow")
+    assert other.video.crf == 20
+
+
+def test_configs_round_trip(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL + "texture: {resolution: 77}\n"))
+    write_configs(params, "a", tmp_path)
+    assert read_stage(TextureParams, tmp_path) == TextureParams(resolution=77)
+    assert read_stage(TrainParams, tmp_path) == params.stage("train", "a")
+    assert read_subject(tmp_path) == params.subject("a")
+
+
+def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
+    written = []
+    for resolution in (64, 128):
+        folder = tmp_path / str(resolution)
+        params = load_params(params_file(tmp_path, MINIMAL + f"texture: {{resolution: {resolution}}}\n"))
+        written.append({path.name: path.read_bytes() for path in write_configs(params, "a", folder)})
+    assert [name for name in written[0] if written[0][name] != written[1][name]] == ["texture.json"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("subjects:\n  a: [\n", "line 3"),
+        ("train: {}\n", "no subjects"),
+        ("", "no subjects"),
+        (MINIMAL + "trian: {}\n", "trian"),
+        (MINIMAL + "train: {preset: fastest}\n", "there are"),
+        (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
+        (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
+        (MINIMAL + "texture: {size: 3}\n", "texture.size"),
+        ("subjects:\n  a: {source: video, path: x}\n", "subjects.a.source"),
+        ("subjects:\n  a: {source: actor}\n", "subjects.a.path"),
+        ("subjects:\n  a: {source: actor, path: x, texture: {resolution: -1}}\n", "for subject a"),
+        ("subjects:\n  a: {source: actor, path: x, holdout: {every: 1}}\n", "subjects.a.holdout"),
+    ],
+)
+def test_mistakes_name_the_file_and_the_key(tmp_path: Path, text: str, says: str) -> None:
+    path = params_file(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        load_params(path)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_unknown_subject_lists_those_there_are(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL))
+    with pytest.raises(UserError, match="expected: a"):
+        params.stage("train", "b")
+
+
+def test_missing_file_is_a_user_error(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="file not found"):
+        load_params(tmp_path / "params.yaml")
+
+
+def test_a_garbled_stage_config_is_a_user_error(tmp_path: Path) -> None:
+    (tmp_path / "texture.json").write_text("{")
+    with pytest.raises(UserError, match=r"texture\.json"):
+        read_stage(TextureParams, tmp_path)
