@@ -1,0 +1,143 @@
+"""`dvc repro` on a tiny actor: every stage, what a change reruns, interruption, and mistakes on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.pipeline.tiny import PARAMS, TinyProject
+
+EXPORT_OF_TEXTURES = ["texture@actor", "compress@actor", "evaluate@actor"]
+
+
+def stages_run(output: str) -> list[str]:
+    return re.findall(r"^Running stage '(.+)':", output, flags=re.MULTILINE)
+
+
+@pytest.fixture(scope="module")
+def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
+    """A tiny project that has been run once."""
+    tiny = TinyProject(project_root, tmp_path_factory.mktemp("tiny"))
+    status, output = tiny.repro()
+    assert status == 0, output
+    return tiny
+
+
+def test_it_ends_with_scores_and_pictures(project: TinyProject) -> None:
+    folder = project.root / "data" / "actor"
+    metrics = json.loads((folder / "metrics.json").read_text())
+    for variant in ("model", "diffuse", "asset"):
+        assert 5 < metrics[variant]["psnr"] < 60
+        assert 5 < metrics[variant]["psnr_subject"] < 60
+    assert metrics["cost"]["triangles"] > 0
+    assert (folder / "evaluation" / "contact_sheet.png").stat().st_size > 1000
+    assert (folder / "evaluation" / "per_image.parquet").exists()
+
+
+def test_the_asset_is_valid(project: TinyProject) -> None:
+    status, output = project.run("python", "-m", "stages.validate", "data/actor/asset")
+    assert status == 0, output
+
+
+def test_nothing_to_do(project: TinyProject) -> None:
+    status, output = project.repro()
+    assert status == 0
+    assert stages_run(output) == []
+
+
+def test_a_texture_resolution_reruns_three_stages(project: TinyProject) -> None:
+    project.write_params(PARAMS.replace("texture: {resolution: 32}", "texture: {resolution: 48}"))
+    status, output = project.repro()
+    assert status == 0, output
+    assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
+
+
+def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
+    override = "    holdout: {every: 4}\n    texture: {resolution: 40}\n"
+    project.write_params(PARAMS.replace("    holdout: {every: 4}\n", override))
+    status, output = project.repro()
+    assert status == 0, output
+    assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
+
+
+def test_a_killed_training_resumes(project_root: Path, tmp_path: Path, project: TinyProject) -> None:
+    train = "train: {preset: quick, iterations: 400, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, "
+    params = re.sub(r"^train: \{[^\n]*$", train + "manifold_width: 32}", PARAMS, flags=re.MULTILINE)
+    tiny = TinyProject(project_root, tmp_path / "killed", params)
+    status, output = tiny.repro("normalize@actor")
+    assert status == 0, output
+    process = tiny.start("dvc", "repro", "train@actor")
+    checkpoints = tiny.root / "data" / "actor" / "checkpoints"
+    deadline = time.monotonic() + 120
+    while not list(checkpoints.glob("**/*.safetensors")) and time.monotonic() < deadline:
+        assert process.poll() is None, process.communicate()[0]
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    assert not (tiny.root / "data" / "actor" / "model").exists()
+    status, output = tiny.repro("train@actor")
+    assert status == 0, output
+    assert "resum" in output
+    assert (tiny.root / "data" / "actor" / "model" / "model.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("params", "says"),
+    [
+        (PARAMS.replace("every: 4", "every: 1"), "holdout"),
+        (PARAMS.replace("{every: 4}", "[nobody]"), "nobody"),
+        (PARAMS + "normalize: {max_azimuth: 0.001}\n", "azimuth"),
+        (PARAMS.replace("texture:", "texure:"), "texure"),
+        (PARAMS.replace("subjects:", "subjects: ["), "line"),
+    ],
+)
+def test_mistakes_in_params_stop_with_one_message(project: TinyProject, params: str, says: str) -> None:
+    before = project.params
+    project.write_params(params)
+    try:
+        status, output = project.repro()
+    finally:
+        project.write_params(before)
+    assert status != 0
+    assert says in output
+    assert "Traceback" not in output
+
+
+DAMAGE = [
+    ("train", "scene/frames.arrow"),
+    ("train", "scene/scene.json"),
+    ("sample", "model/model.safetensors"),
+    ("sample", "model/model.json"),
+    ("reconstruct", "samples/grids.npz"),
+    ("decimate", "surfaces/surfaces.npz"),
+    ("texture", "samples/textures.arrow"),
+    ("compress", "meshes/meshes.npz"),
+    ("compress", "textures/textures.arrow"),
+    ("evaluate", "asset/manifest.json"),
+    ("evaluate", "asset/texture.mp4"),
+    ("evaluate", "asset/layer_00.drc"),
+    ("evaluate", "model/training.json"),
+]
+
+
+@pytest.mark.parametrize(("stage", "name"), DAMAGE)
+def test_a_truncated_input_stops_a_stage_with_one_message(project: TinyProject, stage: str, name: str) -> None:
+    path = project.root / "data" / "actor" / name
+    content = path.read_bytes()
+    path.unlink()
+    path.write_bytes(content[: len(content) // 2])
+    try:
+        status, output = project.stage(stage)
+    finally:
+        path.unlink()
+        path.write_bytes(content)
+    assert status == 1, output
+    assert path.name in output
+    assert "remedy" in output
+    assert "Traceback" not in output
