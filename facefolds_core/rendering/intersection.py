@@ -1,0 +1,106 @@
+"""Nearest hit of rays with a triangle mesh: with Embree, and, slow and plain, by trying every triangle.
+
+Both are two-sided (no culling). Embree works in float32 and only says which triangle is hit; where in the triangle is
+computed again in float64, by the same formula as in the plain version (Moeller and Trumbore 1997).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+MISS = -1
+_PAIRS_AT_ONCE = 2_000_000
+"""Ray-triangle pairs that `brute_force_hits` works on together: bounds its memory."""
+
+
+@dataclass(frozen=True)
+class TriangleHits:
+    """Nearest hits of R rays with one mesh.
+
+    Attributes:
+        triangle: (R,) int32, MISS where nothing is hit.
+        barycentric: (R, 3) float64, weights of the triangle's three vertices; 0 where nothing is hit.
+    """
+
+    triangle: Indices
+    barycentric: Array
+
+
+def moeller_trumbore(origins: Array, directions: Array, triangles: Array) -> tuple[Array, Array, Array]:
+    """Ray parameter t and coordinates (u, v) of rays in the planes of triangles: o + t d = (1-u-v) a + u b + v c.
+
+    Args:
+        origins, directions: (..., 3).
+        triangles: (..., 3, 3), vertices by rows.
+
+    Returns:
+        t, u and v (...); infinite or NaN where a ray is parallel to the plane or a triangle has no area.
+    """
+    a = triangles[..., 0, :]
+    edge1, edge2 = triangles[..., 1, :] - a, triangles[..., 2, :] - a
+    p = np.cross(directions, edge2)
+    offset = origins - a
+    q = np.cross(offset, edge1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / (edge1 * p).sum(-1)
+        return (edge2 * q).sum(-1) * inverse, (offset * p).sum(-1) * inverse, (directions * q).sum(-1) * inverse
+
+
+class EmbreeMesh:
+    """A mesh in an Embree scene of its own.
+
+    Args:
+        vertices: (V, 3).
+        faces: (F, 3) indices.
+    """
+
+    def __init__(self, vertices: NDArray[np.float32], faces: Indices) -> None:
+        self.triangles: Array = np.asarray(vertices, np.float64)[faces]
+        # robust: no ray slips through between two triangles that share an edge.
+        self._scene = EmbreeScene(robust=True)
+        if len(faces):
+            TriangleMesh(self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
+
+    def nearest(self, origins: Array, directions: Array) -> TriangleHits:
+        """Nearest hits of rays; origins, directions: (R, 3)."""
+        if not len(self.triangles):
+            return _hits_in(self.triangles, np.full(len(origins), MISS, np.int32), origins, directions)
+        triangle = self._scene.run(
+            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+        )
+        return _hits_in(self.triangles, np.asarray(triangle, np.int32), origins, directions)
+
+
+def brute_force_hits(vertices: Array, faces: Indices, origins: Array, directions: Array) -> TriangleHits:
+    """The same by trying every triangle for every ray, in float64: the reference for `EmbreeMesh`."""
+    triangles = np.asarray(vertices, np.float64)[faces]
+    nearest = np.full(len(origins), MISS, np.int32)
+    if len(triangles):
+        step = max(1, _PAIRS_AT_ONCE // len(triangles))
+        for start in range(0, len(origins), step):
+            part = slice(start, start + step)
+            t, u, v = moeller_trumbore(origins[part, None], directions[part, None], triangles)
+            inside = (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1)
+            t = np.where(inside, t, np.inf)
+            nearest[part] = np.where(inside.any(1), t.argmin(1), MISS)
+    return _hits_in(triangles, nearest, origins, directions)
+
+
+def _hits_in(triangles: Array, triangle: Indices, origins: Array, directions: Array) -> TriangleHits:
+    """Where in the triangles that they hit (R,) rays (R, 3) pass."""
+    barycentric = np.zeros((len(origins), 3))
+    hit = triangle != MISS
+    _, u, v = moeller_trumbore(origins[hit], directions[hit], triangles[triangle[hit]])
+    # What float32 calls a hit may lie a hair outside in float64, or anywhere in a triangle seen exactly from the side.
+    u = np.clip(np.nan_to_num(u, posinf=1, neginf=0), 0, 1)
+    v = np.clip(np.nan_to_num(v, posinf=1, neginf=0), 0, 1 - u)
+    barycentric[hit] = np.stack([1 - u - v, u, v], -1)
+    return TriangleHits(triangle, barycentric)

@@ -1,0 +1,131 @@
+"""The reference renderer: an asset as it ships, seen from a camera. Slow and clear; every faster player is compared with it.
+
+What it does is what docs/asset-format.md asks of a player:
+- one ray through each pixel's centre, no anti-aliasing; the nearest hit with each layer counts, whichever side it is;
+- (s, t) from the triangle's vertices; RGBA by bilinear interpolation of the stored (sRGB-encoded) values, colour and
+  straight alpha each by itself, clamped to the texture's edge texels;
+- layers put together outermost first, whatever their distance along the ray, in stored values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.intersection import MISS, EmbreeMesh
+
+Image = NDArray[np.float32]
+Textures = NDArray[np.uint8]
+
+BLACK = (0.0, 0.0, 0.0)
+
+
+class Mesh(Protocol):
+    """One layer: vertices (V, 3) float32, faces (F, 3) int32, st (V, 2) float32."""
+
+    @property
+    def vertices(self) -> NDArray[np.float32]: ...
+    @property
+    def faces(self) -> NDArray[np.int32]: ...
+    @property
+    def st(self) -> NDArray[np.float32]: ...
+
+
+class Layered(Protocol):
+    """What the renderer needs of an asset: its meshes, outermost first, and frame k of its textures."""
+
+    @property
+    def layers(self) -> Sequence[Mesh]: ...
+    def frame(self, k: int) -> Textures:
+        """(N, R, R, 4) uint8, straight alpha."""
+        ...
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Nearest hit of each pixel's ray with each of N layers, outermost first. It serves all frames: meshes stand still.
+
+    Attributes:
+        hit: (H, W, N) bool.
+        st: (H, W, N, 2) float32 texture coordinates; 0 where nothing is hit.
+    """
+
+    hit: NDArray[np.bool_]
+    st: NDArray[np.float32]
+
+
+class AssetCaster:
+    """Casts rays at the meshes of an asset, one Embree scene a layer."""
+
+    def __init__(self, asset: Layered) -> None:
+        self._layers = [(EmbreeMesh(layer.vertices, layer.faces), layer.st[layer.faces]) for layer in asset.layers]
+
+    def cast(self, camera: Camera) -> Hits:
+        """Hits of the rays through all pixel centres of `camera`."""
+        origins, directions = (np.reshape(rays, (-1, 3)) for rays in camera.rays())
+        shape = (camera.height, camera.width, len(self._layers))
+        hit, st = np.zeros(shape, bool), np.zeros((*shape, 2), np.float32)
+        for i, (mesh, corners) in enumerate(self._layers):
+            found = mesh.nearest(origins, directions)
+            rays = np.flatnonzero(found.triangle != MISS)
+            where = np.unravel_index(rays, shape[:2])
+            hit[(*where, i)] = True
+            weights = found.barycentric[rays]
+            st[(*where, i)] = np.einsum("rk,rkc->rc", weights, corners[found.triangle[rays]].astype(np.float64))
+        return Hits(hit, st)
+
+
+def sample_texture(texture: Textures, st: NDArray[np.float32]) -> Image:
+    """Bilinear look-up, clamped to the edge texels' centres.
+
+    Args:
+        texture: (H, W, C) uint8; texel (row i, column j) has its centre at s = (j + 0.5) / W, t = (i + 0.5) / H.
+        st: (M, 2), s right and t down.
+
+    Returns:
+        (M, C) float32 in [0, 1].
+    """
+    height, width = texture.shape[:2]
+    x = np.clip(st[:, 0] * np.float64(width) - 0.5, 0, width - 1)
+    y = np.clip(st[:, 1] * np.float64(height) - 0.5, 0, height - 1)
+    left, top = x.astype(np.intp), y.astype(np.intp)
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    fx, fy = (x - left).astype(np.float32)[:, None], (y - top).astype(np.float32)[:, None]
+    upper = (1 - fx) * texture[top, left] + fx * texture[top, right]
+    lower = (1 - fx) * texture[bottom, left] + fx * texture[bottom, right]
+    return np.asarray(((1 - fy) * upper + fy * lower) / np.float32(255), np.float32)
+
+
+def composite(hits: Hits, textures: Textures, background: ArrayLike = BLACK) -> tuple[Image, Image]:
+    """C = sum_i alpha_i c_i prod_{k<i} (1 - alpha_k) + transmittance * background, in stored values.
+
+    Args:
+        hits: of one camera.
+        textures: (N, R, R, 4) uint8, one frame of all layers.
+        background: RGB in [0, 1], (3,) or (H, W, 3).
+
+    Returns:
+        rgb (H, W, 3) and alpha (H, W), float32 in [0, 1].
+    """
+    if len(textures) != hits.hit.shape[2]:
+        raise ValueError(f"{len(textures)} textures for {hits.hit.shape[2]} layers")
+    rgb = np.zeros((*hits.hit.shape[:2], 3), np.float32)
+    transmittance = np.ones(hits.hit.shape[:2], np.float32)
+    for i, texture in enumerate(textures):
+        hit = hits.hit[..., i]
+        rgba = sample_texture(texture, hits.st[..., i, :][hit])
+        through = transmittance[hit]
+        rgb[hit] += (through * rgba[:, 3])[:, None] * rgba[:, :3]
+        transmittance[hit] = through * (1 - rgba[:, 3])
+    rgb += transmittance[..., None] * np.asarray(background, np.float32)
+    return rgb, 1 - transmittance
+
+
+def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
+    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`. For many, keep an `AssetCaster` and its `Hits`."""
+    return composite(AssetCaster(asset).cast(camera), asset.frame(frame), background)

@@ -1,0 +1,114 @@
+"""Embree against trying every triangle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from facefolds_core.rendering.intersection import MISS, EmbreeMesh, brute_force_hits
+
+
+def folded_sheet(rng: np.random.Generator, n: int = 12) -> tuple[np.ndarray, np.ndarray]:
+    """A crumpled grid near the origin that rays along -x cross several times: vertices (V, 3) f32, faces (F, 3) i32."""
+    a, b = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    x = 0.4 * np.sin(5 * a) + rng.normal(0, 0.05, a.shape)
+    y = 0.3 * (a + 1.2 * np.sin(4 * a)) + rng.normal(0, 0.02, a.shape)
+    vertices = np.stack([x, y, 0.3 * b], -1).reshape(-1, 3).astype(np.float32)
+    i = np.arange(n * n).reshape(n, n)
+    quads = [i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel()]
+    faces = np.concatenate([np.stack(quads[:3], 1), np.stack([quads[1], quads[3], quads[2]], 1)]).astype(np.int32)
+    return vertices, faces
+
+
+def rays(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    origins = np.array([1.0, 0.1, -0.05]) + rng.normal(0, 0.05, (count, 3))
+    targets = rng.uniform(-0.7, 0.7, (count, 3)) * [0.2, 1, 0.6]
+    directions = targets - origins
+    return origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def test_embree_finds_what_trying_every_triangle_finds() -> None:
+    rng = np.random.default_rng(0)
+    vertices, faces = folded_sheet(rng)
+    origins, directions = rays(rng, 4000)
+    fast = EmbreeMesh(vertices, faces).nearest(origins, directions)
+    slow = brute_force_hits(vertices, faces, origins, directions)
+    assert 0.3 < (slow.triangle != MISS).mean() < 0.95
+    np.testing.assert_array_equal(fast.triangle, slow.triangle)
+    np.testing.assert_array_equal(fast.barycentric, slow.barycentric)
+
+
+def test_the_sheet_of_the_test_is_folded() -> None:
+    """Some rays cross it more than once, so "nearest" is put to the test above."""
+    rng = np.random.default_rng(0)
+    vertices, faces = folded_sheet(rng)
+    origins, directions = rays(rng, 500)
+    first = brute_force_hits(vertices, faces, origins, directions)
+    hit = first.triangle != MISS
+    points = np.einsum("rk,rkc->rc", first.barycentric[hit], vertices[faces][first.triangle[hit]])
+    beyond = brute_force_hits(vertices, faces, points + 1e-6 * directions[hit], directions[hit])
+    assert (beyond.triangle != MISS).mean() > 0.2
+
+
+def test_barycentric_weights_give_the_point_on_the_ray() -> None:
+    rng = np.random.default_rng(1)
+    vertices, faces = folded_sheet(rng)
+    origins, directions = rays(rng, 1000)
+    found = EmbreeMesh(vertices, faces).nearest(origins, directions)
+    hit = found.triangle != MISS
+    points = np.einsum("rk,rkc->rc", found.barycentric[hit], vertices[faces][found.triangle[hit]].astype(float))
+    offset = points - origins[hit]
+    off_ray = np.linalg.norm(np.cross(offset, directions[hit]), axis=1)
+    assert off_ray.max() < 1e-9  # float64: about 1e-15; float32 would give 1e-7
+
+
+def test_no_ray_slips_through_shared_edges() -> None:
+    rng = np.random.default_rng(2)
+    n = 9
+    y, z = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    vertices = np.stack([0.3 * y * z, y, z], -1).reshape(-1, 3).astype(np.float32)
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[:-1, 1:].ravel(), i[1:, 1:].ravel()
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)]).astype(np.int32)
+    ends = vertices[np.stack([b, c], 1)].astype(float)  # the diagonals, which two triangles share
+    share = rng.uniform(0, 1, (200, len(ends), 1))
+    targets = (share * ends[:, 0] + (1 - share) * ends[:, 1]).reshape(-1, 3)
+    origins = np.broadcast_to([1.1, 0.03, 0.02], targets.shape)
+    assert (EmbreeMesh(vertices, faces).nearest(origins, targets - origins).triangle != MISS).all()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_both_sides_are_hit(side: float) -> None:
+    vertices = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    origins, directions = np.array([[side, 0.2, 0.3]]), np.array([[-side, 0.0, 0.0]])
+    for found in (
+        EmbreeMesh(vertices, faces).nearest(origins, directions),
+        brute_force_hits(vertices, faces, origins, directions),
+    ):
+        np.testing.assert_allclose(found.barycentric, [[0.5, 0.2, 0.3]], atol=1e-12)
+
+
+def test_a_mesh_behind_the_camera_is_not_hit() -> None:
+    vertices = np.array([[0, -1, -1], [0, 1, -1], [0, 0, 1]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    origins, directions = np.array([[1.0, 0, 0]]), np.array([[1.0, 0, 0]])
+    assert EmbreeMesh(vertices, faces).nearest(origins, directions).triangle[0] == MISS
+    assert brute_force_hits(vertices, faces, origins, directions).triangle[0] == MISS
+
+
+def test_an_empty_mesh_is_not_hit() -> None:
+    empty = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)
+    found = EmbreeMesh(*empty).nearest(np.zeros((5, 3)), np.ones((5, 3)))
+    assert (found.triangle == MISS).all()
+    assert (found.barycentric == 0).all()
+
+
+def test_a_triangle_seen_from_the_side_gives_finite_weights() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1e-7]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    origins = np.stack([np.full(100, 2.0), np.zeros(100), np.linspace(-1e-7, 1e-7, 100)], 1)
+    directions = np.broadcast_to([-1.0, 0.0, 0.0], origins.shape)
+    weights = EmbreeMesh(vertices, faces).nearest(origins, directions).barycentric
+    assert np.isfinite(weights).all()
+    assert (weights >= 0).all()
