@@ -94,6 +94,8 @@ class TrainParams(Section):
         seed: of initialisation and ray sampling.
         layers: N, number of manifolds.
         level_halfwidth: the N levels lie within this distance of the face surface, units.
+        manifold_start: "sphere" (the paper's), or "surface": the tracked mesh, where there is one, by a short regression
+            before training; without one it is the sphere.
         manifold_layers, manifold_width: hidden layers of the manifold predictor.
         texture_layers, texture_width: hidden layers of the texture predictor.
         latent_dim: frame latents.
@@ -112,6 +114,7 @@ class TrainParams(Section):
     seed: int = 0
     layers: Annotated[int, Field(ge=1, le=64)]
     level_halfwidth: Annotated[float, Field(gt=0, lt=0.2)]
+    manifold_start: Literal["sphere", "surface"]
     manifold_layers: Positive
     manifold_width: Positive
     texture_layers: Positive
@@ -195,11 +198,13 @@ class MeshCodec(Section):
     """Draco.
 
     Attributes:
-        quantization_bits: of positions and texture coordinates; 0 stores the floats exactly (the paper's setting).
+        quantization_bits: of positions; 0 stores all floats exactly (the paper's setting).
+        texture_coordinate_bits: of texture coordinates, where positions are quantised.
         compression_level: 0 (fastest, the paper's) to 10.
     """
 
-    quantization_bits: Annotated[int, Field(ge=0, le=30)] = 0
+    quantization_bits: Annotated[int, Field(ge=0, le=24)] = 0
+    texture_coordinate_bits: Annotated[int, Field(ge=1, le=24)] = 12
     compression_level: Annotated[int, Field(ge=0, le=10)] = 0
 
 
@@ -209,12 +214,14 @@ class VideoCodec(Section):
     Attributes:
         codec: "h264".
         crf: constant rate factor; smaller is better and larger.
-        preset: encoder speed.
+        preset: of libx264: slower ones make smaller files.
     """
 
     codec: Literal["h264"] = "h264"
     crf: Annotated[int, Field(ge=0, le=51)] = 18
-    preset: str = "medium"
+    preset: Literal[
+        "ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"
+    ] = "medium"
 
 
 class CompressParams(Section):

@@ -8,6 +8,7 @@ PAPER: dict[str, Any] = {
     # FaceFolds, "Training details" and "Architecture Details".
     "layers": 12,
     "level_halfwidth": 0.03,
+    "manifold_start": "sphere",
     "manifold_layers": 3,
     "manifold_width": 128,
     "texture_layers": 8,
@@ -30,6 +31,7 @@ PAPER: dict[str, Any] = {
 
 QUICK: dict[str, Any] = {
     **PAPER,
+    "manifold_start": "surface",
     "manifold_width": 64,
     "texture_layers": 4,
     "texture_width": 96,

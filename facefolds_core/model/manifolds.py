@@ -1,0 +1,129 @@
+"""Where the layers are: N nested surfaces, level sets of one scalar field."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import silu
+
+from facefolds_core.model.intersection import Crossings, first_crossings
+from facefolds_core.model.layers import LinearStack
+
+CHUNK = {"cpu": 1 << 15, "cuda": 1 << 21}
+"""Points that the field is evaluated at together without gradient: on a CPU the activations then stay in its cache."""
+
+
+class Manifolds(Protocol):
+    """What a model of the surfaces must offer; the rest of the model asks nothing else of it."""
+
+    @property
+    def num_layers(self) -> int: ...
+
+    @property
+    def centre(self) -> Tensor:
+        """[3], c."""
+        ...
+
+    @property
+    def radius(self) -> float:
+        """Radius of the ball around c that encloses all layers."""
+        ...
+
+    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+        """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable."""
+        ...
+
+    def regularisation(self) -> Tensor:
+        """Penalty that keeps the surfaces tame, a scalar."""
+        ...
+
+
+class MlpManifolds(nn.Module):
+    """The paper's manifold predictor: layer i is {x : G(x) = s_i}, G a multilayer perceptron.
+
+    G(x) = |x - c| + MLP((x - c) / levels[0]), the last layer of the MLP zero to start with. The start is an exact
+    sphere around c with |grad G| = 1, and the s-values are radii in scene units. (The paper starts from the
+    initialisation of Atzmon & Lipman 2020, which is a sphere only in the limit of infinite width.) Activation: SiLU, so
+    that surfaces are smooth; the paper names none.
+
+    Args:
+        centre: c.
+        levels: N values s_i, falling: outermost first.
+        radius: of the ball that encloses all layers: crossings are searched in its front half only.
+        hidden_layers, width: of the MLP.
+        samples: M, samples a ray for the search.
+    """
+
+    centre: Tensor
+    levels: Tensor
+
+    def __init__(
+        self,
+        centre: tuple[float, ...],
+        levels: tuple[float, ...],
+        radius: float,
+        hidden_layers: int,
+        width: int,
+        samples: int,
+    ) -> None:
+        super().__init__()
+        self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
+        self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
+        self.radius = radius
+        self.scale = 1.0 / levels[0]
+        self.samples = samples
+        self.hidden = LinearStack([3] + [width] * hidden_layers)
+        self.last = nn.Linear(width, 1)
+        with torch.no_grad():
+            for layer in self.hidden:
+                # He's variance: it keeps the activations' size through SiLU. Biases spread the first layer's kinks.
+                nn.init.normal_(layer.weight, std=math.sqrt(2.0 / layer.in_features))
+                nn.init.uniform_(layer.bias, -1, 1) if layer.in_features == 3 else nn.init.zeros_(layer.bias)
+            nn.init.zeros_(self.last.weight)
+            nn.init.zeros_(self.last.bias)
+
+    @property
+    def num_layers(self) -> int:
+        return len(self.levels)
+
+    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+        return first_crossings(self, self.levels, origins, directions, self.centre, self.radius, self.samples)
+
+    def regularisation(self) -> Tensor:
+        """Sum of the squared weights (biases left out) of all layers but the last (paper, "Training details")."""
+        return torch.stack([layer.weight.square().sum() for layer in self.hidden]).sum()
+
+    def value(self, points: Tensor) -> Tensor:
+        """G at points [..., 3] -> [...]. Without gradient it works in chunks, in bounded memory."""
+        flat = points.reshape(-1, 3)
+        if torch.is_grad_enabled():
+            values = self._evaluate(flat)
+        else:
+            values = torch.cat([self._evaluate(chunk) for chunk in flat.split(CHUNK[points.device.type])])
+        return values.view(points.shape[:-1])
+
+    def _evaluate(self, points: Tensor) -> Tensor:
+        offset = points - self.centre
+        h = offset * self.scale
+        for layer in self.hidden:
+            h = silu(layer(h), inplace=not torch.is_grad_enabled())
+        values: Tensor = offset.norm(dim=-1) + self.last(h).squeeze(-1)
+        return values
+
+    def value_and_slope(self, points: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
+        """G [P] and grad G . d [P] in one pass; the slope carries no gradient (it is the Newton step's denominator)."""
+        offset = points - self.centre
+        distance = offset.norm(dim=-1)
+        h, dh = offset * self.scale, directions * self.scale
+        for layer in self.hidden:
+            z = layer(h)
+            h = silu(z)
+            with torch.no_grad():
+                s = torch.sigmoid(z)
+                dh = (dh @ layer.weight.T) * (s + h * (1 - s))  # silu'(z) = s + z s (1 - s), h = z s
+        with torch.no_grad():
+            slope = (offset * directions).sum(-1) / distance.clamp(min=1e-9) + (dh @ self.last.weight.T).squeeze(-1)
+        return distance + self.last(h).squeeze(-1), slope

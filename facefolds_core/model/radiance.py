@@ -1,0 +1,155 @@
+"""Radiance manifolds: surfaces and textures put together. Everything after training asks only this class."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
+from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.model.intersection import Crossings
+from facefolds_core.model.manifolds import Manifolds
+from facefolds_core.model.textures import Textures
+
+RAYS_AT_ONCE = 8192
+"""Rays (or texels) that `render`, `surface_points` and `texture` work on together: bounds their memory."""
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """R composited rays.
+
+    Attributes:
+        rgb: [R, 3] in [0, 1], over black.
+        alpha: [R] opacity.
+        weights: [R, N] of the layers, outermost first.
+    """
+
+    rgb: Tensor
+    alpha: Tensor
+    weights: Tensor
+
+
+@dataclass(frozen=True)
+class Traced:
+    """R rays in the training loop: unclamped, with gradients.
+
+    Attributes:
+        rgb: [R, 3] over black, not clamped.
+        weights: [R, N].
+        view: [P] the view-dependent term at the P crossings of all rays; None if it was switched off.
+    """
+
+    rgb: Tensor
+    weights: Tensor
+    view: Tensor | None
+
+
+class RadianceManifolds(nn.Module):
+    """N nested surfaces with RGBA textures in time.
+
+    Args:
+        manifolds: where the layers are.
+        textures: what they look like.
+    """
+
+    def __init__(self, manifolds: Manifolds, textures: Textures) -> None:
+        super().__init__()
+        self.manifolds = manifolds
+        self.textures = textures
+
+    @property
+    def num_layers(self) -> int:
+        return self.manifolds.num_layers
+
+    @property
+    def num_frames(self) -> int:
+        return self.textures.num_frames
+
+    @property
+    def centre(self) -> Tensor:
+        """[3], c."""
+        return self.manifolds.centre
+
+    def trace(self, origins: Tensor, directions: Tensor, time: Tensor, view_effects: bool) -> Traced:
+        """Cross, shade and composite rays, all at once and differentiable.
+
+        Args:
+            origins, directions: [R, 3], directions of unit length.
+            time: [R] frame indices, possibly between frames.
+            view_effects: add the view-dependent term.
+        """
+        crossings = self.manifolds.crossings(origins, directions)
+        ray, layer = crossings.hit.nonzero(as_tuple=True)
+        uv, _ = points_to_uv(crossings.points[ray, layer], self.centre)
+        shaded = self.textures.shade(uv, layer, time[ray], directions[ray] if view_effects else None)
+        colour = shaded.rgb if shaded.view is None else shaded.rgb + shaded.view[:, None]
+        alpha = torch.zeros_like(crossings.distance).index_put((ray, layer), shaded.alpha)
+        weights, _ = compositing_weights(alpha)
+        # Dense [R, N, 3]: index_add along rays would be one small operation a crossing on a CPU.
+        colours = torch.zeros_like(crossings.points).index_put((ray, layer), colour)
+        return Traced((weights[..., None] * colours).sum(1), weights, shaded.view)
+
+    @torch.no_grad()
+    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+        """Nearest crossing of each ray with each layer, outermost first.
+
+        Args:
+            origins, directions: [R, 3], directions of unit length.
+        """
+        parts = [self.manifolds.crossings(o, d) for o, d in _chunks(origins, directions)]
+        return Crossings(
+            torch.cat([p.points for p in parts]),
+            torch.cat([p.distance for p in parts]),
+            torch.cat([p.hit for p in parts]),
+        )
+
+    @torch.no_grad()
+    def render(self, origins: Tensor, directions: Tensor, time: float | Tensor, view_effects: bool) -> Rendered:
+        """Colour of rays over black, clamped to [0, 1].
+
+        Args:
+            origins, directions: [R, 3], directions of unit length.
+            time: frame index, possibly between frames: one number or [R].
+            view_effects: with the view-dependent term; False shows what an asset can show.
+        """
+        times = torch.as_tensor(time, dtype=origins.dtype, device=origins.device).expand(len(origins))
+        parts = [self.trace(o, d, t, view_effects) for o, d, t in _chunks(origins, directions, times)]
+        weights = torch.cat([p.weights for p in parts])
+        return Rendered(torch.cat([p.rgb for p in parts]).clamp(0, 1), weights.sum(-1), weights)
+
+    def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        """Each layer along the directions (u, v), by rays from the enclosing ball towards c.
+
+        Args:
+            uv: [M, 2] in [-1, 1].
+
+        Returns:
+            points [N, M, 3] and valid [N, M] bool (False where the layer has no point in that direction).
+        """
+        outward = uv_to_directions(uv)
+        crossings = self.crossings(self.centre + self.manifolds.radius * outward, -outward)
+        return crossings.points.transpose(0, 1), crossings.hit.T
+
+    @torch.no_grad()
+    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
+        """Colour and opacity of one layer, without the view branch.
+
+        Args:
+            uv: [M, 2] in [-1, 1].
+            layer: index, outermost first.
+            time: frame index, possibly between frames.
+
+        Returns:
+            rgb [M, 3] and alpha [M], in [0, 1].
+        """
+        layers = torch.full((len(uv),), layer, dtype=torch.int64, device=uv.device)
+        times = torch.full((len(uv),), float(time), dtype=uv.dtype, device=uv.device)
+        parts = [self.textures.shade(at, i, t, None) for at, i, t in _chunks(uv, layers, times)]
+        return torch.cat([p.rgb for p in parts]), torch.cat([p.alpha for p in parts])
+
+
+def _chunks(*tensors: Tensor) -> list[tuple[Tensor, ...]]:
+    return list(zip(*(t.split(RAYS_AT_ONCE) for t in tensors), strict=True))

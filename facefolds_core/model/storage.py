@@ -1,0 +1,171 @@
+"""A trained model on disk: `model.safetensors` (numbers) and `model.json` (what they are)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import torch
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json, write_json
+from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.model.radiance import RadianceManifolds
+from facefolds_core.model.textures import MlpTextures
+
+_REMEDY = "train again: `dvc repro --force train@SUBJECT`"
+
+
+class ModelSpec(BaseModel):
+    """Everything that is needed to build a model but its numbers.
+
+    Attributes:
+        centre: c, units.
+        levels: s-values, falling (outermost first); radii of the starting spheres, units.
+        radius: of the ball around c that encloses all layers, units.
+        num_frames: K.
+        fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
+        others: as in TrainParams.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    format: Literal["facefolds-model"] = "facefolds-model"
+    version: Literal[1] = 1
+    kind: Literal["mlp"] = "mlp"
+    centre: tuple[float, float, float]
+    levels: Annotated[tuple[float, ...], Field(min_length=1)]
+    radius: float
+    num_frames: Annotated[int, Field(ge=1)]
+    manifold_layers: int
+    manifold_width: int
+    search_samples: int
+    texture_layers: int
+    texture_width: int
+    latent_dim: int
+    uv_frequencies: int
+    level_frequencies: int
+    view_frequencies: int
+    fingerprint: str = ""
+
+
+def build_model(spec: ModelSpec) -> RadianceManifolds:
+    """An untrained model; its random numbers come from torch's global generator."""
+    manifolds = MlpManifolds(
+        spec.centre, spec.levels, spec.radius, spec.manifold_layers, spec.manifold_width, spec.search_samples
+    )
+    textures = MlpTextures(
+        len(spec.levels),
+        spec.num_frames,
+        spec.texture_layers,
+        spec.texture_width,
+        spec.latent_dim,
+        spec.uv_frequencies,
+        spec.level_frequencies,
+        spec.view_frequencies,
+    )
+    return RadianceManifolds(manifolds, textures)
+
+
+def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Tensors and metadata of a safetensors file, on the CPU.
+
+    Raises:
+        UserError: if the file is missing or damaged.
+    """
+    try:
+        with safe_open(str(path), "pt") as file:
+            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy=remedy) from None
+    except (SafetensorError, OSError) as error:
+        raise UserError(
+            "damaged file", file=path, expected="a whole safetensors file", found=str(error), remedy=remedy
+        ) from None
+
+
+def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: Path, remedy: str) -> None:
+    """Compare names, shapes and finiteness.
+
+    Raises:
+        UserError: at the first difference, naming the tensor.
+    """
+    for name in sorted(set(found) ^ set(expected)):
+        raise UserError(
+            "the file does not belong to this configuration",
+            file=path,
+            place=name,
+            expected="this tensor" if name in expected else "no such tensor",
+            found="no such tensor" if name in expected else "this tensor",
+            remedy=remedy,
+        )
+    for name, tensor in found.items():
+        if tensor.shape != expected[name].shape:
+            raise UserError(
+                "the file does not belong to this configuration",
+                file=path,
+                place=name,
+                expected=f"shape {tuple(expected[name].shape)}",
+                found=f"shape {tuple(tensor.shape)}",
+                remedy=remedy,
+            )
+        if tensor.is_floating_point() and not tensor.isfinite().all():
+            raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
+
+
+def save_model(model: RadianceManifolds, spec: ModelSpec, folder: Path) -> None:
+    """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
+    save_file(tensors, str(folder / "model.safetensors"), metadata={"spec": spec.model_dump_json()})
+    write_json(folder / "model.json", spec.model_dump(mode="json"))
+
+
+def read_spec(folder: Path) -> ModelSpec:
+    """`model.json`.
+
+    Raises:
+        UserError: if it is missing, garbled or of another kind.
+    """
+    path = folder / "model.json"
+    value: Any = read_json(path, remedy=_REMEDY)
+    try:
+        return ModelSpec.model_validate(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UserError(
+            "not the description of a model that this version reads",
+            file=path,
+            place=".".join(str(part) for part in first["loc"]) or None,
+            expected=first["msg"],
+            found=repr(first["input"])[:200],
+            remedy=_REMEDY,
+        ) from None
+
+
+def load_model(folder: str | Path, device: torch.device | str = "cpu") -> RadianceManifolds:
+    """The trained model of a folder, in evaluation mode.
+
+    Raises:
+        UserError: if files are missing or damaged, or the two files do not belong together.
+    """
+    folder = Path(folder)
+    spec = read_spec(folder)
+    path = folder / "model.safetensors"
+    tensors, metadata = read_tensors(path, _REMEDY)
+    if metadata.get("spec") != spec.model_dump_json():
+        raise UserError(
+            "model.safetensors and model.json are of different models",
+            file=path,
+            expected=spec.model_dump_json(),
+            found=metadata.get("spec", "no description"),
+            remedy=_REMEDY,
+        )
+    with torch.random.fork_rng(devices=[]):
+        model = build_model(spec)
+    check_tensors(tensors, model.state_dict(), path, _REMEDY)
+    model.load_state_dict(tensors)
+    return model.to(device).eval()

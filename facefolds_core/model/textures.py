@@ -1,0 +1,116 @@
+"""What the layers look like: colour and opacity at (u, v) of a layer, at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+from torch.nn.functional import embedding, relu
+
+from facefolds_core.model.encoding import encoded_size, positional_encoding
+from facefolds_core.model.layers import LinearStack
+
+INITIAL_ALPHA_LOGIT = -1.5
+"""Bias of the opacity: sigmoid(-1.5) = 0.18, so that all 12 layers are seen (and learn) at the start."""
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """Appearance of P points.
+
+    Attributes:
+        rgb: [P, 3] view-independent colour in [0, 1].
+        alpha: [P] opacity in [0, 1].
+        view: [P] grey view-dependent term to add to all three channels, or None where it was not asked for.
+    """
+
+    rgb: Tensor
+    alpha: Tensor
+    view: Tensor | None
+
+
+class Textures(Protocol):
+    """What a model of the appearance must offer."""
+
+    @property
+    def num_frames(self) -> int: ...
+
+    def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
+        """Points at uv [P, 2] of layers [P] (int64), at frame times [P]; directions [P, 3] of the rays, or None."""
+        ...
+
+
+class MlpTextures(nn.Module):
+    """The paper's texture predictor: an MLP on (encoded (u, v), encoded layer coordinate, frame latent), two branches.
+
+    - Layer coordinate: s_i scaled to [-1, 1] (outermost 1), encoded with `level_frequencies` octaves.
+    - Base branch (one linear layer): RGB and alpha, each through a sigmoid. The paper takes alpha as "the raw output",
+      but alpha outside [0, 1] makes compositing blow up.
+    - View branch (one linear layer on the last hidden layer and the encoded ray direction): one grey value, unbounded,
+      added to RGB. Zero to start with.
+    - Activation ReLU. Latents: normal, standard deviation 0.1.
+
+    Args:
+        num_layers: N.
+        num_frames: K latents.
+        hidden_layers, width: of the MLP.
+        latent_dim: of each frame's latent.
+        uv_frequencies, level_frequencies, view_frequencies: octaves.
+    """
+
+    coordinate: Tensor
+
+    def __init__(
+        self,
+        num_layers: int,
+        num_frames: int,
+        hidden_layers: int,
+        width: int,
+        latent_dim: int,
+        uv_frequencies: int,
+        level_frequencies: int,
+        view_frequencies: int,
+    ) -> None:
+        super().__init__()
+        self.uv_frequencies, self.view_frequencies = uv_frequencies, view_frequencies
+        coordinate = torch.linspace(1, -1, num_layers) if num_layers > 1 else torch.zeros(1)
+        encoded = positional_encoding(coordinate[:, None], level_frequencies)
+        self.register_buffer("coordinate", encoded, persistent=False)
+        self.latents = nn.Parameter(0.1 * torch.randn(num_frames, latent_dim))
+        inputs = encoded_size(2, uv_frequencies) + encoded_size(1, level_frequencies) + latent_dim
+        self.hidden = LinearStack([inputs] + [width] * hidden_layers)
+        self.base = nn.Linear(width, 4)
+        self.view = nn.Linear(width + encoded_size(3, view_frequencies), 1)
+        with torch.no_grad():
+            for layer in self.hidden:
+                nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+                nn.init.zeros_(layer.bias)
+            nn.init.normal_(self.base.weight, std=0.5 / width**0.5)
+            self.base.bias.copy_(torch.tensor([0.0, 0.0, 0.0, INITIAL_ALPHA_LOGIT]))
+            nn.init.zeros_(self.view.weight)
+            nn.init.zeros_(self.view.bias)
+
+    @property
+    def num_frames(self) -> int:
+        return len(self.latents)
+
+    def latent(self, time: Tensor) -> Tensor:
+        """Latents [P, D] at frame times [P]: linear between frames, held beyond the first and the last."""
+        time = time.clamp(0, self.num_frames - 1)
+        before = time.floor().long()
+        after = (before + 1).clamp(max=self.num_frames - 1)
+        # embedding() and not indexing: its gradient adds up in a fixed order, so that training repeats bit for bit.
+        return torch.lerp(embedding(before, self.latents), embedding(after, self.latents), (time - before)[:, None])
+
+    def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
+        encoded = positional_encoding(uv, self.uv_frequencies)
+        h = torch.cat([encoded, self.coordinate[layer], self.latent(time)], -1)
+        for linear in self.hidden:
+            h = relu(linear(h))
+        base = torch.sigmoid(self.base(h))
+        view = None
+        if directions is not None:
+            view = self.view(torch.cat([h, positional_encoding(directions, self.view_frequencies)], -1)).squeeze(-1)
+        return Shaded(base[:, :3], base[:, 3], view)

@@ -1,0 +1,282 @@
+"""The training loop: from a normalised scene to a model folder, interruptible at any moment."""
+
+from __future__ import annotations
+
+import math
+import resource
+import shutil
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+from dvclive.live import Live
+from tqdm import tqdm
+
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.model.storage import ModelSpec, build_model, save_model
+from facefolds_core.params import TrainParams
+from facefolds_core.training.checkpoints import (
+    CHECKPOINT,
+    TrainingState,
+    fingerprint,
+    load_checkpoint,
+    save_checkpoint,
+)
+from facefolds_core.training.losses import Losses, batch_losses
+from facefolds_core.training.rays import RaySampler
+from facefolds_core.training.start import Start, find_start, fit_outline
+
+LOG_POINTS = 500
+"""Lines in the log of a whole training, at least; never more than 100 iterations apart."""
+
+START_ITERATIONS = 600
+"""Of the regression onto the tracked mesh (`manifold_start: surface`)."""
+
+
+@dataclass(frozen=True)
+class TrainingReport:
+    """`training.json`.
+
+    Attributes:
+        seconds: of training (start included, over all runs that it took).
+        iterations: Adam steps.
+        device: "cpu (2 threads)" or the GPU's name.
+        preset: name in params.yaml.
+        rays_per_second: mean over `seconds`.
+        peak_memory_bytes: resident (CPU) or allocated (CUDA) at most, in the last run.
+        final_psnr: of the training rays over the last log interval, dB.
+    """
+
+    seconds: float
+    iterations: int
+    device: str
+    preset: str
+    rays_per_second: float
+    peak_memory_bytes: int
+    final_psnr: float
+
+
+def pick_device(name: str) -> torch.device:
+    """ "auto", "cpu" or "cuda" -> device.
+
+    Raises:
+        UserError: if CUDA is asked for and there is none.
+    """
+    if name == "cuda" and not torch.cuda.is_available():
+        raise UserError(
+            "no CUDA device",
+            place="train.device",
+            expected="a CUDA GPU that this build of torch can use",
+            found="none",
+            remedy="set `device: auto` or `device: cpu` in params.yaml, or install a CUDA build of torch",
+        )
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    return torch.device(name)
+
+
+def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
+    """lr_0 decay^(iteration / interval): the paper's "decay rates of 0.05 and 0.20 per 200 000 iterations" as factors."""
+    time_constant = iteration / params.decay_interval
+    return {
+        "manifold": params.lr_manifold * params.decay_manifold**time_constant,
+        "texture": params.lr_texture * params.decay_texture**time_constant,
+    }
+
+
+def model_spec(params: TrainParams, start: Start, num_frames: int, mark: str) -> ModelSpec:
+    shared = set(ModelSpec.model_fields) & set(TrainParams.model_fields)
+    return ModelSpec(
+        centre=SPHERE_CENTRE,
+        levels=start.levels,
+        radius=start.radius,
+        num_frames=num_frames,
+        fingerprint=mark,
+        **params.model_dump(include=shared),
+    )
+
+
+def new_state(params: TrainParams, spec: ModelSpec, device: torch.device) -> TrainingState:
+    """Model, optimiser and ray generator before the first step; the same on every device for a seed."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(params.seed)
+        model = build_model(spec).to(device)
+    named = list(model.named_parameters())
+    groups = [
+        {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
+        {"params": [p for n, p in named if n.startswith("textures.")], "name": "texture"},
+    ]
+    optimiser = torch.optim.Adam(groups, lr=params.lr_texture)
+    return TrainingState(model, optimiser, torch.Generator().manual_seed(params.seed))
+
+
+def train_step(state: TrainingState, sampler: RaySampler, params: TrainParams) -> Losses:
+    """One Adam step.
+
+    Raises:
+        UserError: if the loss or a gradient is not finite; the parameters are then still those before the step.
+    """
+    rates = learning_rates(params, state.iteration)
+    for group in state.optimiser.param_groups:
+        group["lr"] = rates[group["name"]]
+    losses = batch_losses(
+        state.model, sampler.draw(params.rays, state.generator), params.lambda_view, params.lambda_reg
+    )
+    state.optimiser.zero_grad()
+    losses.total.backward()
+    # A parameter that this batch did not reach takes a step with gradient zero, so that Adam's state is always whole.
+    for parameter in state.model.parameters():
+        if parameter.grad is None:
+            parameter.grad = torch.zeros_like(parameter)
+    norm = torch.nn.utils.get_total_norm([p.grad for p in state.model.parameters() if p.grad is not None])
+    if not math.isfinite(float(losses.total.detach() + norm)):
+        raise UserError(
+            "training diverged: the loss or a gradient is not finite",
+            place=f"iteration {state.iteration}, learning rates {rates['manifold']:.3g} (manifold), "
+            f"{rates['texture']:.3g} (texture)",
+            expected="finite numbers",
+            found=f"loss {float(losses.total.detach()):.4g}, gradient norm {float(norm):.4g}",
+            remedy="lower train.lr_manifold and train.lr_texture in params.yaml (halve them), or change train.seed, "
+            "and run `dvc repro` again; nothing of this run was kept as a model",
+        )
+    state.optimiser.step()
+    state.iteration += 1
+    return losses
+
+
+class _Progress:
+    """Log (dvclive) and progress bar: averages over the iterations since the last line."""
+
+    def __init__(self, params: TrainParams, folder: Path, iteration: int) -> None:
+        self.params = params
+        self.every = max(1, min(100, params.iterations // LOG_POINTS))
+        _trim_log(folder, iteration)
+        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else.
+        self.live = Live(dir=str(folder), resume=iteration > 0, save_dvc_exp=False, dvcyaml=None, report=None)
+        self.bar = tqdm(total=params.iterations, initial=iteration, unit="it", desc="train", mininterval=1.0)
+        self.sums: list[float] = []
+        self.count = 0
+        self.since = time.perf_counter()
+        self.psnr = 0.0
+
+    def update(self, losses: Losses, iteration: int) -> None:
+        values = [float(value.detach()) for value in asdict_shallow(losses).values()]
+        self.sums = [a + b for a, b in zip(self.sums, values, strict=True)] if self.count else values
+        self.count += 1
+        self.bar.update()
+        if iteration % self.every and iteration < self.params.iterations:
+            return
+        means = dict(zip(asdict_shallow(losses), (s / self.count for s in self.sums), strict=True))
+        self.psnr = -10 * math.log10(max(means.pop("squared_error"), 1e-10))
+        now = time.perf_counter()
+        rates = learning_rates(self.params, iteration - 1)
+        self.live.step = iteration
+        for name, value in means.items():
+            self.live.log_metric(f"loss/{name}", value)
+        self.live.log_metric("psnr", self.psnr)
+        self.live.log_metric("lr/manifold", rates["manifold"])
+        self.live.log_metric("lr/texture", rates["texture"])
+        self.live.log_metric("rays_per_second", self.count * self.params.rays / (now - self.since))
+        self.live.make_summary()
+        self.bar.set_postfix_str(f"PSNR {self.psnr:.2f} dB", refresh=False)
+        self.count, self.since = 0, now
+
+    def close(self) -> None:
+        self.bar.close()
+        self.live.end()
+
+
+def asdict_shallow(losses: Losses) -> dict[str, torch.Tensor]:
+    return dict(vars(losses))
+
+
+def _trim_log(folder: Path, iteration: int) -> None:
+    """Drop lines of the log that lie after the checkpoint that training continues from."""
+    for path in (folder / "plots" / "metrics").rglob("*.tsv") if iteration else ():
+        header, *rows = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        column = header.split("\t").index("step")
+        path.write_text(header + "".join(r for r in rows if int(r.split("\t")[column]) <= iteration), encoding="utf-8")
+
+
+def train(scene: Scene, params: TrainParams, model_folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
+    """Train on `scene`, write the model folder whole, and remove the checkpoint.
+
+    A run that was interrupted continues from its last checkpoint, to the same result (bit for bit on a CPU with the
+    same number of threads).
+
+    Args:
+        checkpoints: folder of checkpoints; this run's lies in a subfolder named by its fingerprint.
+        log: folder of dvclive's files.
+
+    Raises:
+        UserError: if training diverges (the last checkpoint stays), or the checkpoint found is damaged.
+    """
+    device = pick_device(params.device)
+    start = find_start(scene, params.layers, params.level_halfwidth)
+    mark = fingerprint(params, scene)
+    spec = model_spec(params, start, scene.num_frames, mark)
+    state = new_state(params, spec, device)
+    sampler = RaySampler(scene, state.model.centre, spec.radius, device)
+    own_checkpoints = checkpoints / mark
+    if (own_checkpoints / CHECKPOINT).exists():
+        load_checkpoint(state, mark, own_checkpoints)
+        print(f"train: continuing from iteration {state.iteration} ({own_checkpoints / CHECKPOINT})")
+    else:
+        _begin(state, params, start)
+    psnr = _run(state, sampler, params, mark, own_checkpoints, log)
+    report = _report(state, params, device, psnr)
+    with atomic_folder(model_folder) as temporary:
+        save_model(state.model, spec, temporary)
+        write_json(temporary / "training.json", asdict(report))
+    shutil.rmtree(own_checkpoints, ignore_errors=True)
+    return report
+
+
+def _begin(state: TrainingState, params: TrainParams, start: Start) -> None:
+    manifolds = state.model.manifolds
+    if params.manifold_start == "surface" and start.outline is not None and isinstance(manifolds, MlpManifolds):
+        began = time.perf_counter()
+        error = fit_outline(manifolds, start.outline, START_ITERATIONS, state.generator)
+        state.seconds += time.perf_counter() - began
+        print(f"train: manifolds start at the tracked mesh, root mean square error {error:.4f} units")
+
+
+def _run(
+    state: TrainingState, sampler: RaySampler, params: TrainParams, mark: str, checkpoints: Path, log: Path
+) -> float:
+    """All remaining iterations; returns the PSNR of the last log interval."""
+    progress = _Progress(params, log, state.iteration)
+    saved = last = time.perf_counter()
+    try:
+        while state.iteration < params.iterations:
+            losses = train_step(state, sampler, params)
+            progress.update(losses, state.iteration)
+            now = time.perf_counter()
+            state.seconds, last = state.seconds + now - last, now
+            if now - saved > params.checkpoint_seconds:
+                save_checkpoint(state, mark, checkpoints)
+                saved = now
+    finally:
+        progress.close()
+    return progress.psnr
+
+
+def _report(state: TrainingState, params: TrainParams, device: torch.device, psnr: float) -> TrainingReport:
+    if device.type == "cuda":
+        name, peak = torch.cuda.get_device_name(device), torch.cuda.max_memory_allocated(device)
+    else:
+        name = f"cpu ({torch.get_num_threads()} threads)"
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return TrainingReport(
+        seconds=round(state.seconds, 1),
+        iterations=state.iteration,
+        device=name,
+        preset=params.preset,
+        rays_per_second=round(state.iteration * params.rays / max(state.seconds, 1e-9), 1),
+        peak_memory_bytes=peak,
+        final_psnr=round(psnr, 3),
+    )

@@ -1,0 +1,108 @@
+"""Training rays, drawn uniformly over cameras, pixels and frames, straight from the memory-mapped frame store."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.model.intersection import search_interval
+
+
+@dataclass(frozen=True)
+class Rays:
+    """A batch of R rays with their true colours.
+
+    Attributes:
+        origins, directions: [R, 3], directions of unit length.
+        time: [R] frame indices (float).
+        rgb: [R, 3] in [0, 1].
+    """
+
+    origins: Tensor
+    directions: Tensor
+    time: Tensor
+    rgb: Tensor
+
+
+class RaySampler:
+    """Draws rays of the training cameras.
+
+    Rays that miss the half ball in which surfaces are searched are never drawn: nothing that is learnt changes their
+    colour, so their gradient is zero. (The paper does not say; it only shortens training.)
+
+    Args:
+        scene: whose training cameras are used.
+        centre, radius: of the search ball.
+        device: where batches go. Drawing itself is on the CPU, so that it repeats on any device.
+
+    Raises:
+        UserError: if a training image is missing from the store, or no pixel of any camera meets the ball.
+    """
+
+    def __init__(self, scene: Scene, centre: Tensor, radius: float, device: torch.device) -> None:
+        self.store = scene.open_frames()
+        self.cameras = scene.indices("train")
+        self.num_frames = scene.num_frames
+        self.width = scene.width
+        self.device = device
+        for camera in self.cameras:
+            for frame in range(self.num_frames):
+                if (camera, frame) not in self.store:
+                    raise UserError(
+                        "a training image is missing",
+                        file=self.store.path,
+                        place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
+                        remedy="run `dvc repro` to make the normalised scene again",
+                    )
+        pixels = []
+        for camera in self.cameras:
+            origins, directions = (torch.from_numpy(a.reshape(-1, 3).copy()) for a in scene.cameras[camera].rays())
+            valid = search_interval(origins, directions, centre.cpu().to(origins.dtype), radius)[2]
+            pixels.append(valid.nonzero().squeeze(1).to(torch.int32))
+        self.pixels = torch.cat(pixels)
+        self.ends = torch.tensor([len(p) for p in pixels]).cumsum(0)
+        if len(self.pixels) == 0:
+            raise UserError(
+                "no pixel of any training camera sees the subject",
+                file=scene.folder / "scene.json",
+                expected="cameras that look at the origin",
+                remedy="check the capture's calibration, and `front` or the head poses",
+            )
+        # Pixel (x, y, 1) -> direction in the world: R^T K^-1.
+        unproject = [scene.cameras[c].rotation.T @ np.linalg.inv(scene.cameras[c].K) for c in self.cameras]
+        self.unproject = torch.tensor(np.stack(unproject), dtype=torch.float32, device=device)
+        centres = np.stack([scene.cameras[c].centre for c in self.cameras])
+        self.centres = torch.tensor(centres, dtype=torch.float32, device=device)
+
+    def draw(self, count: int, generator: torch.Generator) -> Rays:
+        """`count` rays, drawn with replacement."""
+        index = torch.randint(len(self.pixels), (count,), generator=generator)
+        frame = torch.randint(self.num_frames, (count,), generator=generator)
+        camera = torch.searchsorted(self.ends, index, right=True)
+        pixel = self.pixels[index].long()
+        colours = self._colours(camera.numpy(), frame.numpy(), pixel.numpy())
+        xy1 = torch.stack([pixel % self.width + 0.5, pixel // self.width + 0.5, torch.ones(count)], -1)
+        cam = camera.to(self.device)
+        directions = torch.einsum("rij,rj->ri", self.unproject[cam], xy1.to(self.device))
+        return Rays(
+            origins=self.centres[cam],
+            directions=torch.nn.functional.normalize(directions, dim=-1),
+            time=frame.to(self.device, torch.float32),
+            rgb=torch.from_numpy(colours).to(self.device).float() / 255,
+        )
+
+    def _colours(self, camera: np.ndarray, frame: np.ndarray, pixel: np.ndarray) -> np.ndarray:
+        """(R, 3) uint8; one look-up an image, because each is its own view of the mapped file."""
+        key = camera * self.num_frames + frame
+        order = np.argsort(key, kind="stable")
+        images, starts = np.unique(key[order], return_index=True)
+        colours = np.empty((len(key), 3), np.uint8)
+        for image, rows in zip(images, np.split(order, starts[1:]), strict=True):
+            view = self.store.image(self.cameras[image // self.num_frames], int(image % self.num_frames))
+            colours[rows] = view.reshape(-1, 3)[pixel[rows]]
+        return colours

@@ -1,0 +1,139 @@
+"""What the scene tells before training: where the levels start, and (optionally) a first guess of the surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.sphere_uv import uv_to_directions
+from facefolds_core.model.manifolds import MlpManifolds
+
+Array = NDArray[np.float64]
+
+MARGIN = 0.05
+"""The search ball reaches this far beyond the outermost level's farthest point, units."""
+
+FILL = 0.8
+"""Without a tracked mesh: the subject is taken to fill this fraction of the narrower half field of view."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The tracked surface as seen from c.
+
+    Attributes:
+        directions: (V, 3) unit directions from c, n_x > 0.
+        radii: (V,) distance of the outermost surface in that direction.
+    """
+
+    directions: Array
+    radii: Array
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where training starts.
+
+    Attributes:
+        levels: N s-values, outermost first: radii of the starting spheres.
+        radius: of the search ball around c.
+        outline: of the tracked mesh, or None.
+    """
+
+    levels: tuple[float, ...]
+    radius: float
+    outline: Outline | None
+
+
+def find_start(scene: Scene, layers: int, halfwidth: float) -> Start:
+    """Levels within +-`halfwidth` of the face surface, and the ball in which crossings are searched.
+
+    With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of c, and the ball encloses
+    all of them. Without, see `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball
+    reaches `MARGIN` beyond the outermost layer if that lay `halfwidth` outside the surface's farthest point.
+    """
+    surface = scene.load_surface()
+    outline = None
+    if surface is not None:
+        outline = find_outline(surface[0].astype(np.float64).mean(0))
+        r0, farthest = float(np.median(outline.radii)), float(outline.radii.max())
+    else:
+        r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")])
+    offsets = np.linspace(halfwidth, -halfwidth, layers) if layers > 1 else np.zeros(1)
+    return Start(tuple((r0 + offsets).tolist()), farthest + halfwidth + MARGIN, outline)
+
+
+def find_outline(vertices: Array) -> Outline:
+    """Outermost vertices (V, 3) in front of c: none within 0.05 (of direction) lies more than 0.02 units farther out.
+
+    This leaves out what another part of the surface covers, seen from outside: eye sockets, mouth, back of the ears.
+    """
+    offset = vertices - np.array(SPHERE_CENTRE)
+    offset = offset[offset[:, 0] > 0]
+    radii = np.linalg.norm(offset, axis=1)
+    directions = offset / radii[:, None]
+    neighbours = cKDTree(directions).query_ball_point(directions, 0.05)
+    highest = np.array([radii[ids].max() for ids in neighbours])
+    keep = radii > highest - 0.02
+    return Outline(directions[keep], radii[keep])
+
+
+def fitted_radius(cameras: list[Camera]) -> tuple[float, float]:
+    """Start radius where there is no tracked mesh.
+
+    The subject is a ball at the origin that fills 0.8 of the narrower half field of view of the median camera: radius
+    rho = 0.8 median(D sin(half angle)), D the camera's distance. Over the front half of that ball cos(angle to +x) is
+    uniform in [0, 1], so the median of |p - c|^2 = rho^2 + b^2 + 2 b rho cos is at cos = 1/2 (b = |c|).
+
+    Returns:
+        r0 = sqrt(rho^2 + b^2 + b rho), and b + rho, the ball's farthest point from c.
+    """
+    tangents = [min(0.5 * c.width / c.K[0, 0], 0.5 * c.height / c.K[1, 1]) for c in cameras]
+    distances = [np.linalg.norm(c.centre) for c in cameras]
+    reach = [d * math.sin(math.atan(t)) for d, t in zip(distances, tangents, strict=True)]
+    rho, b = FILL * float(np.median(reach)), float(np.linalg.norm(SPHERE_CENTRE))
+    return math.sqrt(rho**2 + b**2 + b * rho), rho + b
+
+
+def fit_outline(
+    manifolds: MlpManifolds, outline: Outline, iterations: int, generator: torch.Generator, points: int = 4096
+) -> float:
+    """Regress G(x) = |x - c| + r0 - rho(n), rho the outline's radius in direction n: the middle level on the surface.
+
+    rho is interpolated from the three nearest vertices in direction, so beyond the mesh it continues as its border.
+    Points are drawn at random over the hemisphere (uniform in u, v) and within 0.1 of the surface. Adam, learning
+    rate 5e-3 falling to 1e-4 (cosine).
+
+    Returns:
+        the root mean square error of the last tenth of the iterations, units.
+    """
+    device = manifolds.centre.device
+    tree = cKDTree(outline.directions)
+    middle = 0.5 * float(manifolds.levels[0] + manifolds.levels[-1])
+    optimiser = torch.optim.Adam(manifolds.parameters(), lr=5e-3)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, iterations, eta_min=1e-4)
+    errors = []
+    for _ in range(iterations):
+        draws = torch.rand(points, 3, generator=generator) * 2 - 1
+        directions = uv_to_directions(draws[:, :2])
+        distance, nearest = tree.query(directions.numpy(), k=min(3, len(outline.radii)))
+        distance, nearest = distance.reshape(points, -1), nearest.reshape(points, -1)
+        weights = 1 / (distance + 1e-4)
+        rho = (outline.radii[nearest] * weights).sum(1) / weights.sum(1)
+        rho = torch.from_numpy(rho.astype(np.float32)).to(device)
+        radius = rho + 0.1 * draws[:, 2].to(device)
+        x = manifolds.centre + radius[:, None] * directions.to(device)
+        loss = (manifolds.value(x) - (radius + middle - rho)).square().mean()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        errors.append(float(loss.detach()))
+    return math.sqrt(float(np.mean(errors[-max(1, iterations // 10) :])))

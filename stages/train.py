@@ -1,0 +1,23 @@
+"""Train the model on the normalised scene: data/<subject>/model."""
+
+from __future__ import annotations
+
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_stage
+from facefolds_core.params import TrainParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.loop import train
+from stages.common import run_stage
+
+
+def train_stage(folders: SubjectFolders) -> str:
+    params = read_stage(TrainParams, folders.config)
+    report = train(read_scene(folders.scene), params, folders.model, folders.checkpoints, folders.training_log)
+    return (
+        f"{report.iterations} iterations on {report.device}, {report.rays_per_second:.0f} rays/s, "
+        f"PSNR {report.final_psnr:.2f} dB on training rays, model in {folders.model}"
+    )
+
+
+if __name__ == "__main__":
+    run_stage("train", train_stage, __doc__ or "")
