@@ -1,0 +1,189 @@
+"""Read an asset. Nothing here knows the model: files only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.asset.draco import DracoError, LayerMesh, decode_mesh
+from facefolds_core.asset.manifest import MANIFEST_NAME, REMEDY, Manifest, parse_manifest, seal_is_whole
+from facefolds_core.asset.packing import AtlasLayout
+from facefolds_core.asset.video import decode_video, unpack_picture
+from facefolds_core.asset.writer import file_sha256
+from facefolds_core.errors import UserError
+
+Frame = NDArray[np.uint8]
+"""(N, R, R, 4) RGBA, straight alpha, layers outermost first, row 0 at the top of the head."""
+
+
+@dataclass(frozen=True)
+class Asset:
+    """An asset whose files have been checked against the manifest; the video is decoded on demand.
+
+    Attributes:
+        folder: where it lies.
+        manifest: its manifest.
+        layers: N meshes, outermost first.
+    """
+
+    folder: Path
+    manifest: Manifest
+    layers: tuple[LayerMesh, ...]
+
+    @property
+    def num_layers(self) -> int:
+        return len(self.layers)
+
+    @property
+    def num_frames(self) -> int:
+        return self.manifest.texture.frames
+
+    @property
+    def resolution(self) -> int:
+        """R^t, texels a side."""
+        return self.manifest.texture.layer_resolution
+
+    def frames(self) -> Iterator[Frame]:
+        """All frames in order, decoded as they are asked for.
+
+        Raises:
+            UserError: if the video is damaged or has another number of frames than the manifest says.
+        """
+        count = 0
+        for frame in self._decode(0):
+            if count < self.num_frames:
+                yield frame
+            count += 1
+        if count != self.num_frames:
+            raise self._wrong_count(count)
+
+    def frame(self, index: int) -> Frame:
+        """Frame `index`, 0 <= index < num_frames, whatever was read before.
+
+        Raises:
+            IndexError: if there is no such frame.
+            UserError: if the video is damaged.
+        """
+        if not 0 <= index < self.num_frames:
+            raise IndexError(f"frame {index} of {self.num_frames}")
+        found = next(islice(self._decode(index), 1), None)
+        if found is None:
+            raise self._wrong_count(index)
+        return found
+
+    def _decode(self, start: int) -> Iterator[Frame]:
+        texture = self.manifest.texture
+        layout = layout_of(self.manifest)
+        pictures = decode_video(self.folder / texture.video, (texture.width, texture.height), texture.fps, start)
+        return (unpack_picture(picture, layout) for picture in pictures)
+
+    def _wrong_count(self, found: int) -> UserError:
+        return UserError(
+            "the texture video has another number of frames",
+            file=self.folder / self.manifest.texture.video,
+            expected=self.num_frames,
+            found=found,
+            remedy=REMEDY,
+        )
+
+
+def layout_of(manifest: Manifest) -> AtlasLayout:
+    """Where the manifest says the textures lie."""
+    texture = manifest.texture
+    return AtlasLayout(
+        width=texture.width,
+        height=texture.height,
+        colour_rect=texture.colour_rect,
+        alpha_rect=texture.alpha_rect,
+        rects=tuple(layer.texture_rect for layer in manifest.layers),
+    )
+
+
+def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
+    """What is wrong inside a manifest that has all its keys, in words; the files that it names are not looked at."""
+    texture = manifest.texture
+    problems = []
+    if not seal_is_whole(path.read_bytes()):
+        problems.append("manifest_sha256 is not this file's: its content was changed")
+    if texture.width % 2 or texture.height % 2:
+        problems.append(f"a video of {texture.width} x {texture.height} pixels: both must be even")
+    layout = layout_of(manifest)
+    problems += layout.problems()
+    if layout.resolution != texture.layer_resolution:
+        problems.append(f"texture_rects of {layout.resolution} pixels, layer_resolution is {texture.layer_resolution}")
+    for index, (u0, u1, v0, v1) in enumerate(layer.uv_window for layer in manifest.layers):
+        if not (u0 < u1 and v0 < v1):
+            problems.append(f"uv_window {[u0, u1, v0, v1]} of layer {index} is empty")
+    rotation = np.array(manifest.coordinates.to_capture.rotation)
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+        problems.append("coordinates.to_capture.rotation is not a rotation")
+    names = [texture.video, *(layer.mesh for layer in manifest.layers)]
+    if len(set(names)) != len(names):
+        problems.append("one file is named twice")
+    return problems
+
+
+def check_file(path: Path, size: int, sha256: str) -> str | None:
+    """What is wrong with a file against the manifest's byte count and checksum, in words; None if it is whole."""
+    if not path.is_file():
+        return "the file is missing"
+    found = path.stat().st_size
+    if found != size:
+        return f"the file has {found} bytes, the manifest says {size}: " + ("truncated" if found < size else "too long")
+    if file_sha256(path) != sha256:
+        return "the file's SHA-256 is not the manifest's: its content was changed"
+    return None
+
+
+def read_asset(folder: str | Path) -> Asset:
+    """Read the manifest and the meshes; check every file's length and checksum.
+
+    Raises:
+        UserError: if anything is missing, damaged or of another version; names the file.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise UserError("no such folder", file=folder, expected="the folder of an asset", remedy="make it with `dvc repro`")
+    path = folder / MANIFEST_NAME
+    manifest = parse_manifest(path)
+    problems = manifest_problems(path, manifest)
+    if problems:
+        raise UserError("damaged manifest", file=path, found="; ".join(problems), remedy=REMEDY)
+    texture = manifest.texture
+    files = [(layer.mesh, layer.bytes, layer.sha256) for layer in manifest.layers]
+    for name, size, sha256 in [*files, (texture.video, texture.bytes, texture.sha256)]:
+        problem = check_file(folder / name, size, sha256)
+        if problem:
+            raise UserError("damaged asset", file=folder / name, found=problem, remedy=REMEDY)
+    layers = []
+    for layer in manifest.layers:
+        try:
+            mesh = decode_mesh((folder / layer.mesh).read_bytes())
+        except DracoError as error:
+            raise UserError("damaged mesh", file=folder / layer.mesh, found=str(error), remedy=REMEDY) from None
+        problems = mesh_problems(mesh, layer.vertices, layer.triangles)
+        if problems:
+            raise UserError("damaged mesh", file=folder / layer.mesh, found="; ".join(problems), remedy=REMEDY)
+        layers.append(mesh)
+    return Asset(folder, manifest, tuple(layers))
+
+
+def mesh_problems(mesh: LayerMesh, vertices: int, triangles: int) -> list[str]:
+    """What makes a decoded mesh unusable or different from its manifest's counts, in words."""
+    problems = []
+    if len(mesh.vertices) != vertices:
+        problems.append(f"{len(mesh.vertices)} vertices, the manifest says {vertices}")
+    if len(mesh.faces) != triangles:
+        problems.append(f"{len(mesh.faces)} triangles, the manifest says {triangles}")
+    if not np.isfinite(mesh.vertices).all():
+        problems.append("vertices that are not finite")
+    if not (mesh.st >= -1e-6).all() or not (mesh.st <= 1 + 1e-6).all():
+        problems.append("texture coordinates outside [0, 1]")
+    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        problems.append("faces that name vertices which are not there")
+    return problems

@@ -1,0 +1,220 @@
+"""The texture video: H.264 in MP4 through PyAV, so that frame k of the file is frame k of the sequence.
+
+There are no B-frames and every group of pictures is closed and starts with an IDR picture each KEYFRAME_INTERVAL frames:
+decoding order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many
+pictures. One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from av.error import FFmpegError
+from av.video.reformatter import ColorRange, Colorspace
+from numpy.typing import NDArray
+
+from facefolds_core.asset.colour import NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
+from facefolds_core.asset.packing import AtlasLayout, cell_size, cut, fill_cell
+from facefolds_core.errors import UserError
+from facefolds_core.params import VideoCodec
+
+KEYFRAME_INTERVAL = 15
+_PRIMARIES_BT709 = 1
+_TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273
+
+Picture = NDArray[np.uint8]
+"""A planar 4:2:0 picture as PyAV lays it out: (3/2 height, width), Y above Cb above Cr."""
+
+
+@dataclass(frozen=True)
+class VideoFacts:
+    """What a video file says of itself.
+
+    Attributes:
+        level: of H.264, e.g. "5.1".
+        rate: frames a second.
+        tags: (matrix, range) codes of H.273 / FFmpeg.
+    """
+
+    codec: str
+    level: str
+    pixel_format: str
+    width: int
+    height: int
+    rate: Fraction
+    tags: tuple[int, int]
+
+
+def pack_frame(textures: NDArray[np.uint8], layout: AtlasLayout) -> Picture:
+    """Layers' textures (N, R, R, 4) RGBA -> the picture that is encoded. Each cell is converted by itself.
+
+    `layout` must be `AtlasLayout.grid`'s.
+    """
+    height, width, pitch = layout.height, layout.width, cell_size(layout.resolution)
+    y = np.full((height, width), 16, np.uint8)
+    cb = np.full((height // 2, width // 2), NEUTRAL, np.uint8)
+    cr = cb.copy()
+    top = layout.alpha_rect[1]
+    for texture, (left, up, _, _) in zip(textures, layout.rects, strict=True):
+        cell = fill_cell(texture)
+        full = (slice(up, up + pitch), slice(left, left + pitch))
+        half = (slice(up // 2, (up + pitch) // 2), slice(left // 2, (left + pitch) // 2))
+        y[full], cb[half], cr[half] = rgb_to_yuv420(cell[..., :3])
+        y[top + up : top + up + pitch, full[1]] = alpha_to_luma(cell[..., 3])
+    bottom = layout.colour_rect[3]
+    middle = (bottom + top) // 2
+    y[bottom:middle] = y[bottom - 1]
+    y[middle:top] = y[top]
+    for chroma in (cb, cr):
+        chroma[bottom // 2 : middle // 2] = chroma[bottom // 2 - 1]
+    return np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)])
+
+
+def unpack_picture(picture: Picture, layout: AtlasLayout) -> NDArray[np.uint8]:
+    """A decoded picture -> (N, R, R, 4) RGBA."""
+    height, width = layout.height, layout.width
+    y = picture[:height]
+    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
+    x0, y0, w, h = layout.colour_rect
+    half = (slice(y0 // 2, (y0 + h) // 2), slice(x0 // 2, (x0 + w) // 2))
+    colour = yuv420_to_rgb(y[y0 : y0 + h, x0 : x0 + w], cb[half], cr[half])
+    x1, y1, _, _ = layout.alpha_rect
+    alpha = luma_to_alpha(y[y1 : y1 + h, x1 : x1 + w])
+    return cut(np.concatenate([colour, alpha[..., None]], -1), layout.rects)
+
+
+def encode_video(path: Path, pictures: Iterable[Picture], size: tuple[int, int], fps: Fraction, codec: VideoCodec) -> int:
+    """Encode planar pictures of `size` (width, height); returns how many.
+
+    Raises:
+        UserError: if the encoder refuses.
+    """
+    count = 0
+    try:
+        with av.open(str(path), "w", format="mp4", options={"movflags": "faststart", "fflags": "bitexact"}) as container:
+            stream: Any = container.add_stream("libx264", rate=fps, options=_x264_options(codec))
+            stream.width, stream.height = size
+            stream.pix_fmt = "yuv420p"
+            context = stream.codec_context
+            context.time_base = 1 / fps
+            context.thread_count = 1
+            context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+            context.color_primaries, context.color_trc = _PRIMARIES_BT709, _TRANSFER_SRGB
+            for picture in pictures:
+                frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
+                frame.colorspace, frame.color_range = Colorspace.ITU709, ColorRange.MPEG
+                frame.pts, frame.time_base = count, 1 / fps
+                container.mux(stream.encode(frame))
+                count += 1
+            container.mux(stream.encode(None))
+    except FFmpegError as error:
+        if error.errno in (28, 122):  # disk full, quota: reported as such by the stage
+            raise
+        raise UserError(
+            "the video encoder refused the textures",
+            file=path,
+            place=f"frame {count}, {size[0]} x {size[1]} pixels",
+            found=str(error),
+            remedy="use a smaller texture.resolution, or another compress.video.preset",
+        ) from None
+    return count
+
+
+def _x264_options(codec: VideoCodec) -> dict[str, str]:
+    fixed = {
+        "keyint": KEYFRAME_INTERVAL,
+        "min-keyint": KEYFRAME_INTERVAL,
+        "scenecut": 0,
+        "open-gop": 0,
+        "bframes": 0,
+        "chromaloc": 0,
+        "threads": 1,
+        "cpu-independent": 1,
+    }
+    return {
+        "crf": str(codec.crf),
+        "preset": codec.preset,
+        "x264-params": ":".join(f"{key}={value}" for key, value in fixed.items()),
+    }
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """(container, its video stream).
+
+    Raises:
+        UserError: if the file is missing or is not a video; also for errors of FFmpeg inside the block.
+    """
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.video:
+                raise _damaged(path, "it has no video stream")
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            yield container, stream
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy="make the asset again, or copy it again") from None
+    except FFmpegError as error:
+        raise _damaged(path, str(error)) from None
+
+
+def _damaged(path: Path, found: str) -> UserError:
+    return UserError("damaged texture video", file=path, found=found, remedy="make the asset again, or copy it again")
+
+
+def probe_video(path: Path) -> VideoFacts:
+    """Read a video's header.
+
+    Raises:
+        UserError: if it cannot be opened.
+    """
+    with _opened(path) as (_, stream):
+        context = stream.codec_context
+        header = bytes(context.extradata or b"")
+        # ISO/IEC 14496-15, AVCDecoderConfigurationRecord: byte 3 is level_idc, ten times the level.
+        level = header[3] if len(header) > 3 else 0
+        return VideoFacts(
+            codec=context.name,
+            level=f"{level / 10:g}",
+            pixel_format=context.pix_fmt or "unknown",
+            width=context.width,
+            height=context.height,
+            rate=stream.average_rate or Fraction(0),
+            tags=(int(context.colorspace), int(context.color_range)),
+        )
+
+
+def decode_video(path: Path, size: tuple[int, int], fps: float, start: int = 0) -> Iterator[Picture]:
+    """Decode the pictures from frame `start` on, one at a time.
+
+    Args:
+        size: (width, height) that the pictures must have.
+        fps: frames a second, by which time stamps become frame numbers.
+        start: first frame wanted; decoding starts at the key frame before it.
+
+    Raises:
+        UserError: if the file is damaged, its size is another, or a frame is missing.
+    """
+    with _opened(path) as (container, stream):
+        if (stream.codec_context.width, stream.codec_context.height) != size:
+            found = f"{stream.codec_context.width} x {stream.codec_context.height}"
+            raise _damaged(path, f"pictures of {found} pixels instead of {size[0]} x {size[1]}")
+        if start:
+            container.seek(round(start / fps / stream.time_base), stream=stream, backward=True)
+        expected = None
+        for frame in container.decode(stream):
+            number = round(float(frame.pts * stream.time_base) * fps) if frame.pts is not None else -1
+            if expected is not None and number != expected or expected is None and number > start:
+                raise _damaged(path, f"frame {number} follows where frame {start if expected is None else expected} should")
+            expected = number + 1
+            if (frame.width, frame.height) != size or frame.format.name != "yuv420p":
+                raise _damaged(path, f"frame {number} is {frame.width} x {frame.height} {frame.format.name}")
+            if number >= start:
+                yield frame.to_ndarray()

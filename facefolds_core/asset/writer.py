@@ -1,0 +1,175 @@
+"""Write an asset: Draco meshes, texture video, manifest."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core import __version__
+from facefolds_core.asset.draco import LayerMesh, encode_mesh
+from facefolds_core.asset.manifest import MANIFEST_NAME, Coordinates, Layer, Manifest, Texture, Transform, write_manifest
+from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.video import Picture, encode_video, pack_frame, probe_video
+from facefolds_core.captures.frames import FrameStore
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.params import CompressParams
+
+STATIC_FPS = 1.0
+"""Written for a static scene, whose one frame has no rate."""
+VIDEO_NAME = "texture.mp4"
+
+
+@dataclass(frozen=True)
+class AssetSource:
+    """What a manifest tells of the capture.
+
+    Attributes:
+        subject: its name.
+        fps: frames a second; 0 for a static scene.
+        to_capture: normalised coordinates -> capture coordinates.
+        sphere_centre: c of the UV map, normalised.
+    """
+
+    subject: str
+    fps: float
+    to_capture: Similarity
+    sphere_centre: tuple[float, float, float]
+
+
+def write_asset(
+    folder: str | Path,
+    meshes: Sequence[LayerMesh],
+    windows: Sequence[Window],
+    textures: FrameStore,
+    source: AssetSource,
+    params: CompressParams,
+) -> Manifest:
+    """Write the folder of an asset, whole or not at all; an older one is replaced.
+
+    Args:
+        meshes: N layers, outermost first.
+        windows: (u0, u1, v0, v1) of each layer's texture.
+        textures: layered texture store (camera := layer), N layers x K frames of (R, R, 4).
+        source: what the manifest tells of the capture.
+        params: codecs.
+
+    Raises:
+        UserError: if a mesh or the store cannot be an asset's, or the textures do not fit into one video.
+    """
+    frames = _check_textures(textures, len(meshes))
+    if len(windows) != len(meshes):
+        raise ValueError(f"{len(windows)} windows for {len(meshes)} meshes")
+    for index, mesh in enumerate(meshes):
+        _check_mesh(mesh, f"layer {index}")
+    layout = AtlasLayout.grid(len(meshes), textures.height)
+    check_layout(layout)
+    folder = Path(folder)
+    with atomic_folder(folder) as temporary:
+        layers = [
+            _write_layer(temporary, index, mesh, window, layout, params)
+            for index, (mesh, window) in enumerate(zip(meshes, windows, strict=True))
+        ]
+        manifest = Manifest(
+            generator=f"facefolds {__version__}",
+            subject=source.subject,
+            coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
+            layers=tuple(layers),
+            texture=_write_video(temporary, textures, frames, source.fps or STATIC_FPS, layout, params),
+        )
+        return write_manifest(manifest, temporary / MANIFEST_NAME)
+
+
+def _write_layer(
+    folder: Path, index: int, mesh: LayerMesh, window: Window, layout: AtlasLayout, params: CompressParams
+) -> Layer:
+    name = f"layer_{index:02d}.drc"
+    data, decoded = encode_mesh(mesh, params.mesh)
+    (folder / name).write_bytes(data)
+    u0, u1, v0, v1 = (float(bound) for bound in window)
+    return Layer(
+        mesh=name,
+        vertices=len(decoded.vertices),
+        triangles=len(decoded.faces),
+        bytes=len(data),
+        sha256=hashlib.sha256(data).hexdigest(),
+        texture_rect=layout.rects[index],
+        uv_window=(u0, u1, v0, v1),
+    )
+
+
+def _write_video(
+    folder: Path, textures: FrameStore, frames: int, fps: float, layout: AtlasLayout, params: CompressParams
+) -> Texture:
+    def pictures() -> Iterator[Picture]:
+        for frame in range(frames):
+            yield pack_frame(np.stack([textures.image(layer, frame) for layer in range(len(layout.rects))]), layout)
+
+    path = folder / VIDEO_NAME
+    rate = Fraction(fps).limit_denominator(1001)
+    encode_video(path, pictures(), (layout.width, layout.height), rate, params.video)
+    return Texture(
+        video=VIDEO_NAME,
+        bytes=path.stat().st_size,
+        sha256=file_sha256(path),
+        level=probe_video(path).level,
+        width=layout.width,
+        height=layout.height,
+        colour_rect=layout.colour_rect,
+        alpha_rect=layout.alpha_rect,
+        frames=frames,
+        fps=float(rate),
+        layer_resolution=layout.resolution,
+    )
+
+
+def file_sha256(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file's bytes."""
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def _check_textures(textures: FrameStore, layers: int) -> int:
+    """The number K of frames of a store that holds N x K square RGBA textures."""
+    remedy = "run `dvc repro` to make the textures again"
+    if textures.channels != 4 or textures.height != textures.width:
+        raise UserError(
+            "the textures are not square RGBA images",
+            file=textures.path,
+            found=f"{textures.height} x {textures.width} x {textures.channels}",
+            remedy=remedy,
+        )
+    keys = textures.keys()
+    frames = 1 + max((frame for _, frame in keys), default=-1)
+    if frames == 0 or keys != [(layer, frame) for layer in range(layers) for frame in range(frames)]:
+        raise UserError(
+            "the texture store is not complete",
+            file=textures.path,
+            expected=f"{layers} layers x {frames} frames",
+            found=f"{len(keys)} images",
+            remedy=remedy,
+        )
+    return frames
+
+
+def _check_mesh(mesh: LayerMesh, place: str) -> None:
+    problem = None
+    if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
+        problem = "no faces"
+    elif mesh.st.shape != (len(mesh.vertices), 2):
+        problem = f"texture coordinates {mesh.st.shape} for {len(mesh.vertices)} vertices"
+    elif not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.st).all()):
+        problem = "numbers that are not finite"
+    elif mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        problem = "faces that name vertices which are not there"
+    elif mesh.st.min() < 0 or mesh.st.max() > 1:
+        problem = f"texture coordinates from {mesh.st.min():g} to {mesh.st.max():g}, outside [0, 1]"
+    if problem:
+        raise UserError("a layer's mesh cannot be written", place=place, found=problem, remedy="run `dvc repro` again")

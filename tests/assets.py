@@ -1,0 +1,83 @@
+"""A small synthetic asset: nested caps of spheres about the sphere centre, with procedural textures that move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.asset import AssetSource, LayerMesh, Manifest, write_asset
+from facefolds_core.captures.frames import FrameStore, write_frames
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
+from facefolds_core.params import CompressParams
+
+CENTRE = (-0.25, 0.0, 0.0)
+WINDOW: Window = (-0.5, 0.5, -0.4, 0.4)
+SOURCE = AssetSource(
+    "caps", 30.0, Similarity(2.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.3])), CENTRE
+)
+
+
+def radius_of(layer: int) -> float:
+    """Radius of a layer's sphere; outermost first."""
+    return 0.40 - 0.03 * layer
+
+
+def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) -> LayerMesh:
+    """A grid over `window` on the sphere of `radius` about CENTRE; faces turn counter-clockwise seen from outside."""
+    n = vertices_a_side
+    s, t = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
+    st = np.stack([s, t], -1).reshape(-1, 2)
+    points = np.array(CENTRE) + radius * uv_to_directions(st_to_uv(st, window))
+    index = np.arange(n * n).reshape(n, n)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
+    return LayerMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+
+
+def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:
+    """(R, R, 4) RGBA: smooth waves that move with the frame, alpha from 0 at the rim to 255 in the middle."""
+    s, t = np.meshgrid(*[(np.arange(resolution) + 0.5) / resolution] * 2)
+    phase = 0.4 * frame + layer
+    red = 0.6 + 0.3 * np.sin(9 * s + 4 * t + phase)
+    green = 0.45 + 0.25 * np.sin(7 * t - phase)
+    blue = 0.4 + 0.2 * np.cos(8 * (s - t) + phase)
+    alpha = np.clip(1.6 - 3.2 * np.hypot(s - 0.5, t - 0.5) + 0.1 * np.sin(12 * s + phase), 0, 1)
+    rgba = np.stack([red, green, blue, alpha], -1)
+    return np.rint(255 * rgba).astype(np.uint8)
+
+
+def cap_textures(layers: int, frame: int, resolution: int) -> NDArray[np.uint8]:
+    """(N, R, R, 4): what `Asset.frame` should come near to."""
+    return np.stack([cap_texture(layer, frame, resolution) for layer in range(layers)])
+
+
+def write_store(path: Path, frames: NDArray[np.uint8]) -> FrameStore:
+    """Write (K, N, R, R, 4) as a layered texture store and open it."""
+
+    def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+        for frame, layers in enumerate(frames):
+            for layer, texture in enumerate(layers):
+                yield layer, frame, texture
+
+    resolution = frames.shape[2]
+    write_frames(path, (resolution, resolution, 4), rows())
+    return FrameStore(path)
+
+
+def make_asset(
+    folder: Path,
+    layers: int = 3,
+    frames: int = 5,
+    resolution: int = 64,
+    params: CompressParams | None = None,
+    source: AssetSource = SOURCE,
+) -> Manifest:
+    """Write the synthetic asset to `folder` (its textures' store goes beside it)."""
+    textures = np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)])
+    store = write_store(folder.parent / f"{folder.name}-textures.arrow", textures)
+    meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
+    return write_asset(folder, meshes, [WINDOW] * layers, store, source, params or CompressParams())
