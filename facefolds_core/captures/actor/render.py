@@ -1,0 +1,255 @@
+"""Rays, hair, light: the actor's own renderer. It shares nothing with the product's rendering but the `Camera`.
+
+Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour, opacity or depth, the
+pixel becomes the mean of four more samples on a rotated grid. Nothing is random, so a picture depends on its arguments only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from facefolds_core.captures.actor.hair import STEP, density, envelope, hair_colour
+from facefolds_core.captures.actor.jit import compiled, kernel, source_digest
+from facefolds_core.captures.actor.motion import head_pose, pose_at
+from facefolds_core.captures.actor.noise import Vector
+from facefolds_core.captures.actor.room import room_colour
+from facefolds_core.captures.actor.shade import surface_colour
+from facefolds_core.captures.actor.shape import normal, surface, trace
+from facefolds_core.geometry.cameras import Camera
+
+Array = NDArray[np.float64]
+
+_DIFFERENT = 0.035
+"""Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
+_DEPTH_JUMP = 4.0
+"""Likewise in depth, mm."""
+_BOUND = 480.0
+"""Everything opaque lies within this distance of the head's origin, mm."""
+
+# Unit direction to the light (head standing still: x to its left, y up, z forward) and colour. The key light comes from
+# above, in front of the left cheek; then a fill from the window's side and two rims from behind.
+_LIGHTS = np.array(
+    [
+        [0.48, 0.52, 0.71, 0.62, 0.58, 0.52],
+        [-0.72, 0.10, 0.69, 0.20, 0.23, 0.27],
+        [-0.80, 0.45, -0.40, 0.20, 0.22, 0.25],
+        [0.85, 0.30, -0.43, 0.18, 0.15, 0.12],
+    ]
+)
+_LIGHTS[:, :3] /= np.linalg.norm(_LIGHTS[:, :3], axis=1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class ActorOptions:
+    """Ways to make the actor easier or harder.
+
+    Attributes:
+        gloss: factor on all gloss; 0 makes the head view-independent.
+        hair_density: factor on the hair's extinction; 0 makes it bald.
+        room_colour: 1 as painted, 0 a grey room.
+        head_motion: amplitude of a rigid turn and nod, radians; 0 keeps the skull still.
+    """
+
+    gloss: float = 1.0
+    hair_density: float = 1.0
+    room_colour: float = 1.0
+    head_motion: float = 0.0
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a camera sees.
+
+    Attributes:
+        rgb: (H, W, 3) uint8, display-referred.
+        opacity: (H, W) float32 in [0, 1]: subject (hair included) against the room.
+        depth: (H, W) float32: distance in mm along the optical axis of the first opaque surface of the subject, at the
+            pixel's centre; inf where there is none. Hair is not opaque and has no depth.
+    """
+
+    rgb: NDArray[np.uint8]
+    opacity: NDArray[np.float32]
+    depth: NDArray[np.float32]
+
+
+@compiled
+def _hair(
+    o: Vector, d: Vector, far: float, lights: Array, amount: float, gloss: float, seed: int
+) -> tuple[float, float, float, float]:
+    """March a ray through the hair up to `far`: (red, green, blue) of the hair times its cover, and transmittance."""
+    red, green, blue, through = 0.0, 0.0, 0.0, 1.0
+    b = o[0] * d[0] + (o[1] - 5.0) * d[1] + (o[2] + 10.0) * d[2]
+    c = o[0] * o[0] + (o[1] - 5.0) ** 2 + (o[2] + 10.0) ** 2 - 150.0**2
+    root = b * b - c
+    if amount <= 0.0 or root <= 0.0:
+        return red, green, blue, through
+    t, stop = -b - math.sqrt(root), min(-b + math.sqrt(root), far)
+    view = (-d[0], -d[1], -d[2])
+    while t < stop:
+        x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
+        outside = envelope(x, y, z)
+        if outside > 8.0:
+            t += max(0.8 * (outside - 6.0), STEP)
+            continue
+        step = min(STEP, stop - t)
+        half = t + 0.5 * step
+        x, y, z = o[0] + half * d[0], o[1] + half * d[1], o[2] + half * d[2]
+        extinction, depth, locks, fine = density(x, y, z, amount, seed)
+        if extinction > 1e-4:
+            cover = 1.0 - math.exp(-extinction * step)
+            r, g, bl = hair_colour(x, y, z, view, depth, locks, fine, lights, gloss)
+            red += through * cover * r
+            green += through * cover * g
+            blue += through * cover * bl
+            through *= 1.0 - cover
+            if through < 0.004:
+                return red, green, blue, 0.0
+        t += step
+    return red, green, blue, through
+
+
+@compiled
+def _sample(
+    u: float, v: float, to_world: Array, centre: Array, frame: Array, pose: Array, lights: Array, settings: Array, seed: int
+) -> tuple[float, float, float, float, float]:
+    """One ray through continuous image coordinates (u, v): colour, opacity, distance along the ray (inf for none)."""
+    wx = to_world[0, 0] * u + to_world[0, 1] * v + to_world[0, 2]
+    wy = to_world[1, 0] * u + to_world[1, 1] * v + to_world[1, 2]
+    wz = to_world[2, 0] * u + to_world[2, 1] * v + to_world[2, 2]
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    wx, wy, wz = wx / length, wy / length, wz / length
+    # Into the head's frame: X = R^T (X_w - t).
+    ax, ay, az = centre[0] - frame[0, 3], centre[1] - frame[1, 3], centre[2] - frame[2, 3]
+    o = (
+        frame[0, 0] * ax + frame[1, 0] * ay + frame[2, 0] * az,
+        frame[0, 1] * ax + frame[1, 1] * ay + frame[2, 1] * az,
+        frame[0, 2] * ax + frame[1, 2] * ay + frame[2, 2] * az,
+    )
+    d = (
+        frame[0, 0] * wx + frame[1, 0] * wy + frame[2, 0] * wz,
+        frame[0, 1] * wx + frame[1, 1] * wy + frame[2, 1] * wz,
+        frame[0, 2] * wx + frame[1, 2] * wy + frame[2, 2] * wz,
+    )
+    gloss, amount, colourfulness = settings[0], settings[1], settings[2]
+    b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
+    root = b * b - (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - _BOUND * _BOUND)
+    hit = math.inf
+    red, green, blue, through = 0.0, 0.0, 0.0, 1.0
+    if root > 0.0:
+        half = math.sqrt(root)
+        hit = trace(o[0], o[1], o[2], d[0], d[1], d[2], max(-b - half, 0.0), -b + half, pose)
+        red, green, blue, through = _hair(o, d, hit, lights, amount, gloss, seed)
+    if through <= 0.0:
+        return red, green, blue, 1.0, hit
+    if hit < math.inf:
+        p = (o[0] + hit * d[0], o[1] + hit * d[1], o[2] + hit * d[2])
+        _, material = surface(p[0], p[1], p[2], pose)
+        n = normal(p[0], p[1], p[2], pose)
+        r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss, seed)
+        return red + through * r, green + through * g, blue + through * bl, 1.0, hit
+    r, g, bl = room_colour(centre[0], centre[1], centre[2], wx, wy, wz, colourfulness)
+    return red + through * r, green + through * g, blue + through * bl, 1.0 - through, hit
+
+
+@compiled
+def _differs(image: Array, i: int, j: int) -> bool:
+    """Whether pixel (row i, column j) of (H, W, 5) samples differs from one of its eight neighbours."""
+    height, width = image.shape[0], image.shape[1]
+    for a in range(max(i - 1, 0), min(i + 2, height)):
+        for b in range(max(j - 1, 0), min(j + 2, width)):
+            for c in range(4):
+                if abs(image[a, b, c] - image[i, j, c]) > _DIFFERENT:
+                    return True
+            one, other = image[a, b, 4], image[i, j, 4]
+            if (one < math.inf) != (other < math.inf) or (one < math.inf and abs(one - other) > _DEPTH_JUMP):
+                return True
+    return False
+
+
+def _build(digest: int) -> Callable[..., tuple[Array, Array]]:
+    """The kernel; `digest` of the sources is part of its cache key (see jit.kernel)."""
+
+    @kernel
+    def render_samples(
+        height: int,
+        width: int,
+        to_world: Array,
+        centre: Array,
+        frame: Array,
+        pose: Array,
+        lights: Array,
+        settings: Array,
+        seed: int,
+    ) -> tuple[Array, Array]:
+        """(H, W, 5) red, green, blue, opacity and ray distance at pixel centres, and (H, W, 4) anti-aliased."""
+        assert digest >= 0
+        first = np.empty((height, width, 5))
+        for i in prange(height):
+            for j in range(width):
+                r, g, b, a, t = _sample(j + 0.5, i + 0.5, to_world, centre, frame, pose, lights, settings, seed)
+                first[i, j, 0], first[i, j, 1], first[i, j, 2] = min(r, 1.0), min(g, 1.0), min(b, 1.0)
+                first[i, j, 3], first[i, j, 4] = a, t
+        smooth = np.empty((height, width, 4))
+        for i in prange(height):
+            for j in range(width):
+                smooth[i, j] = first[i, j, :4]
+                if _differs(first, i, j):
+                    smooth[i, j] = 0.0
+                    for k in range(4):
+                        # A rotated grid: rows and columns of the four samples are all different.
+                        u = j + 0.125 + 0.25 * ((2 * k + 1) % 5 if k != 2 else 0)
+                        v = i + 0.125 + 0.25 * k
+                        r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
+                        smooth[i, j, 0] += 0.25 * min(r, 1.0)
+                        smooth[i, j, 1] += 0.25 * min(g, 1.0)
+                        smooth[i, j, 2] += 0.25 * min(b, 1.0)
+                        smooth[i, j, 3] += 0.25 * a
+        return first, smooth
+
+    return render_samples
+
+
+_render_samples = _build(source_digest())
+
+
+def render(camera: Camera, time: float, options: ActorOptions | None = None, seed: int = 0) -> Picture:
+    """The actor as a camera sees it.
+
+    Args:
+        camera: in the capture's world (mm, head near z = 1000), continuous image coordinates.
+        time: seconds; any, also between frames; periodic in `motion.PERIOD`.
+        options: see `ActorOptions`.
+        seed: of skin, hair and freckles.
+    """
+    options = options or ActorOptions()
+    rotation, translation = head_pose(time, options.head_motion)
+    frame = np.concatenate([rotation, translation[:, None]], 1)
+    # The lights stand in the room: turn them into the head's frame.
+    lights = _LIGHTS.copy()
+    lights[:, :3] = _LIGHTS[:, :3] @ np.diag([1.0, -1.0, -1.0]) @ rotation
+    to_world = np.ascontiguousarray(camera.rotation.T @ np.linalg.inv(camera.K))
+    settings = np.array([options.gloss, options.hair_density, options.room_colour])
+    first, smooth = _render_samples(
+        camera.height,
+        camera.width,
+        to_world,
+        np.ascontiguousarray(camera.centre),
+        frame,
+        pose_at(time),
+        lights,
+        settings,
+        seed,
+    )
+    rays = camera.rays()[1]
+    along_axis = rays @ camera.forward
+    return Picture(
+        rgb=np.rint(255 * np.clip(smooth[..., :3], 0, 1)).astype(np.uint8),
+        opacity=np.clip(smooth[..., 3], 0, 1).astype(np.float32),
+        depth=(first[..., 4] * along_axis).astype(np.float32),
+    )

@@ -1,0 +1,83 @@
+"""The actor's cameras: a calibrated rig about one metre from the head, in the capture's world (mm)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import CaptureParams
+
+DISTANCE = 1000.0
+TARGET = (0.0, -12.0, 0.0)
+"""What the cameras look at, head frame, mm."""
+_FIELD = (226.0, 345.0)
+"""Width and height in mm at the head that fit into every picture."""
+_MAX_AZIMUTH = 75.0
+_ELEVATIONS = (-25.0, 35.0)
+_FIRST_VIEW = (3.0, 2.0)
+# (azimuth, elevation) at every twelfth place, the ones that `holdout: {every: 12}` takes: inside the rig.
+_INNER_VIEWS = ((-17.0, 6.0), (40.0, 9.0), (-42.0, 4.0), (18.0, 14.0))
+_INNER_EVERY = 12
+
+
+@dataclass(frozen=True)
+class ActorRig:
+    """Cameras in the order of their names.
+
+    Attributes:
+        cameras: all of one image size, continuous image coordinates, world mm.
+    """
+
+    cameras: tuple[Camera, ...]
+
+
+def camera_at(name: str, azimuth: float, elevation: float, width: int, height: int) -> Camera:
+    """A camera that looks at the head.
+
+    Args:
+        name: of the camera.
+        azimuth: degrees to the head's left.
+        elevation: degrees above the head.
+        width, height: of its images, pixels.
+    """
+    a, e = math.radians(azimuth), math.radians(elevation)
+    to_world = np.diag([1.0, -1.0, -1.0])
+    away = to_world @ np.array([math.cos(e) * math.sin(a), math.sin(e), math.cos(e) * math.cos(a)])
+    target = to_world @ np.array(TARGET) + np.array([0.0, 0.0, 1000.0])
+    forward = -away
+    right = np.cross(np.array([0.0, 1.0, 0.0]), forward)
+    right /= np.linalg.norm(right)
+    R = np.stack([right, np.cross(forward, right), forward])
+    centre = target + DISTANCE * away
+    focal = DISTANCE * min(width / _FIELD[0], height / _FIELD[1])
+    K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+    return Camera(name, K, np.concatenate([R, (-R @ centre)[:, None]], 1), width, height)
+
+
+def make_rig(params: CaptureParams) -> ActorRig:
+    """The rig of a capture: a nearly frontal camera, inner views at every twelfth place, the rest spread evenly.
+
+    The spread is the plane's two-dimensional golden-ratio sequence (Roberts, 2018): any number of cameras covers the
+    window of directions without clusters.
+    """
+    plastic = 1.324717957244746
+    views = [_FIRST_VIEW]
+    inner = 0
+    for place in range(1, params.cameras):
+        if (place + 1) % _INNER_EVERY == 0:
+            views.append(_INNER_VIEWS[inner % len(_INNER_VIEWS)])
+            inner += 1
+            continue
+        a, b = (0.5 + place / plastic) % 1.0, (0.5 + place / plastic**2) % 1.0
+        low, high = _ELEVATIONS
+        views.append((_MAX_AZIMUTH * (2 * a - 1), low + (high - low) * b))
+    names = [f"A{place:03d}" for place in range(params.cameras)]
+    return ActorRig(
+        tuple(
+            camera_at(name, azimuth, elevation, params.width, params.height)
+            for name, (azimuth, elevation) in zip(names, views, strict=True)
+        )
+    )
