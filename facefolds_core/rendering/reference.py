@@ -1,4 +1,4 @@
-"""The reference renderer: an asset as it ships, seen from a camera. Slow and clear; every faster player is compared with it.
+"""The reference renderer: an asset as it ships, seen from a camera. Slow and clear: faster players are held against it.
 
 What it does is what docs/asset-format.md asks of a player:
 - one ray through each pixel's centre, no anti-aliasing; the nearest hit with each layer counts, whichever side it is;
@@ -68,16 +68,16 @@ class AssetCaster:
     def cast(self, camera: Camera) -> Hits:
         """Hits of the rays through all pixel centres of `camera`."""
         origins, directions = (np.reshape(rays, (-1, 3)) for rays in camera.rays())
-        shape = (camera.height, camera.width, len(self._layers))
-        hit, st = np.zeros(shape, bool), np.zeros((*shape, 2), np.float32)
+        count = (len(origins), len(self._layers))
+        hit, st = np.zeros(count, bool), np.zeros((*count, 2), np.float32)
         for i, (mesh, corners) in enumerate(self._layers):
             found = mesh.nearest(origins, directions)
             rays = np.flatnonzero(found.triangle != MISS)
-            where = np.unravel_index(rays, shape[:2])
-            hit[(*where, i)] = True
+            hit[rays, i] = True
             weights = found.barycentric[rays]
-            st[(*where, i)] = np.einsum("rk,rkc->rc", weights, corners[found.triangle[rays]].astype(np.float64))
-        return Hits(hit, st)
+            st[rays, i] = np.einsum("rk,rkc->rc", weights, corners[found.triangle[rays]].astype(np.float64))
+        image = (camera.height, camera.width, len(self._layers))
+        return Hits(hit.reshape(image), st.reshape(*image, 2))
 
 
 def sample_texture(texture: Textures, st: NDArray[np.float32]) -> Image:

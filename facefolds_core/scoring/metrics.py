@@ -1,0 +1,94 @@
+"""PSNR and SSIM of an image against the truth, over the whole frame or weighted by a mask (docs/metrics.md).
+
+Images are (H, W, 3) float64 in [0, 1], in stored (sRGB-encoded) values. SSIM is written out here with separable filters
+because torchmetrics' takes seconds an image on a CPU; tests compare the two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+
+Array = NDArray[np.float64]
+
+MAX_PSNR = 100.0
+"""dB given to images that agree (almost) exactly: infinity is no number in JSON."""
+
+WINDOW_RADIUS = 5
+"""SSIM's Gaussian window is 11 x 11."""
+WINDOW_SIGMA = 1.5
+SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
+
+
+def shown(image: NDArray[np.floating]) -> Array:
+    """An image as an 8-bit display shows it: clipped to [0, 1] and rounded to multiples of 1/255."""
+    return np.asarray(np.round(np.clip(image, 0, 1) * np.float64(255)) / 255)
+
+
+def psnr(image: Array, truth: Array, mask: Array | None = None) -> float | None:
+    """10 log10(1 / MSE) dB, at most MAX_PSNR; MSE = sum m |I - T|^2 / (3 sum m).
+
+    Args:
+        image, truth: (H, W, 3).
+        mask: (H, W), m in [0, 1]; None is 1 everywhere.
+
+    Returns:
+        None where the mask is empty.
+    """
+    square = ((image - truth) ** 2).mean(-1)
+    if mask is None:
+        error = float(square.mean())
+    elif mask.sum() > 0:
+        error = float((mask * square).sum() / mask.sum())
+    else:
+        return None
+    return min(MAX_PSNR, -10 * float(np.log10(max(error, 1e-12))))
+
+
+def ssim_map(image: Array, truth: Array) -> Array:
+    """SSIM (Wang et al. 2004, eq. 13) at each pixel whose whole 11 x 11 window lies inside the image; mean of channels.
+
+    Gaussian window, sigma 1.5, biased (population) moments, C1 = 0.01^2, C2 = 0.03^2.
+
+    Args:
+        image, truth: (H, W, 3), H and W at least 11.
+
+    Returns:
+        (H - 10, W - 10).
+    """
+    mean_x, mean_y = _smooth(image), _smooth(truth)
+    variance_x = _smooth(image**2) - mean_x**2
+    variance_y = _smooth(truth**2) - mean_y**2
+    covariance = _smooth(image * truth) - mean_x * mean_y
+    luminance = (2 * mean_x * mean_y + SSIM_C1) / (mean_x**2 + mean_y**2 + SSIM_C1)
+    contrast_structure = (2 * covariance + SSIM_C2) / (variance_x + variance_y + SSIM_C2)
+    return np.asarray((luminance * contrast_structure).mean(-1))
+
+
+def ssim(image: Array, truth: Array, mask: Array | None = None) -> float | None:
+    """Mean SSIM; with a mask, of the images multiplied by it, weighted by it.
+
+    Args:
+        image, truth: (H, W, 3).
+        mask: (H, W) in [0, 1]; None is 1 everywhere.
+
+    Returns:
+        None where the image is smaller than the window, or the mask is empty within the map.
+    """
+    if min(truth.shape[:2]) < 2 * WINDOW_RADIUS + 1:
+        return None
+    if mask is None:
+        return float(ssim_map(image, truth).mean())
+    values = ssim_map(image * mask[..., None], truth * mask[..., None])
+    weights = mask[WINDOW_RADIUS:-WINDOW_RADIUS, WINDOW_RADIUS:-WINDOW_RADIUS]
+    return float((weights * values).sum() / weights.sum()) if weights.sum() > 0 else None
+
+
+def _smooth(image: Array) -> Array:
+    """Gaussian mean (H, W, 3) -> (H - 10, W - 10, 3)."""
+    x = np.arange(-WINDOW_RADIUS, WINDOW_RADIUS + 1)
+    kernel = np.exp(-0.5 * (x / WINDOW_SIGMA) ** 2)
+    kernel /= kernel.sum()
+    r = WINDOW_RADIUS
+    return np.asarray(correlate1d(correlate1d(image, kernel, 0), kernel, 1)[r:-r, r:-r])
