@@ -1,7 +1,8 @@
 """RGB <-> Y'CbCr 4:2:0, BT.709, limited range, chroma sited left: the one conversion of the asset's video.
 
-Own code rather than swscale's: without a way to name the siting, swscale takes chroma to be centred horizontally, half a
-pixel from where H.264 puts it by default, which costs 8 dB in a round trip against a decoder that follows the standard.
+Own code rather than swscale's: PyAV has no way to name the siting, and swscale then takes chroma to be centred
+horizontally, half a pixel from where H.264 puts it by default: 8 dB less (50 to 42, on a fine texture, before the codec)
+in a round trip through a decoder that follows the standard.
 
 Matrix (ITU-R BT.709-6, items 3.2 and 3.3), with R, G, B, Y' in [0, 1] and Cb, Cr in [-0.5, 0.5]:
 Y' = 0.2126 R + 0.7152 G + 0.0722 B, Cb = (B - Y') / 1.8556, Cr = (R - Y') / 1.5748; codes 16 + 219 Y', 128 + 224 C.
@@ -26,7 +27,7 @@ def rgb_to_yuv420(rgb: NDArray[np.uint8]) -> tuple[Plane, Plane, Plane]:
 
     Chroma is filtered by (1 2 1)/4 across, about the column it is sited at, and by the mean of two rows down.
     """
-    r, g, b = (rgb[..., channel].astype(np.float32) / 255 for channel in range(3))
+    r, g, b = (rgb[..., channel].astype(np.float32) / np.float32(255) for channel in range(3))
     luma = KR * r + KG * g + KB * b
     y = np.rint(16 + 219 * luma).astype(np.uint8)
     return y, _halve((b - luma) / CB_SCALE), _halve((r - luma) / CR_SCALE)
@@ -38,15 +39,13 @@ def yuv420_to_rgb(y: Plane, cb: Plane, cr: Plane) -> NDArray[np.uint8]:
     r = luma + CR_SCALE * _double(cr)
     b = luma + CB_SCALE * _double(cb)
     g = (luma - KR * r - KB * b) / KG
-    rgb = np.empty((*y.shape, 3), np.uint8)
-    for channel, value in enumerate((r, g, b)):
-        rgb[..., channel] = _to_byte(value)
-    return rgb
+    return np.stack([_to_byte(value) for value in (r, g, b)], -1)
 
 
 def alpha_to_luma(alpha: NDArray[np.uint8]) -> Plane:
     """Alpha 0..255 -> luma code 16..235. 256 values into 220: what comes back is at most 1 off."""
-    return np.rint(16 + alpha.astype(np.float32) * (219 / 255)).astype(np.uint8)
+    luma: Plane = np.rint(16 + alpha.astype(np.float32) * (219 / 255)).astype(np.uint8)
+    return luma
 
 
 def luma_to_alpha(y: Plane) -> NDArray[np.uint8]:
@@ -55,11 +54,13 @@ def luma_to_alpha(y: Plane) -> NDArray[np.uint8]:
 
 
 def _unit_luma(y: Plane) -> Float:
-    return (y.astype(np.float32) - 16) / 219
+    unit: Float = (y.astype(np.float32) - np.float32(16)) / np.float32(219)
+    return unit
 
 
 def _to_byte(value: Float) -> NDArray[np.uint8]:
-    return np.rint(np.clip(value, 0, 1) * 255).astype(np.uint8)
+    codes: Plane = np.rint(np.clip(value, 0, 1) * 255).astype(np.uint8)
+    return codes
 
 
 def _halve(chroma: Float) -> Plane:
@@ -67,7 +68,8 @@ def _halve(chroma: Float) -> Plane:
     rows = chroma[0::2] + chroma[1::2]
     left = np.concatenate([rows[:, :1], rows[:, 1:-1:2]], 1)
     mean = (left + 2 * rows[:, 0::2] + rows[:, 1::2]) / 8
-    return np.rint(NEUTRAL + 224 * mean).astype(np.uint8)
+    codes: Plane = np.rint(NEUTRAL + 224 * mean).astype(np.uint8)
+    return codes
 
 
 def _double(codes: Plane) -> Float:

@@ -27,7 +27,7 @@ _SEAL = re.compile(rb'"manifest_sha256"\s*:\s*"([0-9a-f]{64})"')
 _UNSEALED = "0" * 64
 
 Count = Annotated[int, Field(ge=1)]
-Fraction01 = Annotated[float, Field(ge=-1, le=1)]
+UV = Annotated[float, Field(ge=-1, le=1)]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Offset = Annotated[int, Field(ge=0)]
@@ -82,7 +82,7 @@ class Layer(Part):
     bytes: Count
     sha256: Sha256
     texture_rect: Rect
-    uv_window: tuple[Fraction01, Fraction01, Fraction01, Fraction01]
+    uv_window: tuple[UV, UV, UV, UV]
 
 
 class Texture(Part):
@@ -148,7 +148,8 @@ def manifest_schema() -> dict[str, Any]:
 
 def write_manifest(manifest: Manifest, path: Path) -> Manifest:
     """Write the manifest with its own checksum; returns it as written."""
-    text = json.dumps(manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}, indent=1, allow_nan=False) + "\n"
+    value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()
     write_text(path, text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'))
     return manifest.model_copy(update={"manifest_sha256": digest})
@@ -159,7 +160,8 @@ def seal_is_whole(raw: bytes) -> bool:
     found = _SEAL.findall(raw)
     if len(found) != 1:
         return False
-    return hashlib.sha256(raw.replace(found[0], _UNSEALED.encode())).hexdigest() == found[0].decode()
+    digest: bytes = found[0]
+    return hashlib.sha256(raw.replace(digest, _UNSEALED.encode())).hexdigest() == digest.decode()
 
 
 def parse_manifest(path: Path) -> Manifest:
@@ -172,7 +174,12 @@ def parse_manifest(path: Path) -> Manifest:
     if not isinstance(value, dict) or value.get("format") != "facefolds":
         found = value.get("format") if isinstance(value, dict) else type(value).__name__
         raise UserError(
-            "not the manifest of a facefolds asset", file=path, place="format", expected="facefolds", found=found, remedy=REMEDY
+            "not the manifest of a facefolds asset",
+            file=path,
+            place="format",
+            expected="facefolds",
+            found=found,
+            remedy=REMEDY,
         )
     if value.get("version") != FORMAT_VERSION or isinstance(value.get("version"), bool):
         raise UserError(
@@ -183,18 +190,35 @@ def parse_manifest(path: Path) -> Manifest:
             found=value.get("version"),
             remedy="make the asset again with this version of facefolds, or read it with the one that made it",
         )
-    missing = sorted(set(Manifest.model_fields) - set(value))
     try:
         manifest = Manifest.model_validate_json(path.read_bytes())
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise UserError(
-            "the manifest is wrong", file=path, place=place, expected=first["msg"], found=repr(first["input"])[:200], remedy=REMEDY
+            "the manifest is wrong",
+            file=path,
+            place=place,
+            expected=first["msg"],
+            found=repr(first["input"])[:200],
+            remedy=REMEDY,
         ) from None
+    missing = _missing_keys(manifest.model_dump(mode="json"), value)
     if missing:
         raise UserError("the manifest lacks keys", file=path, place=", ".join(missing), remedy=REMEDY)
     return manifest
+
+
+def _missing_keys(whole: Any, given: Any, place: str = "") -> list[str]:
+    """Dotted names of the keys of `whole` that `given` lacks (and whose defaults filled the gap)."""
+    if isinstance(whole, dict):
+        found = [f"{place}{key}" for key in whole if key not in given]
+        pairs = [(key, whole[key], given[key]) for key in whole if key in given]
+    elif isinstance(whole, list):
+        found, pairs = [], [(str(i), a, b) for i, (a, b) in enumerate(zip(whole, given, strict=True))]
+    else:
+        return []
+    return found + [name for key, a, b in pairs for name in _missing_keys(a, b, f"{place}{key}.")]
 
 
 if __name__ == "__main__":

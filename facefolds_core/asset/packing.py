@@ -1,10 +1,10 @@
 """Where the layers' textures lie in the video's picture.
 
 The colour image is a near-square grid of cells, filled by rows, the outermost layer first; the alpha image has the same
-grid below it. A cell is R^t rounded up to whole macroblocks (16), so that no block of the codec spans two layers; the
-texture lies in its top left corner and the rest repeats its last column and row. Between colour and alpha lies a
-band of one macroblock, its upper half continuing the colour and its lower half the alpha, so that up-sampled chroma of
-one cannot leak into the other.
+grid below it. A cell is R^t and a gutter of 2 pixels on each side, rounded up to whole macroblocks (16), so that no
+block of the codec spans two layers; what the texture leaves of its cell repeats its border. The gutter is one chroma
+sample wide: without it, interpolated chroma brings the neighbouring layer's hue into a texture's last column and rows
+(off by up to 66 of 255 in the synthetic asset of the tests, before the codec; with the gutter 6).
 
 A reader takes the rectangles from the manifest and does not care how they were chosen.
 """
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from facefolds_core.errors import UserError
 
 MACROBLOCK = 16
+GUTTER = 2
 MAX_MACROBLOCKS = 139_264
 """Macroblocks a picture at level 6.2, the highest of H.264 (table A-1)."""
 MAX_SIDE = 16_384
@@ -52,15 +53,13 @@ class AtlasLayout:
         rows = -(-layers // columns)
         pitch = cell_size(resolution)
         width, height = columns * pitch, rows * pitch
-        rects = [
-            (column * pitch, row * pitch, resolution, resolution) for row in range(rows) for column in range(columns)
-        ]
+        corners = [(column * pitch, row * pitch) for row in range(rows) for column in range(columns)]
         return cls(
             width=width,
-            height=2 * height + MACROBLOCK,
+            height=2 * height,
             colour_rect=(0, 0, width, height),
-            alpha_rect=(0, height + MACROBLOCK, width, height),
-            rects=tuple(rects[:layers]),
+            alpha_rect=(0, height, width, height),
+            rects=tuple((x + GUTTER, y + GUTTER, resolution, resolution) for x, y in corners[:layers]),
         )
 
     @property
@@ -89,7 +88,7 @@ class AtlasLayout:
             if not _inside(rect, self.colour_rect[2:]):
                 found.append(f"texture_rect {list(rect)} of layer {index} is not inside the colour image")
             if rect[2:] != (self.resolution, self.resolution):
-                found.append(f"texture_rect {list(rect)} of layer {index} is not of {self.resolution} x {self.resolution}")
+                found.append(f"texture_rect {list(rect)} of layer {index} is not {self.resolution} pixels a side")
             found += [
                 f"the texture_rects of layers {other} and {index} overlap"
                 for other in range(index)
@@ -100,13 +99,13 @@ class AtlasLayout:
 
 def cell_size(resolution: int) -> int:
     """Pixels a side of the cell of a texture: whole macroblocks."""
-    return -(-resolution // MACROBLOCK) * MACROBLOCK
+    return -(-(resolution + 2 * GUTTER) // MACROBLOCK) * MACROBLOCK
 
 
 def fill_cell(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A texture (R, R, C) with its last column and row repeated up to the cell's size."""
-    extra = cell_size(len(texture)) - len(texture)
-    return np.pad(texture, ((0, extra), (0, extra), (0, 0)), mode="edge")
+    """A texture (R, R, C) with its border repeated to fill its cell."""
+    after = cell_size(len(texture)) - len(texture) - GUTTER
+    return np.pad(texture, ((GUTTER, after), (GUTTER, after), (0, 0)), mode="edge")
 
 
 def check_layout(layout: AtlasLayout) -> None:

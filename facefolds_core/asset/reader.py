@@ -148,7 +148,7 @@ def read_asset(folder: str | Path) -> Asset:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise UserError("no such folder", file=folder, expected="the folder of an asset", remedy="make it with `dvc repro`")
+        raise UserError("no such folder", file=folder, expected="an asset's folder", remedy="make it with `dvc repro`")
     path = folder / MANIFEST_NAME
     manifest = parse_manifest(path)
     problems = manifest_problems(path, manifest)

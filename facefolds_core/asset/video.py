@@ -1,8 +1,7 @@
 """The texture video: H.264 in MP4 through PyAV, so that frame k of the file is frame k of the sequence.
 
-There are no B-frames and every group of pictures is closed and starts with an IDR picture each KEYFRAME_INTERVAL frames:
-decoding order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many
-pictures. One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
+There are no B-frames, and every KEYFRAME_INTERVAL frames an IDR picture starts a closed group of pictures: decoding
+order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many pictures. One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
 from facefolds_core.asset.colour import NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
-from facefolds_core.asset.packing import AtlasLayout, cell_size, cut, fill_cell
+from facefolds_core.asset.packing import GUTTER, AtlasLayout, cell_size, cut, fill_cell
 from facefolds_core.errors import UserError
 from facefolds_core.params import VideoCodec
 
@@ -62,18 +61,13 @@ def pack_frame(textures: NDArray[np.uint8], layout: AtlasLayout) -> Picture:
     cb = np.full((height // 2, width // 2), NEUTRAL, np.uint8)
     cr = cb.copy()
     top = layout.alpha_rect[1]
-    for texture, (left, up, _, _) in zip(textures, layout.rects, strict=True):
+    for texture, (x, y0, _, _) in zip(textures, layout.rects, strict=True):
         cell = fill_cell(texture)
+        left, up = x - GUTTER, y0 - GUTTER
         full = (slice(up, up + pitch), slice(left, left + pitch))
         half = (slice(up // 2, (up + pitch) // 2), slice(left // 2, (left + pitch) // 2))
         y[full], cb[half], cr[half] = rgb_to_yuv420(cell[..., :3])
         y[top + up : top + up + pitch, full[1]] = alpha_to_luma(cell[..., 3])
-    bottom = layout.colour_rect[3]
-    middle = (bottom + top) // 2
-    y[bottom:middle] = y[bottom - 1]
-    y[middle:top] = y[top]
-    for chroma in (cb, cr):
-        chroma[bottom // 2 : middle // 2] = chroma[bottom // 2 - 1]
     return np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)])
 
 
@@ -90,15 +84,18 @@ def unpack_picture(picture: Picture, layout: AtlasLayout) -> NDArray[np.uint8]:
     return cut(np.concatenate([colour, alpha[..., None]], -1), layout.rects)
 
 
-def encode_video(path: Path, pictures: Iterable[Picture], size: tuple[int, int], fps: Fraction, codec: VideoCodec) -> int:
+def encode_video(
+    path: Path, pictures: Iterable[Picture], size: tuple[int, int], fps: Fraction, codec: VideoCodec
+) -> int:
     """Encode planar pictures of `size` (width, height); returns how many.
 
     Raises:
         UserError: if the encoder refuses.
     """
     count = 0
+    muxer = {"movflags": "faststart", "fflags": "bitexact"}
     try:
-        with av.open(str(path), "w", format="mp4", options={"movflags": "faststart", "fflags": "bitexact"}) as container:
+        with av.open(str(path), "w", format="mp4", options=muxer) as container:
             stream: Any = container.add_stream("libx264", rate=fps, options=_x264_options(codec))
             stream.width, stream.height = size
             stream.pix_fmt = "yuv420p"
@@ -208,12 +205,12 @@ def decode_video(path: Path, size: tuple[int, int], fps: float, start: int = 0) 
             raise _damaged(path, f"pictures of {found} pixels instead of {size[0]} x {size[1]}")
         if start:
             container.seek(round(start / fps / stream.time_base), stream=stream, backward=True)
-        expected = None
+        previous = None
         for frame in container.decode(stream):
             number = round(float(frame.pts * stream.time_base) * fps) if frame.pts is not None else -1
-            if expected is not None and number != expected or expected is None and number > start:
-                raise _damaged(path, f"frame {number} follows where frame {start if expected is None else expected} should")
-            expected = number + 1
+            if number > start if previous is None else number != previous + 1:
+                raise _damaged(path, f"frame {number} comes after {'nothing' if previous is None else previous}")
+            previous = number
             if (frame.width, frame.height) != size or frame.format.name != "yuv420p":
                 raise _damaged(path, f"frame {number} is {frame.width} x {frame.height} {frame.format.name}")
             if number >= start:

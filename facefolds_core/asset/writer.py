@@ -12,7 +12,15 @@ import numpy as np
 
 from facefolds_core import __version__
 from facefolds_core.asset.draco import LayerMesh, encode_mesh
-from facefolds_core.asset.manifest import MANIFEST_NAME, Coordinates, Layer, Manifest, Texture, Transform, write_manifest
+from facefolds_core.asset.manifest import (
+    MANIFEST_NAME,
+    Coordinates,
+    Layer,
+    Manifest,
+    Texture,
+    Transform,
+    write_manifest,
+)
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.video import Picture, encode_video, pack_frame, probe_video
 from facefolds_core.captures.frames import FrameStore
