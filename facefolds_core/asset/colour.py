@@ -1,7 +1,7 @@
 """RGB <-> Y'CbCr 4:2:0, BT.709, limited range, chroma sited left: the one conversion of the asset's video.
 
 Own code rather than swscale's: PyAV has no way to name the siting, and swscale then takes chroma to be centred
-horizontally, half a pixel from where H.264 puts it by default: 8 dB less (50 to 42, on a fine texture, before the codec)
+horizontally, half a pixel from where H.264 puts it by default: 42 dB instead of 50 on a fine texture, before the codec,
 in a round trip through a decoder that follows the standard.
 
 Matrix (ITU-R BT.709-6, items 3.2 and 3.3), with R, G, B, Y' in [0, 1] and Cb, Cr in [-0.5, 0.5]:
@@ -10,6 +10,8 @@ Chroma sample (i, j) lies, in luma's pixel indices, at row 2i + 0.5 and column 2
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +60,7 @@ def _unit_luma(y: Plane) -> Float:
     return unit
 
 
-def _to_byte(value: Float) -> NDArray[np.uint8]:
+def _to_byte(value: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
     codes: Plane = np.rint(np.clip(value, 0, 1) * 255).astype(np.uint8)
     return codes
 

@@ -2,8 +2,8 @@
 
 Order of vertices and faces is always kept. With quantization_bits = 0 the floats come back bit for bit (the paper's
 setting, with compression level 0). With b > 0 bits a position is off by at most range / (2^b - 1) / 2 along each
-axis (and float32 rounding), range being the largest side of the layer's bounding box; a texture coordinate likewise, with
-its own number of bits and the larger extent of the layer's (s, t), at most 1, as range.
+axis (and float32 rounding), range being the largest side of the layer's bounding box; a texture coordinate likewise,
+with its own number of bits and the larger extent of the layer's (s, t), at most 1, as range.
 
 Keeping the order costs space where values are quantised (400 vertices, 14/12 bits: 6.3 kB against 2.4 kB).
 """

@@ -1,7 +1,8 @@
 """The texture video: H.264 in MP4 through PyAV, so that frame k of the file is frame k of the sequence.
 
 There are no B-frames, and every KEYFRAME_INTERVAL frames an IDR picture starts a closed group of pictures: decoding
-order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many pictures. One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
+order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many pictures.
+One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
 """
 
 from __future__ import annotations

@@ -1,0 +1,32 @@
+"""Check an asset and say what is wrong with it: `python -m stages.validate data/<subject>/asset`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
+from facefolds_core.asset.validation import summary, validate_asset
+from facefolds_core.errors import report_user_errors
+
+
+def validate(
+    asset: Annotated[Path, typer.Argument(help="Folder of the asset: the one that holds manifest.json.")],
+) -> None:
+    """Check an asset's manifest, checksums, meshes and every frame of its video; exit status 1 if anything is wrong."""
+    with report_user_errors("validate"):
+        problems = validate_asset(asset)
+        if problems:
+            typer.echo(f"{asset}: not a sound asset", err=True)
+            for problem in problems:
+                typer.echo(f"  {problem}", err=True)
+            raise typer.Exit(1)
+        typer.echo(f"{asset}: sound. {summary(parse_manifest(asset / MANIFEST_NAME))}")
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(validate)
+    app()
