@@ -1,0 +1,199 @@
+"""A capture as read from disk, before it is normalised: cameras, paths of the images, tracked mesh. No pixels."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.images import image_size
+from facefolds_core.captures.lens import Lens
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import FrameRange
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class View:
+    """One camera of a capture.
+
+    Attributes:
+        camera: a pinhole without distortion, in the capture's world, for full-size images.
+        lens: how to get the pinhole image from the photo; None where the photo is one.
+    """
+
+    camera: Camera
+    lens: Lens | None = None
+
+    @property
+    def name(self) -> str:
+        return self.camera.name
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """The tracked head.
+
+    Attributes:
+        poses: (K, 3, 4) head -> world, X_w = R X + t; in the head frame the face looks to +z, up is +y.
+        vertices: (K, V, 3) in the head frame.
+        faces: (F, 3) int32, or None where the capture has no topology.
+    """
+
+    poses: Array
+    vertices: Array
+    faces: NDArray[np.int32] | None
+
+    def world_vertices(self) -> Array:
+        """(K, V, 3) in the capture's world."""
+        moved = np.einsum("kij,kvj->kvi", self.poses[:, :, :3], self.vertices)
+        return np.asarray(moved + self.poses[:, None, :, 3])
+
+
+@dataclass(frozen=True)
+class Capture:
+    """Cameras, frames and files of one capture.
+
+    Attributes:
+        root: its folder.
+        views: cameras, in the order of the capture's own list.
+        frame_ids: K names of frames, sorted.
+        fps: frames a second; 0 for a static capture.
+        images: (camera index, frame index) -> file. Incomplete where the capture is.
+        masks: likewise, files of true opacity, where there are any.
+        tracking: for all K frames, or None.
+        left_out: one line for each thing of the capture that is not here, with the reason, and for each guess made.
+    """
+
+    root: Path
+    views: tuple[View, ...]
+    frame_ids: tuple[str, ...]
+    fps: float
+    images: Mapping[tuple[int, int], Path]
+    masks: Mapping[tuple[int, int], Path]
+    tracking: Tracking | None
+    left_out: tuple[str, ...]
+
+    def place(self, camera: int, frame: int) -> str:
+        """Words for one image, for messages."""
+        return f"camera {self.views[camera].name}, frame {self.frame_ids[frame]}"
+
+
+def select_frames(
+    names: Sequence[str], wanted: FrameRange | tuple[str, ...] | None, file: Path, what: str
+) -> list[str]:
+    """The frames that `subjects.<name>.frames` asks for, out of the capture's sorted `names`.
+
+    Raises:
+        UserError: if there is no such frame, or the range is empty.
+    """
+    if isinstance(wanted, tuple):
+        unknown = [name for name in wanted if name not in names]
+        if unknown or not wanted:
+            raise UserError(
+                f"frames of `subjects` that {what} does not have" if unknown else "an empty list of frames",
+                file=file,
+                place="frames",
+                expected=f"some of {shorten(names)}",
+                found=shorten(unknown),
+                remedy="correct `frames` of this subject in params.yaml",
+            )
+        return sorted(set(wanted), key=list(names).index)
+    if wanted is None:
+        return list(names)
+    chosen = list(names)[wanted.start : wanted.stop : wanted.step]
+    if not chosen:
+        raise UserError(
+            "the range of frames is empty",
+            file=file,
+            place="frames",
+            expected=f"positions from 0 to {len(names) - 1} ({what} has {len(names)} frames: {shorten(names)})",
+            found=f"start {wanted.start}, stop {wanted.stop}, step {wanted.step}",
+            remedy="correct `frames` of this subject in params.yaml",
+        )
+    return chosen
+
+
+def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int], list[int], list[str]]:
+    """The cameras and frames between which no image is missing.
+
+    A camera that lacks more than half of the frames is left out; of the frames, those stay that every other camera has.
+
+    Args:
+        cameras: indices of those to use.
+
+    Returns:
+        cameras, frames, and a line for each one left out.
+
+    Raises:
+        UserError: if no frame is left.
+    """
+    total = len(capture.frame_ids)
+    has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
+    kept = [c for c in cameras if 2 * len(has[c]) >= total]
+    left_out = [
+        f"camera {capture.views[c].name}: has {len(has[c])} of {total} frames, fewer than half" for c in cameras if c not in kept
+    ]
+    frames = []
+    for f in range(total):
+        lacking = [capture.views[c].name for c in kept if f not in has[c]]
+        if lacking:
+            left_out.append(f"frame {capture.frame_ids[f]}: no image from {shorten(lacking)}")
+        else:
+            frames.append(f)
+    if not kept or not frames:
+        missing = Counter(capture.views[c].name for c in cameras for f in range(total) if f not in has[c])
+        worst = [f"{name} lacks {count}" for name, count in missing.most_common(5)]
+        raise UserError(
+            "no frame has an image from every camera",
+            file=capture.root,
+            expected=f"at least one of {total} frames complete",
+            found="; ".join(worst),
+            remedy="add the missing images, or choose other frames for this subject in params.yaml",
+        )
+    return kept, frames, left_out
+
+
+def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
+    """(width, height) of all images in use, from their headers (masks included, where they belong to these).
+
+    Raises:
+        UserError: if a header cannot be read or sizes differ; names the file and the size of the others.
+    """
+    expected: tuple[int, int] | None = None
+    for c in cameras:
+        for f in frames:
+            files = [capture.images[c, f]] + ([capture.masks[c, f]] if (c, f) in capture.masks else [])
+            for file in files:
+                size = image_size(file, capture.place(c, f))
+                expected = expected or size
+                if size != expected:
+                    raise UserError(
+                        "images of different sizes",
+                        file=file,
+                        place=capture.place(c, f),
+                        expected=f"{expected[0]} x {expected[1]}, as {capture.images[cameras[0], frames[0]]}",
+                        found=f"{size[0]} x {size[1]}",
+                        remedy="use cameras of one image size, or resize the images (and their intrinsics)",
+                    )
+    if expected is None:
+        raise ValueError("no cameras or frames to check")
+    return expected
+
+
+def shorten(names: Sequence[str], most: int = 12) -> str:
+    """A list in words: 'a, b, c and 40 more'."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def closest_rotation(w2c: Array) -> Array:
+    """(3, 4) [R | t] with R replaced by the nearest rotation: files store it with few digits."""
+    u, _, vt = np.linalg.svd(w2c[:, :3])
+    return np.concatenate([u @ vt, w2c[:, 3:]], 1)

@@ -1,0 +1,134 @@
+"""Photos: headers, decoding to 8-bit colour, area downsampling, Multiface's display colour."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+
+from facefolds_core.errors import UserError
+
+Image = NDArray[np.uint8]
+_REMEDY = "copy the file again from its source, or take this image out of the capture"
+
+
+def _open(path: Path, place: str) -> Pillow.Image:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Pillow.DecompressionBombWarning)
+            return Pillow.open(path)
+    except FileNotFoundError:
+        raise UserError("an image is missing", file=path, place=place, remedy=_REMEDY) from None
+    except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
+        length = path.stat().st_size if path.is_file() else 0
+        found = "an empty file" if length == 0 else f"{length} bytes that are no image ({type(error).__name__})"
+        raise UserError(
+            "cannot read an image", file=path, place=place, expected="a PNG or JPEG image", found=found, remedy=_REMEDY
+        ) from None
+
+
+def image_size(path: Path, place: str) -> tuple[int, int]:
+    """(width, height) from an image's header, without decoding it.
+
+    Args:
+        place: camera and frame, for the message.
+
+    Raises:
+        UserError: if the file is missing, empty or not an image.
+    """
+    with _open(path, place) as image:
+        return image.size
+
+
+def _load(path: Path, place: str) -> Pillow.Image:
+    with _open(path, place) as image:
+        try:
+            image.load()
+        except (OSError, SyntaxError, ValueError) as error:
+            raise UserError(
+                "a damaged image",
+                file=path,
+                place=place,
+                expected=f"{image.size[0]} x {image.size[1]} pixels, as its header says",
+                found=f"{error} ({path.stat().st_size} bytes in the file)",
+                remedy=_REMEDY,
+            ) from None
+        return image
+
+
+def _grey_8bit(image: Pillow.Image) -> Image:
+    """16-bit (or wider) grey levels -> 8 bits: 65535 becomes 255."""
+    return np.round(np.clip(np.asarray(image, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+
+
+def decode_image(path: Path, place: str) -> Image:
+    """(H, W, 3) uint8 RGB of a photo.
+
+    Grey images are repeated over the channels, 16-bit ones reduced to 8, straight alpha is composited over black (the
+    background of a capture with transparent images). EXIF rotation is ignored: K refers to the pixels as stored.
+
+    Raises:
+        UserError: if the file is missing, truncated or not an image; names file and `place` (camera and frame).
+    """
+    image = _load(path, place)
+    if image.mode.startswith("I") or image.mode == "F":
+        return np.repeat(_grey_8bit(image)[..., None], 3, axis=2)
+    if image.mode in ("RGBA", "LA", "PA", "La", "RGBa") or "transparency" in image.info:
+        rgba = np.asarray(image.convert("RGBA"), dtype=np.float64)
+        return np.round(rgba[..., :3] * rgba[..., 3:] / 255).astype(np.uint8)
+    return np.array(image.convert("RGB"))
+
+
+def decode_mask(path: Path, place: str) -> Image:
+    """(H, W, 1) uint8 opacity from a grey image; raises like `decode_image`."""
+    image = _load(path, place)
+    grey = _grey_8bit(image) if image.mode.startswith("I") else np.array(image.convert("L"))
+    return grey[..., None]
+
+
+def fit_box(width: int, height: int, long_side: int, short_side: int) -> tuple[int, int]:
+    """(width, height) of an image shrunk to fit the box, aspect kept to the nearest pixel; never enlarged."""
+    scale = min(1.0, long_side / max(width, height), short_side / min(width, height))
+    return max(1, round(width * scale)), max(1, round(height * scale))
+
+
+def downsample(image: Image, width: int, height: int) -> NDArray[np.float32]:
+    """Mean of the source pixels that each target pixel covers, fractions included.
+
+    Args:
+        image: (H, W, C) uint8.
+
+    Returns:
+        (height, width, C) float32 in 0..255.
+    """
+    values = image.astype(np.float32)
+    if image.shape[:2] != (height, width):
+        values = cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)
+    return values.reshape(height, width, image.shape[2])
+
+
+def display_colour(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Multiface's own display correction of its raw images, which are greenish and dark.
+
+    RGB times (1.4, 1.1, 1.6) / 1.1, minus black 3/255, times 0.95 / (1 - black), to the power 1/2, minus 15/255
+    (Multiface's `gammaCorrect`). It comes after the area average, which is thus one of linear light.
+
+    Args:
+        values: (H, W, 3), 0..255.
+
+    Returns:
+        (H, W, 3), 0..255, clipped.
+    """
+    black = 3 / 255
+    scaled = values / 255 * (np.array([1.4, 1.1, 1.6], np.float32) / 1.1)
+    gained = np.clip(scaled - black, 0, 2) * (0.95 / (1 - black))
+    return (np.clip(np.sqrt(gained) - 15 / 255, 0, 1) * 255).astype(np.float32)
+
+
+def to_8bit(values: NDArray[np.float32]) -> Image:
+    """Round 0..255 to uint8."""
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)

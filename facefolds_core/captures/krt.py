@@ -1,0 +1,161 @@
+"""Multiface's calibration file KRT.
+
+For each camera eight lines: its name; the three rows of K; five distortion values (k1 k2 p1 p2 k3); the three rows of
+[R | t], world -> camera with OpenCV axes, millimetres. Blank lines separate cameras. K refers to full-size images
+(1334 x 2048) in the dataset, but copies with reduced images carry either that K or a scaled one: `krt_reference`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera, check_camera
+
+Array = NDArray[np.float64]
+
+FULL_SIZE = (1334, 2048)
+"""(width, height) of Multiface's own images, v1 and v2."""
+_REMEDY = "copy KRT again from the dataset, or mend this line"
+_ROWS = (3, 3, 3, 5, 4, 4, 4)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One camera of KRT, as it stands there.
+
+    Attributes:
+        name: of the camera.
+        K: (3, 3) intrinsics.
+        distortion: (5,) k1, k2, p1, p2, k3.
+        w2c: (3, 4) world -> camera.
+    """
+
+    name: str
+    K: Array
+    distortion: Array
+    w2c: Array
+
+
+def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    if len(values) != count or not np.isfinite(values).all():
+        raise UserError(
+            "garbled KRT", file=path, place=place, expected=f"{count} numbers", found=repr(text), remedy=_REMEDY
+        )
+    return values
+
+
+def read_krt(path: Path) -> list[Calibration]:
+    """All cameras of a KRT file, in its order.
+
+    Raises:
+        UserError: if the file is missing, garbled, truncated, names a camera twice, or has a singular K or R; names the
+            line and the camera.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise UserError(
+            "file not found", file=path, remedy="point `path` at a Multiface subject's folder, which holds KRT"
+        ) from None
+    except UnicodeDecodeError as error:
+        raise UserError(
+            "not a text file", file=path, place=f"byte {error.start}", expected="KRT in text", remedy=_REMEDY
+        ) from None
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    cameras: list[Calibration] = []
+    for first in range(0, len(lines), 8):
+        block = lines[first : first + 8]
+        camera = _camera(block, path)
+        if any(camera.name == other.name for other in cameras):
+            raise UserError(
+                "a camera appears twice in KRT", file=path, place=f"line {block[0][0]}", found=camera.name, remedy=_REMEDY
+            )
+        cameras.append(camera)
+    if not cameras:
+        raise UserError("KRT is empty", file=path, expected="at least one camera", remedy=_REMEDY)
+    return cameras
+
+
+def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
+    """Parse the lines [(number, text)] of one camera."""
+    number, name = block[0]
+    if len(name.split()) != 1:
+        raise UserError(
+            "garbled KRT", file=path, place=f"line {number}", expected="the name of a camera", found=repr(name), remedy=_REMEDY
+        )
+    rows = [
+        _numbers(text, count, path, f"line {line} (camera {name})")
+        for (line, text), count in zip(block[1:], _ROWS, strict=False)
+    ]
+    if len(rows) < len(_ROWS):
+        raise UserError(
+            "KRT is truncated",
+            file=path,
+            place=f"line {block[-1][0]}, the last one (camera {name})",
+            expected="8 lines a camera",
+            found=f"{len(block)} lines",
+            remedy=_REMEDY,
+        )
+    camera = Calibration(name, np.array(rows[0:3]), np.array(rows[3]), np.array(rows[4:7]))
+    check_camera(Camera(name, camera.K, camera.w2c, 1, 1), path, f"camera {name}, lines {number} to {block[-1][0]}")
+    return camera
+
+
+def krt_reference(
+    cameras: list[Calibration], image: tuple[int, int], given: tuple[int, int] | None, path: Path
+) -> tuple[tuple[int, int], str | None]:
+    """Find out which image size K refers to.
+
+    Two hypotheses: the images at hand, or the dataset's full size. A principal point lies near the middle of the image,
+    so the one with the smaller median distance |c / size - 1/2| holds, if that is under 1/4.
+
+    Args:
+        image: (width, height) of the images at hand.
+        given: `krt_size` of params.yaml, which overrides.
+
+    Returns:
+        (width, height), and a note where it was found out and differs from neither hypothesis trivially.
+
+    Raises:
+        UserError: if neither hypothesis fits.
+    """
+    if given is not None:
+        return given, None
+    if image == FULL_SIZE:
+        return image, None
+    points = np.median([camera.K[:2, 2] for camera in cameras], axis=0)
+    offsets = {size: float(np.abs(points / size - 0.5).max()) for size in (image, FULL_SIZE)}
+    best = min(offsets, key=offsets.__getitem__)
+    words = f"median principal point ({points[0]:.1f}, {points[1]:.1f})"
+    if offsets[best] > 0.25:
+        raise UserError(
+            "cannot tell which image size KRT refers to",
+            file=path,
+            expected=f"principal points near the middle of {image[0]} x {image[1]} or of {FULL_SIZE[0]} x {FULL_SIZE[1]}",
+            found=words,
+            remedy="set `krt_size: [width, height]` of this subject in params.yaml",
+        )
+    relation = "already scaled to the images" if best == image else "for full-size images; scaled"
+    note = f"note: K of KRT is {relation} ({words}; images {image[0]} x {image[1]}); `krt_size` overrides"
+    return best, note
+
+
+def pinhole_K(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
+    """K of KRT -> K for the images at hand in continuous coordinates (docs/conventions.md).
+
+    Args:
+        K: (3, 3) for images of size `reference`, whose first pixel has its centre at `pixel_centres`.
+        reference, image: (width, height).
+    """
+    shift = np.array([[1, 0, 0.5 - pixel_centres], [0, 1, 0.5 - pixel_centres], [0, 0, 1]])
+    scale = np.diag([image[0] / reference[0], image[1] / reference[1], 1.0])
+    return np.asarray(scale @ shift @ K)

@@ -1,0 +1,118 @@
+"""Lens distortion: the radial-tangential model of OpenCV (k1, k2, p1, p2, k3), and photos freed from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.errors import UserError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """The intrinsics of a photo with distortion, and of the pinhole image made from it.
+
+    Attributes:
+        K: (3, 3) of the photo; continuous pixel coordinates, as everywhere.
+        coefficients: (5,) k1, k2, p1, p2, k3.
+        pinhole_K: (3, 3) of the undistorted image, which has the same size.
+    """
+
+    K: Array
+    coefficients: Array
+    pinhole_K: Array
+
+    def distort(self, points: Array) -> Array:
+        """Ideal image-plane points (..., 2), X_c / Z_c, -> where the lens puts them, pixels (..., 2) of the photo."""
+        k1, k2, p1, p2, k3 = self.coefficients
+        x, y = points[..., 0], points[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        moved = np.stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+                np.ones_like(x),
+            ],
+            -1,
+        )
+        return (moved @ self.K.T)[..., :2]
+
+    def source_of(self, pixels: Array) -> Array:
+        """Pixels (..., 2) of the undistorted image -> pixels (..., 2) of the photo."""
+        homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
+        return self.distort((homogeneous @ np.linalg.inv(self.pinhole_K).T)[..., :2])
+
+    def maps(self, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """For each pixel of the undistorted image, where to sample the photo: x and y (height, width), for `cv2.remap`."""
+        x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+        # cv2.remap counts from the centre of the first pixel; our coordinates count from its corner.
+        source = self.source_of(np.stack([x, y], -1)) - 0.5
+        return source[..., 0].astype(np.float32), source[..., 1].astype(np.float32)
+
+
+def undistort(image: NDArray[np.uint8], maps: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
+    """(H, W, C) photo -> (H, W, C) pinhole image, sampled bicubically at `Lens.maps`."""
+    straight: NDArray[np.uint8] = cv2.remap(image, *maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    return straight.reshape(image.shape)
+
+
+def make_lens(K: Array, coefficients: Array, width: int, height: int, file: object, place: str) -> Lens | None:
+    """The lens of one camera, or None where it does not distort.
+
+    The undistorted image keeps K, unless it would then show places outside the photo (pincushion distortion): its focal
+    lengths are enlarged until it does not, so that no pixel is made up.
+
+    Args:
+        K: (3, 3) of the photo.
+        coefficients: (5,) k1, k2, p1, p2, k3.
+        file, place: for the message.
+
+    Raises:
+        UserError: if even twice the focal length shows places outside the photo: such numbers are no lens.
+    """
+    if not np.any(coefficients):
+        return None
+
+    def zoomed(factor: float) -> Lens:
+        return Lens(K, coefficients, np.diag([factor, factor, 1.0]) @ K + _recentre(K, factor))
+
+    def inside(lens: Lens) -> bool:
+        points = lens.source_of(_border(width, height))
+        return bool((points >= 0.5).all() and (points <= [width - 0.5, height - 0.5]).all())
+
+    if inside(zoomed(1.0)):
+        return zoomed(1.0)
+    low, high = 1.0, 2.0
+    if not inside(zoomed(high)):
+        raise UserError(
+            "the distortion is too strong to undo",
+            file=str(file),
+            place=place,
+            expected="k1, k2, p1, p2, k3 of a lens",
+            found=coefficients.tolist(),
+            remedy="check the distortion values; fisheye images must be rectified first",
+        )
+    for _ in range(30):
+        middle = (low + high) / 2
+        low, high = (low, middle) if inside(zoomed(middle)) else (middle, high)
+    return zoomed(high)
+
+
+def _recentre(K: Array, factor: float) -> Array:
+    """What to add to diag(f, f, 1) K so that the principal point stays."""
+    shift = np.zeros((3, 3))
+    shift[:2, 2] = (1 - factor) * K[:2, 2]
+    return shift
+
+
+def _border(width: int, height: int) -> Array:
+    """(M, 2) centres of the outermost pixels."""
+    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+    sides = [(x, np.full_like(x, v)) for v in (0.5, height - 0.5)] + [(np.full_like(y, v), y) for v in (0.5, width - 0.5)]
+    return np.concatenate([np.stack(side, -1) for side in sides])

@@ -1,0 +1,141 @@
+"""Multiface captures, v1 and v2 (and the embedded actor, which is written in the same layout).
+
+    KRT  frame_list.txt
+    images/SEGMENT/CAMERA/FRAME.png
+    tracked_mesh/SEGMENT/FRAME.obj|.bin|_transform.txt
+    masks/SEGMENT/CAMERA/FRAME.png          not in Multiface: true opacity, where a synthetic capture knows it
+
+Cameras, frames or images may be missing; what is not used is named in `Capture.left_out`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.captures.capture import Capture, View, closest_rotation, select_frames, shorten
+from facefolds_core.captures.images import image_size
+from facefolds_core.captures.krt import Calibration, krt_reference, pinhole_K, read_krt
+from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.tracked import read_tracking
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import Subject
+
+FPS = 30.0
+PIXEL_CENTRES = 0.0
+"""OpenCV's calibration, from which Multiface's KRT comes, puts the centre of the first pixel at 0."""
+
+
+def read_multiface(root: Path, subject: Subject, fps: float = FPS, pixel_centres: float = PIXEL_CENTRES) -> Capture:
+    """Read everything but the pixels.
+
+    Args:
+        root: folder with KRT.
+        subject: its `segment`, `frames`, `krt_size`, `pixel_centres` and `fps` are used.
+        fps, pixel_centres: where the subject leaves them null.
+
+    Raises:
+        UserError: for a file that is missing or damaged, and a segment or frame that does not exist.
+    """
+    calibration = read_krt(root / "KRT")
+    segment = _segment(root, subject.segment)
+    photos = _photos(root / "images" / segment)
+    used, left_out = _cameras(calibration, photos, root)
+    names = sorted({frame for camera in used for frame in photos[camera.name]})
+    listed = _listed(root / "frame_list.txt", segment)
+    left_out += [f"frame {name}: in frame_list.txt, but no camera has an image" for name in listed if name not in names]
+    frames = select_frames(names, subject.frames, root / "images" / segment, f"segment {segment}")
+    tracking, frames, lines = read_tracking(root / "tracked_mesh" / segment, frames)
+    left_out += lines
+    views, note = _views(used, photos, root, subject, pixel_centres)
+    left_out += [note] if note else []
+    images = {
+        (c, f): photos[view.name][name]
+        for c, view in enumerate(views)
+        for f, name in enumerate(frames)
+        if name in photos[view.name]
+    }
+    masks = {
+        (c, f): path
+        for c, f in images
+        if (path := root / "masks" / segment / views[c].name / f"{frames[f]}.png").exists()
+    }
+    rate = subject.fps or fps
+    return Capture(
+        root, views, tuple(frames), rate if len(frames) > 1 else 0.0, images, masks, tracking, tuple(left_out)
+    )
+
+
+def _segment(root: Path, wanted: str | None) -> str:
+    folder = root / "images"
+    segments = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    if wanted in segments:
+        return str(wanted)
+    if wanted is None and len(segments) == 1:
+        return segments[0]
+    if not segments:
+        problem, remedy = "no segments", "download some: images/SEGMENT/CAMERA/FRAME.png"
+    elif wanted is None:
+        problem, remedy = "several segments, and none is chosen", "set `segment` of this subject in params.yaml"
+    else:
+        problem, remedy = "no such segment", "correct `segment` of this subject in params.yaml"
+    raise UserError(
+        problem, file=folder, place="segment", expected=f"one of {shorten(segments, 100)}" if segments else None, found=wanted, remedy=remedy
+    )
+
+
+def _photos(folder: Path) -> dict[str, dict[str, Path]]:
+    """Camera -> frame -> file, of what is there."""
+    return {
+        camera.name: {path.stem: path for path in sorted(camera.glob("*.png"))}
+        for camera in sorted(folder.iterdir())
+        if camera.is_dir()
+    }
+
+
+def _listed(path: Path, segment: str) -> list[str]:
+    """Frames of a segment in frame_list.txt, which is not needed and may be missing."""
+    if not path.exists():
+        return []
+    pairs = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
+    return [pair[1] for pair in pairs if len(pair) == 2 and pair[0] == segment]
+
+
+def _cameras(
+    calibration: list[Calibration], photos: dict[str, dict[str, Path]], root: Path
+) -> tuple[list[Calibration], list[str]]:
+    """The cameras with both calibration and images, and lines on the others."""
+    known = {camera.name for camera in calibration}
+    used = [camera for camera in calibration if photos.get(camera.name)]
+    left_out = [f"camera {camera.name}: in KRT, but has no images" for camera in calibration if camera not in used]
+    left_out += [f"camera {name}: has images, but is not in KRT" for name in photos if name not in known]
+    if not used:
+        raise UserError(
+            "no camera has both images and a calibration",
+            file=root,
+            expected=f"folders of images named {shorten([camera.name for camera in calibration], 5)}",
+            found=shorten(list(photos), 5) or "none",
+            remedy="copy KRT and images of the same subject",
+        )
+    return used, left_out
+
+
+def _views(
+    used: list[Calibration], photos: dict[str, dict[str, Path]], root: Path, subject: Subject, pixel_centres: float
+) -> tuple[tuple[View, ...], str | None]:
+    """Cameras for the images at hand, and a note on the size that KRT refers to."""
+    sizes = []
+    for camera in used:
+        frame, path = next(iter(photos[camera.name].items()))
+        sizes.append(image_size(path, f"camera {camera.name}, frame {frame}"))
+    reference, note = krt_reference(used, sizes[0], subject.krt_size, root / "KRT")
+    centres = pixel_centres if subject.pixel_centres is None else subject.pixel_centres
+    views = []
+    for calibration, size in zip(used, sizes, strict=True):
+        K = pinhole_K(calibration.K, reference, size, centres)
+        lens = make_lens(K, calibration.distortion, *size, root / "KRT", f"camera {calibration.name}")
+        pinhole = K if lens is None else lens.pinhole_K
+        views.append(View(Camera(calibration.name, np.array(pinhole), closest_rotation(calibration.w2c), *size), lens))
+    return tuple(views), note
