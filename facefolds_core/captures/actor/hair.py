@@ -20,7 +20,7 @@ _CENTRE_Y, _CENTRE_Z = 25.0, -12.0
 _AXIS: Vector = (0.20, 0.80, -0.5657)
 _ACROSS_1: Vector = (0.9701, -0.2425, 0.0)
 _ACROSS_2: Vector = (-0.1372, -0.5488, -0.8246)
-STEP = 2.0
+STEP = 2.5
 _FULL = 0.20
 """Extinction of dense hair, per mm."""
 
@@ -29,7 +29,7 @@ _FULL = 0.20
 def envelope(x: float, y: float, z: float) -> float:
     """Signed distance to the outline of the hair (without strands), mm."""
     ax = abs(x)
-    d = ellipsoid(x, y - 33.0, z + 12.0, 90.0, 99.0, 109.0)
+    d = ellipsoid(x, y - 33.0, z + 12.0, 88.0, 98.0, 108.0)
     side = ellipsoid(ax - 66.0, y + 42.0, z + 22.0, 27.0, 88.0, 52.0)
     d = smooth_min(d, side, 22.0)
     d = smooth_min(d, ellipsoid(x, y + 40.0, z + 58.0, 84.0, 90.0, 48.0), 25.0)
@@ -53,7 +53,11 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
     c, s = math.cos(twist), math.sin(twist)
     a, b = (a * c - b * s) / rho, (a * s + b * c) / rho
     locks = value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, seed + 11)
+    # The meridians meet at the crown: no locks there.
+    away = smoothstep(0.15, 0.55, rho / r)
+    locks = 0.5 + (locks - 0.5) * away
     fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
+    fine = 0.5 + (fine - 0.5) * away
     return locks, fine
 
 
@@ -69,7 +73,7 @@ def density(x: float, y: float, z: float, amount: float, seed: int) -> tuple[flo
     if body <= 0.0:
         return 0.0, d, locks, fine
     # Near the outline only the thickest strands remain.
-    cut = smoothstep(0.72 - 0.75 * body, 1.12 - 0.75 * body, fine)
+    cut = smoothstep(0.78 - 0.85 * body, 1.02 - 0.85 * body, fine)
     return amount * _FULL * body * cut, d, locks, fine
 
 
@@ -113,7 +117,7 @@ def hair_colour(
         hx, hy, hz = lx + view[0], ly + view[1], lz + view[2]
         h = max(math.sqrt(hx * hx + hy * hy + hz * hz), 1e-6)
         t_h = (tx * hx + ty * hy + tz * hz) / h
-        shine = gloss * 0.16 * max(1.0 - t_h * t_h, 0.0) ** 30 * (0.35 + fine)
+        shine = gloss * 0.22 * max(1.0 - t_h * t_h, 0.0) ** 30 * (0.35 + fine)
         diffuse = 0.85 * across * facing
         red += lights[i, 3] * facing * shine + lights[i, 3] * base_r * diffuse
         green += lights[i, 4] * facing * shine * 0.85 + lights[i, 4] * base_g * diffuse

@@ -25,7 +25,7 @@ from facefolds_core.geometry.cameras import Camera
 
 Array = NDArray[np.float64]
 
-_DIFFERENT = 0.035
+_DIFFERENT = 0.06
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
 _DEPTH_JUMP = 4.0
 """Likewise in depth, mm."""
@@ -108,7 +108,7 @@ def _hair(
             green += through * cover * g
             blue += through * cover * bl
             through *= 1.0 - cover
-            if through < 0.004:
+            if through < 0.01:
                 return red, green, blue, 0.0
         t += step
     return red, green, blue, through

@@ -23,6 +23,7 @@ from facefolds_core.captures.actor.shape import (
     TEETH,
     distance,
     eye_slot,
+    lid_edges,
     mouth_gap,
     to_rest,
 )
@@ -47,12 +48,12 @@ def lip_mask(xr: float, yr: float) -> float:
     """How red the skin is at a point of the rest face, 0 to 1."""
     ax = abs(xr)
     s = ax / (MOUTH_HALFWIDTH + 0.5)
-    taper = math.sqrt(max(1.0 - s * s, 0.0))
-    bow = 1.5 * math.exp(-(((ax - 5.5) / 4.0) ** 2)) - 0.8 * math.exp(-((ax / 2.5) ** 2))
+    taper = max(1.0 - s * s, 0.0) ** 0.75
+    bow = 1.9 * math.exp(-(((ax - 5.5) / 4.0) ** 2)) - 0.8 * math.exp(-((ax / 2.5) ** 2))
     upper = MOUTH_Y + (7.6 + bow) * taper
     lower = MOUTH_Y - 9.6 * taper
     inside = min(upper - yr, yr - lower)
-    return smoothstep(-0.9, 0.9, inside) * smoothstep(1.02, 0.9, s)
+    return smoothstep(-0.9, 0.9, inside) * smoothstep(1.02, 0.92, s)
 
 
 @compiled
@@ -79,7 +80,7 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     broad = value_noise(xr / 17.0, yr / 17.0, zr / 17.0, seed + 1) - 0.5
     fine = value_noise(xr / 3.1, yr / 3.1, zr / 3.1, seed + 2) - 0.5
     tone = 1.0 + 0.07 * broad + 0.07 * fine
-    colour = (0.86 * tone, 0.625 * tone, 0.50 * tone)
+    colour = (0.90 * tone, 0.67 * tone, 0.545 * tone)
     gloss = 0.30 + 0.25 * fine
     # Blood: cheeks, tip of the nose, chin.
     red = 0.75 * math.exp(-(((ax - 40.0) / 17.0) ** 2) - ((yr + 32.0) / 16.0) ** 2)
@@ -112,7 +113,8 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     if abs(y) < 18.0 and z > 50.0:
         colour, gloss = _lid_paint(abs(x) - EYE_X, y, pose[BLINK], colour, gloss)
     # Nostrils and the scalp under the hair are dark.
-    nostril = math.exp(-(((ax - 6.2) / 3.0) ** 2) - ((yr + 45.5) / 1.8) ** 2) * smoothstep(86.0, 92.0, zr)
+    nostril = math.exp(-(((ax - 6.2) / 3.0) ** 2) - ((yr + 45.5) / 1.8) ** 2) * smoothstep(85.0, 88.0, zr)
+    nostril *= smoothstep(98.0, 95.0, zr)
     colour = mix(colour, (0.20, 0.07, 0.05), 0.9 * clamp(1.4 * nostril, 0.0, 1.0))
     scalp = smoothstep(1.0, -7.0, envelope(x, y, z))
     return mix(colour, (0.17, 0.10, 0.06), 0.9 * scalp), gloss * (1.0 - scalp)
@@ -121,11 +123,10 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
 @compiled
 def _lid_paint(ex: float, y: float, blink: float, colour: Vector, gloss: float) -> tuple[Vector, float]:
     """Lashes along the upper lid's edge, a pink lower rim."""
+    lower, upper = lid_edges(ex, blink)
     slot = eye_slot(ex, y, blink)
-    tilted = y - 0.07 * ex
-    middle = 0.6 - 3.4 * blink
-    lash = smoothstep(2.1, 0.7, slot) * smoothstep(15.5, 12.0, abs(ex))
-    if tilted > middle - 0.8:
+    lash = smoothstep(2.2 + 0.5 * blink, 0.8, slot) * smoothstep(16.0, 12.5, abs(ex))
+    if y > 0.5 * (lower + upper) - 1.2 * blink:
         colour = mix(colour, (0.10, 0.055, 0.04), 0.93 * lash)
     else:
         rim = smoothstep(1.5, 0.4, slot)
@@ -146,15 +147,15 @@ def _eye_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: in
     radius = math.sqrt(ux * ux + uy * uy) * EYE_RADIUS
     temple = side * ex * EYE_RADIUS
     colour = mix((0.90, 0.875, 0.85), (0.80, 0.58, 0.53), smoothstep(6.0, 14.0, abs(temple)))
-    if radius < 7.4:
+    if radius < 7.8:
         angle = math.atan2(uy, ux)
         fibre = value_noise(3.0 * math.cos(angle) * 3.0, 3.0 * math.sin(angle) * 3.0, radius / 3.0, seed + 41)
         iris = mix((0.50, 0.36, 0.16), (0.16, 0.36, 0.40), smoothstep(2.4, 4.6, radius + 1.2 * fibre))
         light = 0.75 + 0.6 * fibre
         iris = (iris[0] * light, iris[1] * light, iris[2] * light)
-        iris = mix(iris, (0.05, 0.07, 0.08), smoothstep(5.2, 6.6, radius))
+        iris = mix(iris, (0.05, 0.07, 0.08), smoothstep(5.6, 7.0, radius))
         iris = mix((0.015, 0.012, 0.012), iris, smoothstep(2.3, 2.9, radius))
-        colour = mix(iris, colour, smoothstep(6.3, 7.2, radius))
+        colour = mix(iris, colour, smoothstep(6.8, 7.6, radius))
     slot = -eye_slot(temple, y, pose[BLINK])
     shadow = smoothstep(0.0, 4.5, slot) if y > 0.0 else smoothstep(0.0, 1.5, slot)
     light = 0.50 + 0.50 * shadow
@@ -203,7 +204,7 @@ def occlusion(x: float, y: float, z: float, n: Vector, pose: NDArray[np.float64]
 def shadow(x: float, y: float, z: float, lx: float, ly: float, lz: float, pose: NDArray[np.float64]) -> float:
     """Soft shadow towards a light, 0 to 1 (Quilez's penumbra estimate)."""
     lit, t = 1.0, 4.0
-    for _ in range(10):
+    for _ in range(8):
         d = distance(x + t * lx, y + t * ly, z + t * lz, pose)
         lit = min(lit, 5.0 * d / t)
         if lit < 0.02 or t > 90.0:

@@ -24,32 +24,38 @@ SKIN, EYE, TEETH, TONGUE, SHIRT = range(5)
 
 EYE_X, EYE_Z, EYE_RADIUS = 32.0, 68.5, 13.5
 _LID_RADIUS = 15.0
-_EYE_HALFWIDTH = 14.2
+_EYE_HALFWIDTH = 14.8
 MOUTH_Y = -67.0
-MOUTH_HALFWIDTH = 26.0
+MOUTH_HALFWIDTH = 25.0
 _JAW_DROP = 21.0
 BOUND = 190.0
 """No part of head and hair lies farther from the origin in x or z; shoulders do, and are bounded by `BOUND_BODY`."""
 
 
 @compiled
-def eye_slot(ex: float, ey: float, blink: float) -> float:
-    """Signed distance, in the plane of the face, to the opening between the lids: negative inside, mm.
+def lid_edges(ex: float, blink: float) -> tuple[float, float]:
+    """y of the lower and of the upper lid's edge, mm.
 
     Args:
-        ex: from the eye's centre towards the temple.
-        ey: upwards.
+        ex: from the eye's centre towards the temple, mm.
         blink: 0 open, 1 shut.
     """
     s = ex / _EYE_HALFWIDTH
     lens = max(1.0 - s * s, -1.5)
-    tilted = ey - 0.07 * ex
     lower = -4.6 * lens
     # The upper lid is fullest a little towards the nose.
-    upper = 6.3 * lens * (1.0 - 0.10 * s)
+    upper = 6.9 * lens * (1.0 - 0.10 * s)
     upper += (lower - 0.4 - upper) * blink
-    slope = math.sqrt(1.0 + (0.75 * s) ** 2)
-    return max(tilted - upper, lower - tilted) / slope
+    # The outer corner lies a little higher.
+    return lower + 0.07 * ex, upper + 0.07 * ex
+
+
+@compiled
+def eye_slot(ex: float, ey: float, blink: float) -> float:
+    """Signed distance, in the plane of the face, to the opening between the lids: negative inside, mm."""
+    lower, upper = lid_edges(ex, blink)
+    slope = math.sqrt(1.0 + (0.75 * ex / _EYE_HALFWIDTH) ** 2)
+    return max(ey - upper, lower - ey) / slope
 
 
 @compiled
@@ -64,15 +70,16 @@ def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float]:
 @compiled
 def to_rest(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
     """Carry a point of the moving face back to the rest pose."""
-    height, edge = mouth_gap(x, pose)
-    if z > -20.0 and y < edge - 0.5 * height:
-        drop = _JAW_DROP * pose[JAW]
-        below = edge - height - y
-        shift = height + (drop - height) * smoothstep(0.0, 55.0, below)
-        shift *= smoothstep(-20.0, 55.0, z) * smoothstep(-215.0, -140.0, y)
-        y += shift
-        z += 0.22 * shift
-    if z > 20.0:
+    if z > -20.0 and y < MOUTH_Y + 5.0 and pose[JAW] > 0.0:
+        height, edge = mouth_gap(x, pose)
+        if y < edge - 0.5 * height:
+            drop = _JAW_DROP * pose[JAW]
+            below = edge - height - y
+            shift = height + (drop - height) * smoothstep(0.0, 55.0, below)
+            shift *= smoothstep(-20.0, 55.0, z) * smoothstep(-215.0, -140.0, y)
+            y += shift
+            z += 0.22 * shift
+    if z > 20.0 and y < 15.0:
         ax = abs(x)
         smile = pose[SMILE] * math.exp(-(((ax - 27.0) / 17.0) ** 2) - ((y - MOUTH_Y - 3.0) / 15.0) ** 2)
         x -= math.copysign(3.5, x) * smile
@@ -90,19 +97,19 @@ def _nose(ax: float, y: float, z: float, d: float) -> float:
     d = smooth_min(d, cone(ax, y, z, 12.0, 81.0, -32.0, 97.0, 5.0, 8.0), 12.0)
     d = smooth_min(d, ellipsoid(ax, y + 35.5, z - 99.5, 9.5, 8.4, 9.5), 7.0)
     d = smooth_min(d, ellipsoid(ax - 11.0, y + 39.5, z - 90.0, 6.2, 6.6, 9.0), 5.0)
-    return smooth_max(d, -ellipsoid(ax - 6.2, y + 47.0, z - 96.0, 3.0, 3.4, 4.5), 2.0)
+    return smooth_max(d, -ellipsoid(ax - 6.6, y + 47.5, z - 92.5, 2.6, 3.4, 4.0), 2.0)
 
 
 @compiled
 def _lips(ax: float, y: float, z: float, d: float) -> float:
     """Blend the lips into the skin distance d: two bent tubes that touch along the line of the mouth."""
-    zc = 91.0 - 0.0125 * ax * ax
+    zc = 90.0 - 0.0185 * ax * ax
     s = ax / (MOUTH_HALFWIDTH + 2.0)
     if s > 1.0:
         return d
-    taper = math.sqrt(1.0 - s * s)
-    bow = 1.1 * math.exp(-(((ax - 6.0) / 4.5) ** 2))
-    upper = math.sqrt((y - MOUTH_Y - 4.2 * taper - 0.5 * bow) ** 2 + (z - zc + 1.0) ** 2) - 4.9 * taper
+    taper = 1.0 - s * s
+    bow = 1.6 * math.exp(-(((ax - 6.0) / 4.5) ** 2))
+    upper = math.sqrt((y - MOUTH_Y - 3.9 * taper - 0.5 * bow) ** 2 + (z - zc + 1.5) ** 2) - 4.4 * taper
     lower = math.sqrt((y - MOUTH_Y + 5.2 * taper) ** 2 + (z - zc + 1.3) ** 2) - 5.6 * taper
     return smooth_min(d, min(upper, lower), 4.0 * taper + 0.1)
 
@@ -117,6 +124,20 @@ def _jaw(ax: float, y: float, z: float) -> float:
 
 
 @compiled
+def _eye_region(ax: float, y: float, z: float, brow: float, d: float) -> float:
+    """Blend brow ridge, eye socket and the closed lids into the skin distance d."""
+    d = smooth_min(d, ellipsoid(ax - 25.0, y - 20.5 - 3.0 * brow, z - 71.0, 25.0, 9.0, 14.0), 16.0)
+    ex = ax - EYE_X
+    d = smooth_max(d, -ellipsoid(ex, y - 1.0, z - 96.0, 19.0, 12.5, 15.0), 12.0)
+    d = smooth_min(d, math.sqrt(ex * ex + y * y + (z - EYE_Z) ** 2) - _LID_RADIUS, 5.0)
+    # The fold above the upper lid.
+    crease = (y - 9.8 - 1.5 * brow + 0.012 * ex * ex) / 1.5
+    if abs(crease) < 3.0 and z > 60.0:
+        d += 0.9 * math.exp(-crease * crease - (ex / 14.0) ** 4) * smoothstep(60.0, 72.0, z)
+    return d
+
+
+@compiled
 def skin_rest(x: float, y: float, z: float, brow: float) -> float:
     """Signed distance to the closed skin (no slots) at rest, mm."""
     d = ellipsoid(x, y - 32.0, z + 8.0, 73.0, 83.0, 97.0)
@@ -125,23 +146,29 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
     neck = cone(x, y, z, -60.0, -24.0, -230.0, -40.0, 44.0, 52.0)
     d = smooth_min(d, neck, 18.0)
     d = smooth_min(d, _jaw(ax, y, z), 22.0)
-    if z < 5.0 or d > 40.0:
+    if d > 40.0:
+        # The features stand out from this by less than 25 mm.
+        return d - 25.0
+    if z < 5.0:
         return d
-    d = smooth_min(d, ellipsoid(ax - 39.0, y + 27.0, z - 48.0, 23.0, 20.0, 26.0), 20.0)
-    d = smooth_min(d, ellipsoid(x, y + 101.0, z - 64.0, 19.0, 13.0, 18.0), 16.0)
-    d = smooth_min(d, ellipsoid(x, y + 66.0, z - 54.0, 32.0, 27.0, 34.0), 16.0)
-    d = smooth_min(d, ellipsoid(ax - 25.0, y - 20.0 - 3.0 * brow, z - 72.0, 24.0, 8.0, 14.0), 14.0)
-    ex = ax - EYE_X
-    d = smooth_max(d, -ellipsoid(ex, y - 1.0, z - 96.0, 19.0, 12.5, 15.0), 12.0)
-    d = smooth_min(d, math.sqrt(ex * ex + y * y + (z - EYE_Z) ** 2) - _LID_RADIUS, 5.0)
-    # The fold above the upper lid.
-    fold = math.exp(-(((y - 9.8 - 1.5 * brow + 0.012 * ex * ex) / 1.5) ** 2) - (ex / 14.0) ** 4)
-    d += 0.9 * fold * smoothstep(60.0, 72.0, z)
-    if y < 45.0 and z > 50.0:
+    # Each feature is measured only where it can change the blend.
+    if y < 30.0:
+        d = smooth_min(d, ellipsoid(ax - 39.0, y + 27.0, z - 48.0, 23.0, 20.0, 26.0), 20.0)
+    if y > -50.0:
+        d = smooth_min(d, ellipsoid(ax - 47.0, y - 3.0, z - 40.0, 17.0, 22.0, 24.0), 16.0)
+    if y < 10.0:
+        d = smooth_min(d, ellipsoid(ax - 34.0, y + 58.0, z - 42.0, 22.0, 24.0, 27.0), 18.0)
+        d = smooth_min(d, ellipsoid(x, y + 66.0, z - 54.0, 32.0, 27.0, 34.0), 16.0)
+        if y < -60.0:
+            d = smooth_min(d, ellipsoid(x, y + 101.0, z - 64.0, 19.0, 13.0, 18.0), 16.0)
+    if y > -32.0 and y < 55.0:
+        d = _eye_region(ax, y, z, brow, d)
+    if y < 45.0 and y > -75.0 and z > 50.0 and ax < 45.0:
         d = _nose(ax, y, z, d)
-        if y < -45.0:
-            d = _lips(ax, y, z, d)
-            # Philtrum.
+    if y < -45.0 and z > 60.0:
+        d = _lips(ax, y, z, d)
+        # Philtrum.
+        if y > -70.0 and ax < 10.0:
             d += 0.8 * math.exp(-((ax / 3.0) ** 2) - ((y + 54.0) / 5.0) ** 2)
     return d
 
@@ -229,9 +256,9 @@ def trace(
     t = near
     for _ in range(160):
         d = distance(ox + t * dx, oy + t * dy, oz + t * dz, pose)
-        if d < 0.02:
+        if d < 0.03:
             return t
-        t += 0.75 * d
+        t += 0.8 * d
         if t > far:
             break
     return math.inf
