@@ -25,6 +25,7 @@ class Section(BaseModel):
 T = TypeVar("T", bound="Section")
 
 Positive = Annotated[int, Field(ge=1)]
+Unit = Annotated[float, Field(ge=0, le=1)]
 
 
 class HoldoutEvery(Section):
@@ -230,15 +231,14 @@ class CompressParams(Section):
 
 
 class EvaluateParams(Section):
-    """`evaluate`.
+    """`evaluate` (it works on the device of `train`).
 
     Attributes:
-        background: RGB in [0, 1] shown where the asset is transparent.
-        device: as in `train`.
-        sheet_frames: frames shown for each held-out camera in the contact sheet.
+        background: RGB in [0, 1] shown where the model or the asset is transparent.
+        sheet_frames: frames shown for each held-out camera in the contact sheet, evenly spaced.
     """
 
-    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    background: tuple[Unit, Unit, Unit] = (0.0, 0.0, 0.0)
     sheet_frames: Positive = 3
 
 

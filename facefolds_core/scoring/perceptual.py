@@ -17,7 +17,6 @@ from pathlib import Path
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
 TRUNK_NAME = "alexnet-owt-7be5be79.pth"
 """torchvision's AlexNet; the digits are the first of its SHA-256."""
@@ -43,7 +42,9 @@ class BlurDown(nn.Module):
         self.register_buffer("kernel", (row[:, None] * row).expand(channels, 1, 3, 3).clone(), persistent=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        return F.conv2d(F.pad(x, (2, 2, 2, 2), mode="reflect"), self.kernel, stride=2, groups=x.shape[1])
+        return nn.functional.conv2d(
+            nn.functional.pad(x, (2, 2, 2, 2), mode="reflect"), self.kernel, stride=2, groups=x.shape[1]
+        )
 
 
 def _alexnet_stages() -> list[nn.Sequential]:
@@ -122,7 +123,7 @@ def _enlarged(images: Tensor) -> Tensor:
     if short >= MIN_SIDE:
         return images
     size = (round(height * MIN_SIDE / short), round(width * MIN_SIDE / short))
-    return F.interpolate(images, size=size, mode="bilinear", align_corners=False)
+    return nn.functional.interpolate(images, size=size, mode="bilinear", align_corners=False)
 
 
 @dataclass(frozen=True)

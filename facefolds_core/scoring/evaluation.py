@@ -1,0 +1,203 @@
+"""Score the shipped asset, and the model it came from, on the held-out cameras (docs/metrics.md).
+
+One camera at a time, one frame at a time: memory is bounded by one camera's crossings, whatever the number of images.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from facefolds_core.asset import Asset
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.model import RadianceManifolds
+from facefolds_core.params import EvaluateParams
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
+from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
+
+VARIANTS = ("model", "diffuse", "asset")
+METRICS = ("psnr", "ssim", "lpips", "st_lpips")
+SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
+
+MASK_EDGE = 0.1
+"""The subject is where its opacity exceeds this: for the box of the perceptual metrics, and to tell an empty mask."""
+MASK_MARGIN = 8
+"""Pixels added to that box on each side, within the frame."""
+
+
+@dataclass(frozen=True)
+class ImageScore:
+    """One rendered image against the truth.
+
+    Attributes:
+        camera, frame: their names in the capture.
+        variant: one of VARIANTS.
+        values: METRICS and SUBJECT_METRICS; None where a value cannot be had.
+    """
+
+    camera: str
+    frame: str
+    variant: str
+    values: dict[str, float | None]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores."""
+
+    camera: str
+    frame: str
+    truth: Array
+    model: Array
+    asset: Array
+    model_score: ImageScore
+    asset_score: ImageScore
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """All scores, and the panels of the contact sheet."""
+
+    scores: list[ImageScore]
+    panels: list[Panel]
+
+
+def evaluate(
+    scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, perceptual: Perceptual
+) -> Evaluation:
+    """Render and score every frame of every held-out camera; shows a progress bar.
+
+    Raises:
+        UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
+    """
+    held_out = scene.indices("holdout")
+    _check(scene, model, asset, held_out)
+    truths, masks = scene.open_frames(), scene.open_masks()
+    on_sheet = sheet_frames(scene.num_frames, params.sheet_frames)
+    caster = AssetCaster(asset)
+    scores: list[ImageScore] = []
+    panels: list[Panel] = []
+    with tqdm(total=len(held_out) * scene.num_frames, desc="evaluate", unit="image") as bar:
+        for index in held_out:
+            camera = scene.cameras[index]
+            for k, images in enumerate(_rendered(model, asset, caster, camera, params.background)):
+                frame = scene.frame_ids[k]
+                _check_finite(images, camera.name, frame)
+                pictures = {variant: shown(image) for variant, image in images.items()}
+                truth = truths.image(index, k) / 255.0
+                has_mask = masks is not None and (index, k) in masks
+                mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None
+                found = score_images(pictures, truth, mask, perceptual)
+                group = {v: ImageScore(camera.name, frame, v, values) for v, values in found.items()}
+                scores += group.values()
+                if k in on_sheet:
+                    shot = (truth, pictures["model"], pictures["asset"])
+                    panels.append(Panel(camera.name, frame, *shot, group["model"], group["asset"]))
+                bar.update()
+    return Evaluation(scores, panels)
+
+
+def sheet_frames(frames: int, wanted: int) -> list[int]:
+    """At most `wanted` of `frames` indices, evenly spaced, the first and the last among them."""
+    return sorted({round(i) for i in np.linspace(0, frames - 1, min(wanted, frames))})
+
+
+def score_images(
+    images: dict[str, Array], truth: Array, mask: Array | None, perceptual: Perceptual
+) -> dict[str, dict[str, float | None]]:
+    """All metrics of several renderings of one view.
+
+    Args:
+        images: name -> (H, W, 3) in [0, 1].
+        truth: (H, W, 3).
+        mask: (H, W) opacity of the subject, or None.
+    """
+    pictures = list(images.values())
+    frame = {"lpips": _distances(perceptual.lpips, pictures, truth)}
+    frame["st_lpips"] = _distances(perceptual.st_lpips, pictures, truth)
+    box = None if mask is None else subject_box(mask)
+    if mask is not None and box is not None:
+        cut = [(image * mask[..., None])[box] for image in [truth, *pictures]]
+        frame["lpips_subject"] = _distances(perceptual.lpips, cut[1:], cut[0])
+        frame["st_lpips_subject"] = _distances(perceptual.st_lpips, cut[1:], cut[0])
+    result: dict[str, dict[str, float | None]] = {}
+    for i, (name, image) in enumerate(images.items()):
+        values: dict[str, float | None] = dict.fromkeys((*METRICS, *SUBJECT_METRICS))
+        values |= {key: per_image[i] for key, per_image in frame.items()}
+        values |= {"psnr": psnr(image, truth), "ssim": ssim(image, truth)}
+        if box is not None:
+            values |= {"psnr_subject": psnr(image, truth, mask), "ssim_subject": ssim(image, truth, mask)}
+        result[name] = values
+    return result
+
+
+def subject_box(mask: Array) -> tuple[slice, slice] | None:
+    """Rows and columns of the subject with a margin; None where the mask is empty."""
+    rows, columns = np.nonzero(mask > MASK_EDGE)
+    if not len(rows):
+        return None
+    return (
+        slice(max(0, rows.min() - MASK_MARGIN), rows.max() + 1 + MASK_MARGIN),
+        slice(max(0, columns.min() - MASK_MARGIN), columns.max() + 1 + MASK_MARGIN),
+    )
+
+
+def _rendered(
+    model: RadianceManifolds, asset: Asset, caster: AssetCaster, camera: Camera, background: tuple[float, float, float]
+) -> Iterator[dict[str, NDArray[np.float32]]]:
+    """The variants' images (H, W, 3) over `background`, frame by frame."""
+    view, hits = ModelView(model, camera), caster.cast(camera)
+    for k, textures in enumerate(asset.frames()):
+        with_view, without_view, alpha = view.render(float(k))
+        behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
+        shipped, _ = composite(hits, textures, background)
+        yield {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
+
+
+def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:
+    if metric is None:
+        return [None] * len(images)
+    device = metric.shift.device
+    stack = torch.tensor(np.stack([truth, *images]), dtype=torch.float32, device=device).permute(0, 3, 1, 2)
+    return [float(d) for d in metric(stack[1:], stack[0])]
+
+
+def _check(scene: Scene, model: RadianceManifolds, asset: Asset, held_out: list[int]) -> None:
+    if not held_out:
+        raise UserError(
+            "no held-out camera: there is nothing to score on",
+            file=scene.folder / "scene.json",
+            expected="at least one camera with split holdout",
+            found=f"{len(scene.cameras)} cameras, all for training",
+            remedy="name held-out cameras under subjects.<name>.holdout in params.yaml, or set {every: n} there",
+        )
+    for what, frames in (("model", model.num_frames), ("asset", asset.num_frames)):
+        if frames != scene.num_frames:
+            raise UserError(
+                f"the {what} and the scene have different numbers of frames",
+                file=scene.folder / "scene.json",
+                expected=f"{scene.num_frames} frames, as in the scene",
+                found=f"{frames} in the {what}",
+                remedy="run `dvc repro`, which makes both from the same scene",
+            )
+
+
+def _check_finite(images: dict[str, NDArray[np.float32]], camera: str, frame: str) -> None:
+    for variant, image in images.items():
+        if not np.isfinite(image).all():
+            raise UserError(
+                f"the rendering of the {variant} has numbers that are not finite",
+                place=f"camera {camera}, frame {frame}",
+                expected="colours in [0, 1]",
+                found=f"{int((~np.isfinite(image)).any(-1).sum())} pixels with NaN or infinity",
+                remedy="the model is damaged: train again with a smaller learning rate or another seed",
+            )

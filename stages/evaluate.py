@@ -1,0 +1,41 @@
+"""Score the shipped files, and the model they came from, on the held-out cameras."""
+
+from __future__ import annotations
+
+import sys
+
+from facefolds_core.asset import read_asset
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_stage
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.model import load_model
+from facefolds_core.params import EvaluateParams, TrainParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.evaluation import evaluate
+from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
+from facefolds_core.scoring.sheets import write_contact_sheet
+from facefolds_core.training.loop import pick_device
+from stages.common import run_stage
+
+
+def evaluate_subject(folders: SubjectFolders) -> str:
+    params = read_stage(EvaluateParams, folders.config)
+    device = pick_device(read_stage(TrainParams, folders.config).device)
+    scene, asset = read_scene(folders.scene), read_asset(folders.asset)
+    cost = read_cost(folders, asset.manifest)
+    perceptual = find_perceptual(device)
+    for line in perceptual.missing:
+        sys.stderr.write(f"evaluate: {line}\n")
+    result = evaluate(scene, load_model(folders.model, device), asset, params, perceptual)
+    metrics = metrics_json(scene.subject, result.scores, cost)
+    with atomic_folder(folders.evaluation) as temporary:
+        write_per_image(result.scores, temporary / "per_image.parquet")
+        write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
+    write_json(folders.metrics, metrics)
+    sys.stdout.write(text_table(metrics) + "\n")
+    return f"{metrics['images']} images of {len(scene.indices('holdout'))} held-out cameras; {folders.metrics}"
+
+
+if __name__ == "__main__":
+    run_stage("evaluate", evaluate_subject, __doc__ or "")
