@@ -1,0 +1,206 @@
+"""From a capture's world to the normalised one: centre, orientation, scale; which cameras are used and which held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.capture import Capture, Tracking, shorten
+from facefolds_core.captures.scene import Split
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.params import HoldoutEvery, NormalizeParams, Subject
+
+Array = NDArray[np.float64]
+
+
+def orientation(facing: Array, up: Array) -> Array:
+    """(3, 3) rotation that takes `facing` to +x and `up`, made orthogonal to it, to +z."""
+    x = facing / np.linalg.norm(facing)
+    z = up - (up @ x) * x
+    z = z / np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def nearest_to_axes(cameras: Sequence[Camera]) -> Array:
+    """(3,) the point nearest to all optical axes, robustly: a camera that looks elsewhere counts little.
+
+    Minimises sum_i w_i |(I - d_i d_i^T)(p - o_i)|^2, reweighted 30 times with w_i = 1 / (1 + (r_i / (2 median r))^2)
+    (Cauchy's weights). Two parallel axes leave the position along them open: the least-norm solution is taken there.
+    """
+    origins = np.array([camera.centre for camera in cameras])
+    directions = np.array([camera.forward for camera in cameras])
+    projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
+    weights = np.ones(len(cameras))
+    middle = origins.mean(0)
+    point = middle
+    for _ in range(30):
+        A = (weights[:, None, None] * projectors).sum(0)
+        b = (weights[:, None] * np.einsum("nij,nj->ni", projectors, origins - middle)).sum(0)
+        point = middle + np.linalg.lstsq(A, b, rcond=1e-9)[0]
+        residuals = np.linalg.norm(np.einsum("nij,nj->ni", projectors, point - origins), axis=1)
+        scale = 2 * np.median(residuals) + 1e-12
+        weights = 1 / (1 + (residuals / scale) ** 2)
+    return np.asarray(point)
+
+
+def _from_tracking(tracking: Tracking) -> tuple[Array, Array]:
+    """Centre (3,) and rotation (3, 3) from the tracked head, in the capture's world.
+
+    The centre is the middle of the bounding box, averaged over the frames: unlike the mean of the vertices it does not
+    depend on where the mesh is dense (eyes, lips).
+    """
+    vertices = tracking.world_vertices()
+    centre = ((vertices.min(1) + vertices.max(1)) / 2).mean(0)
+    facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
+    return centre, orientation(facing, up)
+
+
+def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, list[str]]:
+    """Centre (3,), rotation (3, 3) and notes, from the cameras alone."""
+    cameras = [view.camera for view in capture.views]
+    centre = nearest_to_axes(cameras)
+    if front is None:
+        facing = np.mean([camera.centre - centre for camera in cameras], axis=0)
+        up = np.mean([-camera.rotation[1] for camera in cameras], axis=0)
+        if np.linalg.norm(facing) < 1e-9 or np.linalg.norm(np.cross(facing, up)) < 1e-9:
+            raise UserError(
+                "the cameras do not tell where the subject faces",
+                file=capture.root,
+                place="front",
+                remedy="set `front` of this subject in params.yaml to a camera that faces it, upright",
+            )
+        return centre, orientation(facing, up), ["note: no `front` camera and no tracked mesh; +x is the cameras' mean direction"]
+    names = [camera.name for camera in cameras]
+    if front not in names:
+        raise UserError(
+            "no such front camera",
+            file=capture.root,
+            place="front",
+            expected=f"one of {shorten(names, 100)}",
+            found=front,
+            remedy="correct `front` of this subject in params.yaml",
+        )
+    camera = cameras[names.index(front)]
+    return centre, orientation(-camera.forward, -camera.rotation[1]), []
+
+
+def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similarity, list[str]]:
+    """Capture -> normalised coordinates, and notes.
+
+    Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh, centre
+    and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject faces
+    against the viewing direction of the camera `front`, whose image is upright.
+
+    Raises:
+        UserError: if the front camera does not exist, or all cameras stand in the centre.
+    """
+    notes: list[str] = []
+    if capture.tracking is not None:
+        centre, rotation = _from_tracking(capture.tracking)
+    else:
+        centre, rotation, notes = _from_cameras(capture, front)
+    distance = float(np.median([np.linalg.norm(view.camera.centre - centre) for view in capture.views]))
+    if not np.isfinite(distance) or distance < 1e-9:
+        raise UserError(
+            "the cameras stand in the subject's centre",
+            file=capture.root,
+            expected="cameras around the subject",
+            found=f"median distance {distance}",
+            remedy="check the camera poses; cameras must look at one subject from different places",
+        )
+    return Similarity(1 / distance, rotation, -(rotation @ centre) / distance), notes
+
+
+def stabilizing_similarities(tracking: Tracking) -> list[Similarity]:
+    """For each frame, world -> the world in which the head has its mean pose."""
+    facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
+    still = Similarity(1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0))
+    return [still.after(Similarity(1.0, pose[:, :3], pose[:, 3]).inverse()) for pose in tracking.poses]
+
+
+def view_angles(cameras: Sequence[Camera]) -> Array:
+    """(C, 2) elevation and azimuth of normalised cameras as the subject sees them, degrees; azimuth in -180..180."""
+    centres = np.array([camera.centre for camera in cameras])
+    elevation = np.arcsin(np.clip(centres[:, 2] / np.linalg.norm(centres, axis=1), -1, 1))
+    return np.degrees(np.stack([elevation, np.arctan2(centres[:, 1], centres[:, 0])], -1))
+
+
+@dataclass(frozen=True)
+class Culling:
+    """Attributes:
+    kept: indices of the cameras within the angles.
+    lines: for each other one, its name and angles.
+    """
+
+    kept: list[int]
+    lines: list[str]
+
+
+def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Culling:
+    """Leave out normalised cameras beyond `max_elevation` or `max_azimuth`.
+
+    Raises:
+        UserError: if none is left; says the angles.
+    """
+    angles = view_angles(cameras)
+    inside = (np.abs(angles[:, 0]) <= params.max_elevation) & (np.abs(angles[:, 1]) <= params.max_azimuth)
+    lines = [
+        f"camera {camera.name}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees"
+        for camera, (elevation, azimuth), used in zip(cameras, angles, inside, strict=True)
+        if not used
+    ]
+    if not inside.any():
+        each = [f"{c.name} ({e:.0f}, {a:.0f})" for c, (e, a) in zip(cameras, angles, strict=True)]
+        raise UserError(
+            "all cameras are culled",
+            file=str(file),
+            expected=f"elevations up to {params.max_elevation:g} and azimuths up to {params.max_azimuth:g} degrees",
+            found=f"(elevation, azimuth) of {shorten(each)}",
+            remedy="check `front`, or raise `max_elevation` and `max_azimuth` of `normalize` for this subject",
+        )
+    return Culling([int(i) for i in np.flatnonzero(inside)], lines)
+
+
+def split_cameras(
+    names: Sequence[str], subject: Subject, unused: Sequence[str], file: object
+) -> tuple[Split, ...]:
+    """"train" or "holdout" for each of the cameras that are used, in their order.
+
+    `every: n` holds out the cameras at positions p (from 0) with (p + 1) % n == 0.
+
+    Args:
+        unused: lines on cameras that were left out, to say why one that is named is not there.
+
+    Raises:
+        UserError: if a camera to hold out is not there, or no camera is left for training.
+    """
+    if isinstance(subject.holdout, HoldoutEvery):
+        held = {name for p, name in enumerate(names) if (p + 1) % subject.holdout.every == 0}
+    else:
+        held = set(subject.holdout)
+    for name in sorted(held - set(names)):
+        reasons = [line for line in unused if line.startswith(f"camera {name}:")]
+        raise UserError(
+            "a held-out camera is not there",
+            file=str(file),
+            place="holdout",
+            expected=f"some of {shorten(names, 200)}",
+            found=reasons[0] if reasons else f"{name}, which the capture does not have",
+            remedy="correct `holdout` of this subject in params.yaml",
+        )
+    splits: tuple[Split, ...] = tuple("holdout" if name in held else "train" for name in names)
+    if "train" not in splits:
+        raise UserError(
+            "no camera is left for training",
+            file=str(file),
+            place="holdout",
+            expected=f"fewer than {len(names)} held-out cameras",
+            found=shorten(sorted(held)),
+            remedy="hold out fewer cameras",
+        )
+    return splits
