@@ -30,8 +30,8 @@ def compress(folders: SubjectFolders) -> str:
     mesh_bytes = sum(layer.bytes for layer in manifest.layers)
     video = manifest.texture
     return (
-        f"{len(manifest.layers)} meshes ({mesh_bytes} bytes) and {video.frames} frames in {video.width} x {video.height} "
-        f"H.264 level {video.level} ({video.bytes} bytes) in {folders.asset}"
+        f"{len(manifest.layers)} meshes ({mesh_bytes} bytes) and {video.frames} frames "
+        f"in {video.width} x {video.height} H.264 level {video.level} ({video.bytes} bytes) in {folders.asset}"
     )
 
 

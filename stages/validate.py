@@ -13,7 +13,7 @@ from facefolds_core.errors import report_user_errors
 
 
 def validate(
-    asset: Annotated[Path, typer.Argument(help="Folder of the asset: the one that holds manifest.json.")],
+    asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
 ) -> None:
     """Check an asset's manifest, checksums, meshes and every frame of its video; exit status 1 if anything is wrong."""
     with report_user_errors("validate"):

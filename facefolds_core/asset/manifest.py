@@ -1,7 +1,6 @@
 """manifest.json of an asset, format version 1 (docs/asset-format.md), as validated models.
 
-The JSON schema beside this file, manifest.schema.json, says the same without our code; a test keeps the two in step
-(`python -m facefolds_core.asset.manifest` writes it again).
+The JSON schema beside this file, manifest.schema.json, says the same without our code; a test keeps the two in step.
 """
 
 from __future__ import annotations
@@ -39,7 +38,13 @@ Vector = tuple[float, float, float]
 class Part(BaseModel):
     """Base: frozen, unknown keys refused, no conversion between kinds, no NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        json_schema_serialization_defaults_required=True,
+    )
 
 
 class Transform(Part):
@@ -221,5 +226,6 @@ def _missing_keys(whole: Any, given: Any, place: str = "") -> list[str]:
     return found + [name for key, a, b in pairs for name in _missing_keys(a, b, f"{place}{key}.")]
 
 
-if __name__ == "__main__":
+def write_schema() -> None:
+    """Write manifest.schema.json again, after a change of the models."""
     write_text(SCHEMA_PATH, json.dumps(manifest_schema(), indent=1) + "\n")

@@ -18,7 +18,7 @@ _BT709_LIMITED = (1, 1)
 def validate_asset(folder: str | Path) -> list[str]:
     """Check an asset whole: manifest, lengths and checksums, meshes, every frame of the video.
 
-    A file whose bytes are not those of the manifest is reported and not decoded: decoders promise nothing for such input.
+    A file whose bytes are not the manifest's is reported and not decoded: decoders promise nothing for such input.
 
     Returns:
         problems in words, each beginning with the file concerned; empty if the asset is sound.
@@ -50,7 +50,7 @@ def summary(manifest: Manifest) -> str:
     triangles = sum(layer.triangles for layer in manifest.layers)
     return (
         f"{manifest.subject}: {len(manifest.layers)} layers, {triangles} triangles ({meshes} bytes), "
-        f"{texture.frames} frames of {texture.layer_resolution} x {texture.layer_resolution} texels at {texture.fps:g} fps "
+        f"{texture.frames} frames at {texture.fps:g} fps of {texture.layer_resolution}^2 texels a layer "
         f"({texture.bytes} bytes; {texture.width} x {texture.height} H.264, level {texture.level})"
     )
 

@@ -133,6 +133,7 @@ def _x264_options(codec: VideoCodec) -> dict[str, str]:
         "open-gop": 0,
         "bframes": 0,
         "chromaloc": 0,
+        "psy": 0,  # a texture is warped and blended before it is seen: +0.25 dB at equal size
         "threads": 1,
         "cpu-independent": 1,
     }

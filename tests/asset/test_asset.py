@@ -1,0 +1,116 @@
+"""Writing and reading whole assets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facefolds_core.asset import LayerMesh, read_asset, write_asset
+from facefolds_core.asset.validation import validate_asset
+from facefolds_core.captures.frames import write_frames
+from facefolds_core.errors import UserError
+from facefolds_core.params import CompressParams, MeshCodec
+from tests.assets import CENTRE, SOURCE, WINDOW, cap_mesh, cap_textures, make_asset, radius_of, write_store
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("asset") / "asset"
+    make_asset(path)
+    return path
+
+
+def test_meshes_come_back_bit_for_bit(folder: Path) -> None:
+    asset = read_asset(folder)
+    for index, layer in enumerate(asset.layers):
+        mesh = cap_mesh(radius_of(index))
+        assert all(
+            getattr(layer, name).tobytes() == getattr(mesh, name).tobytes() for name in ("vertices", "faces", "st")
+        )
+
+
+def test_layers_are_outermost_first(folder: Path) -> None:
+    radii = [np.linalg.norm(layer.vertices - CENTRE, axis=1).mean() for layer in read_asset(folder).layers]
+    assert radii == sorted(radii, reverse=True)
+
+
+def test_textures_come_back_within_the_codecs_error(folder: Path) -> None:
+    for index, frame in enumerate(read_asset(folder).frames()):
+        truth = cap_textures(3, index, 64)
+        assert frame.shape == truth.shape and frame.dtype == np.uint8
+        assert np.sqrt(((frame.astype(float) - truth) ** 2).mean()) < 5  # 3 seen: tiny textures are hard on H.264
+
+
+def test_frame_k_is_frame_k(folder: Path) -> None:
+    asset = read_asset(folder)
+    frames = list(asset.frames())
+    assert len(frames) == asset.num_frames == 5
+    for index in (4, 0, 2, 3, 1):
+        assert np.array_equal(asset.frame(index), frames[index])
+    with pytest.raises(IndexError):
+        asset.frame(5)
+
+
+def test_manifest_tells_the_way_back_to_the_capture(folder: Path) -> None:
+    to_capture = read_asset(folder).manifest.coordinates.to_capture.similarity()
+    points = np.random.default_rng(0).normal(size=(10, 3))
+    np.testing.assert_array_equal(to_capture.apply(points), SOURCE.to_capture.apply(points))
+
+
+def test_same_input_same_bytes(folder: Path, tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset")
+    for file in folder.iterdir():
+        assert (tmp_path / "asset" / file.name).read_bytes() == file.read_bytes(), file.name
+
+
+@pytest.mark.parametrize("resolution", [37, 50, 61])
+def test_odd_resolutions(tmp_path: Path, resolution: int) -> None:
+    make_asset(tmp_path / "asset", layers=2, frames=2, resolution=resolution)
+    assert validate_asset(tmp_path / "asset") == []
+    frame = read_asset(tmp_path / "asset").frame(1)
+    assert frame.shape == (2, resolution, resolution, 4)
+    assert np.abs(frame.astype(float) - cap_textures(2, 1, resolution)).mean() < 8
+
+
+def test_static_scene(tmp_path: Path) -> None:
+    manifest = make_asset(tmp_path / "asset", frames=1, source=replace(SOURCE, fps=0.0))
+    assert (manifest.texture.frames, manifest.texture.fps) == (1, 1.0)
+    assert validate_asset(tmp_path / "asset") == []
+    asset = read_asset(tmp_path / "asset")
+    assert len(list(asset.frames())) == 1
+    assert asset.frame(0).shape == (3, 64, 64, 4)
+
+
+def test_quantised_asset_is_sound(tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset", params=CompressParams(mesh=MeshCodec(quantization_bits=11, compression_level=7)))
+    assert validate_asset(tmp_path / "asset") == []
+
+
+def test_failure_leaves_the_old_asset(folder: Path, tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset")
+    before = {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()}
+    write_frames(tmp_path / "part.arrow", (64, 64, 4), [(0, 0, cap_textures(1, 0, 64)[0])])
+    store = write_store(tmp_path / "one.arrow", cap_textures(1, 0, 64)[None])
+    with pytest.raises(UserError, match="not complete"):
+        write_asset(tmp_path / "asset", [cap_mesh(0.4), cap_mesh(0.3)], [WINDOW] * 2, store, SOURCE, CompressParams())
+    assert {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()} == before
+
+
+def test_bad_meshes_are_refused(tmp_path: Path) -> None:
+    store = write_store(tmp_path / "textures.arrow", cap_textures(1, 0, 64)[None])
+    good = cap_mesh(0.4)
+    nan = good.vertices.copy()
+    nan[3, 1] = np.nan
+    bad = {
+        "not finite": LayerMesh(nan, good.faces, good.st),
+        "outside": LayerMesh(good.vertices, good.faces, good.st + np.float32(0.1)),
+        "not there": LayerMesh(good.vertices, good.faces + 1, good.st),
+        "no faces": LayerMesh(good.vertices, good.faces[:0], good.st),
+    }
+    for word, mesh in bad.items():
+        with pytest.raises(UserError, match=word):
+            write_asset(tmp_path / "asset", [mesh], [WINDOW], store, SOURCE, CompressParams())
+    assert not (tmp_path / "asset").exists()

@@ -1,0 +1,73 @@
+"""The conversion between RGB and the video's planes, before any codec."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from facefolds_core.asset.colour import alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
+
+
+def uniform(rgb: tuple[int, int, int]) -> np.ndarray:
+    return np.full((4, 4, 3), rgb, np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("rgb", "yuv"),
+    [
+        # ITU-R BT.709-6, item 3.5: black, white and the three primaries in 8 bits.
+        ((0, 0, 0), (16, 128, 128)),
+        ((255, 255, 255), (235, 128, 128)),
+        ((255, 0, 0), (63, 102, 240)),
+        ((0, 255, 0), (173, 42, 26)),
+        ((0, 0, 255), (32, 240, 118)),
+    ],
+)
+def test_known_codes(rgb: tuple[int, int, int], yuv: tuple[int, int, int]) -> None:
+    assert tuple(int(plane[1, 1]) for plane in rgb_to_yuv420(uniform(rgb))) == yuv
+
+
+def test_uniform_colours_come_back() -> None:
+    colours = np.random.default_rng(0).integers(0, 256, (300, 3))
+    worst = 0
+    for rgb in colours:
+        image = uniform(tuple(rgb))
+        worst = max(worst, int(np.abs(yuv420_to_rgb(*rgb_to_yuv420(image)).astype(int) - image).max()))
+    assert worst <= 3  # half a code of chroma times 1.8556 * 255 / 224, and half a code of luma; 2 seen
+
+
+def test_chroma_lies_on_even_columns_between_rows() -> None:
+    # A hue ramp across and down: linear chroma, constant luma, must come back from its own siting (inner pixels).
+    columns, rows = np.meshgrid(np.arange(64), np.arange(64))
+    cr = (columns + 2 * rows) / 64 * 0.1
+    rgb = np.stack([0.5 + 1.5748 * cr, 0.5 - 0.2126 * 1.5748 / 0.7152 * cr, np.full(cr.shape, 0.5)], -1)
+    image = np.rint(255 * rgb).astype(np.uint8)
+    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float)[2:-2, 2:-2] - 255 * rgb[2:-2, 2:-2]
+    assert abs(error[..., 0].mean()) < 0.1  # centred siting would shift red by 0.31
+
+
+def test_fine_texture_keeps_48_db() -> None:
+    y, x = np.mgrid[:256, :256] / 256
+    waves = [0.5 + 0.4 * np.sin(20 * x + 9 * y), 0.45 + 0.3 * np.cos(33 * y + 30 * x), 0.4 + 0.3 * np.sin(25 * (x - y))]
+    image = np.rint(255 * np.stack(waves, -1)).astype(np.uint8)
+    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float) - image
+    assert 10 * np.log10(255**2 / (error**2).mean()) > 48  # 48.7 seen
+
+
+def test_alpha_is_at_most_one_off_and_exact_at_the_ends() -> None:
+    alpha = np.arange(256, dtype=np.uint8)[None]
+    back = luma_to_alpha(alpha_to_luma(alpha))
+    assert np.abs(back.astype(int) - alpha).max() <= 1
+    assert back[0, 0] == 0 and back[0, 255] == 255
+
+
+def test_luma_beyond_its_range_is_clipped() -> None:
+    np.testing.assert_array_equal(luma_to_alpha(np.array([[0, 15, 236, 255]], np.uint8)), [[0, 0, 255, 255]])
+
+
+def test_alpha_is_the_red_that_a_browser_sees() -> None:
+    # Every luma code with neutral chroma, converted as a picture: R is alpha.
+    luma = np.repeat(np.arange(256, dtype=np.uint8), 2)[None].repeat(2, 0)
+    neutral = np.full((1, 256), 128, np.uint8)
+    red = yuv420_to_rgb(luma, neutral, neutral)[..., 0].astype(int)
+    assert np.abs(red - luma_to_alpha(luma)).max() <= 1

@@ -1,0 +1,111 @@
+"""The manifest and its JSON schema say the same."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from facefolds_core import __version__
+from facefolds_core.asset.manifest import SCHEMA_PATH, manifest_schema, parse_manifest, seal_is_whole
+from facefolds_core.errors import UserError
+from tests.assets import make_asset
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("manifest") / "asset"
+    make_asset(folder, frames=1)
+    return folder / "manifest.json"
+
+
+def test_schema_file_is_in_step() -> None:
+    # If this fails: call facefolds_core.asset.manifest.write_schema()
+    assert json.loads(SCHEMA_PATH.read_text()) == manifest_schema()
+
+
+def test_schema_is_valid_and_accepts_a_manifest(path: Path) -> None:
+    schema = json.loads(SCHEMA_PATH.read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.Draft202012Validator(schema).validate(json.loads(path.read_text()))
+
+
+def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Manifests that break one rule each."""
+    edits: dict[str, tuple[list[Any], Any]] = {
+        "format": (["format"], "gltf"),
+        "version": (["version"], 2),
+        "no layers": (["layers"], []),
+        "negative rect": (["layers", 0, "texture_rect", 0], -2),
+        "short rect": (["layers", 0, "texture_rect"], [0, 0, 64]),
+        "window": (["layers", 0, "uv_window", 1], 1.5),
+        "path": (["layers", 0, "mesh"], "../layer_00.drc"),
+        "hash": (["texture", "sha256"], "0" * 63),
+        "count as text": (["texture", "frames"], "5"),
+        "codec": (["texture", "codec"], "vp9"),
+        "fps": (["texture", "fps"], 0),
+        "culling": (["compositing", "culling"], "back"),
+        "rotation": (["coordinates", "to_capture", "rotation"], [[1, 0], [0, 1]]),
+        "scale": (["coordinates", "to_capture", "scale"], 0),
+        "unknown key": (["texture", "colour"], 1),
+    }
+    made = {}
+    for name, (place, new) in edits.items():
+        copied = copy.deepcopy(value)
+        inner: Any = copied
+        for key in place[:-1]:
+            inner = inner[key]
+        inner[place[-1]] = new
+        made[name] = copied
+    for place in (("subject",), ("compositing", "order"), ("texture", "codec"), ("coordinates", "to_capture")):
+        copied = copy.deepcopy(value)
+        inner = copied
+        for key in place[:-1]:
+            inner = inner[key]
+        del inner[place[-1]]
+        made[f"no {place[-1]}"] = copied
+    return made
+
+
+def test_schema_and_models_refuse_the_same(path: Path, tmp_path: Path) -> None:
+    validator = jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text()))
+    for name, value in broken(json.loads(path.read_text())).items():
+        assert not validator.is_valid(value), name
+        (tmp_path / "manifest.json").write_text(json.dumps(value))
+        with pytest.raises(UserError):
+            parse_manifest(tmp_path / "manifest.json")
+
+
+def test_checksum_of_the_manifest(path: Path) -> None:
+    raw = path.read_bytes()
+    assert seal_is_whole(raw)
+    assert not seal_is_whole(raw.replace(b"caps", b"cats"))
+    assert not seal_is_whole(raw.replace(b"manifest_sha256", b"manifest_sha255"))
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [("{", "garbled"), ("[]", "not the manifest"), ("{}", "not the manifest"), ("null", "not the manifest")],
+)
+def test_not_a_manifest(tmp_path: Path, text: str, word: str) -> None:
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(UserError, match=word):
+        parse_manifest(tmp_path / "manifest.json")
+
+
+def test_another_version_is_said_in_plain_words(path: Path, tmp_path: Path) -> None:
+    value = json.loads(path.read_text()) | {"version": 7, "something": "new"}
+    (tmp_path / "manifest.json").write_text(json.dumps(value))
+    with pytest.raises(UserError, match="another format version") as caught:
+        parse_manifest(tmp_path / "manifest.json")
+    assert (caught.value.expected, caught.value.found) == (1, 7)
+
+
+def test_generator_is_the_projects_version() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert project["version"] == __version__

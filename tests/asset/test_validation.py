@@ -1,0 +1,204 @@
+"""The validator finds each kind of damage, and says so on the command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import DracoPy
+import numpy as np
+import pytest
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.manifest import Manifest, write_manifest
+from facefolds_core.asset.validation import validate_asset
+from facefolds_core.asset.writer import file_sha256
+from facefolds_core.errors import UserError
+from tests.assets import cap_mesh, make_asset
+
+FILES = ["manifest.json", "layer_00.drc", "layer_01.drc", "texture.mp4"]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sound") / "asset"
+    make_asset(folder, layers=2, frames=3)
+    return folder
+
+
+@pytest.fixture
+def asset(sound: Path, tmp_path: Path) -> Path:
+    """A copy to damage."""
+    return Path(shutil.copytree(sound, tmp_path / "asset"))
+
+
+def assert_found(folder: Path, file: str, word: str = "") -> None:
+    """The validator names the file (and says the word), and the reader refuses it."""
+    problems = validate_asset(folder)
+    assert any(problem.startswith(f"{file}:") and word in problem for problem in problems), problems
+    with pytest.raises(UserError):
+        list(read_asset(folder).frames())
+
+
+def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change the manifest's content; its own checksum is made anew."""
+    value = json.loads((folder / "manifest.json").read_text())
+    change(value)
+    write_manifest(Manifest.model_validate_json(json.dumps(value)), folder / "manifest.json")
+
+
+def replace_mesh(folder: Path, data: bytes, vertices: int, triangles: int) -> None:
+    path = folder / "layer_01.drc"
+    path.write_bytes(data)
+    entry = {"bytes": len(data), "sha256": file_sha256(path), "vertices": vertices, "triangles": triangles}
+    edit(folder, lambda value: value["layers"][1].update(entry))
+
+
+def draco(vertices: np.ndarray, faces: np.ndarray, st: np.ndarray | None) -> bytes:
+    """As the writer encodes, but without its checks."""
+    coordinates = None if st is None else st.astype(np.float64)
+    return bytes(
+        DracoPy.encode(
+            vertices,
+            faces=faces.astype(np.uint32),
+            quantization_bits=0,
+            compression_level=0,
+            tex_coord=coordinates,
+            preserve_order=True,
+        )
+    )
+
+
+def test_sound(asset: Path) -> None:
+    assert validate_asset(asset) == []
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_missing_file(asset: Path, file: str) -> None:
+    (asset / file).unlink()
+    assert_found(asset, file)
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("keep", [0.0, 0.1, 0.5, 0.999])
+def test_truncated_file(asset: Path, file: str, keep: float) -> None:
+    data = (asset / file).read_bytes()
+    (asset / file).write_bytes(data[: int(keep * len(data))])
+    assert_found(asset, file)
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_flipped_bits(asset: Path, file: str) -> None:
+    data = (asset / file).read_bytes()
+    rng = np.random.default_rng(0)
+    places = [0, len(data) // 2, len(data) - 2, *rng.integers(0, len(data), 12)]
+    for place in places:
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        (asset / file).write_bytes(flipped)
+        assert validate_asset(asset), place
+        with pytest.raises(UserError):
+            read_asset(asset)
+
+
+@pytest.mark.parametrize("key", ["vertices", "triangles"])
+def test_wrong_mesh_counts(asset: Path, key: str) -> None:
+    edit(asset, lambda value: value["layers"][1].update({key: value["layers"][1][key] + 1}))
+    assert_found(asset, "layer_01.drc", key)
+
+
+@pytest.mark.parametrize("frames", [2, 4])
+def test_wrong_number_of_frames(asset: Path, frames: int) -> None:
+    edit(asset, lambda value: value["texture"].update(frames=frames))
+    assert_found(asset, "texture.mp4", "3 frames")
+
+
+def test_wrong_rate(asset: Path) -> None:
+    edit(asset, lambda value: value["texture"].update(fps=25.0))
+    assert any("frames a second" in problem for problem in validate_asset(asset))
+
+
+def test_wrong_video_size(asset: Path) -> None:
+    edit(asset, lambda value: value["texture"].update(width=value["texture"]["width"] + 16))
+    assert_found(asset, "texture.mp4", "width and height")
+
+
+def test_rect_outside(asset: Path) -> None:
+    edit(asset, lambda value: value["layers"][1].update(texture_rect=[130, 2, 64, 64]))
+    assert_found(asset, "manifest.json", "not inside")
+
+
+def test_rects_overlap(asset: Path) -> None:
+    edit(asset, lambda value: value["layers"][1].update(texture_rect=value["layers"][0]["texture_rect"]))
+    assert_found(asset, "manifest.json", "overlap")
+
+
+def test_empty_window(asset: Path) -> None:
+    edit(asset, lambda value: value["layers"][0].update(uv_window=[0.5, 0.5, -1.0, 1.0]))
+    assert_found(asset, "manifest.json", "uv_window")
+
+
+def test_rotation_that_is_none(asset: Path) -> None:
+    edit(asset, lambda value: value["coordinates"]["to_capture"].update(rotation=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]))
+    assert_found(asset, "manifest.json", "rotation")
+
+
+def test_texture_coordinates_outside(asset: Path) -> None:
+    mesh = cap_mesh(0.3, 4)
+    replace_mesh(asset, draco(mesh.vertices, mesh.faces, mesh.st * 1.5), 16, 18)
+    assert_found(asset, "layer_01.drc", "outside [0, 1]")
+
+
+def test_no_texture_coordinates(asset: Path) -> None:
+    mesh = cap_mesh(0.3, 4)
+    replace_mesh(asset, draco(mesh.vertices, mesh.faces, None), 16, 18)
+    assert_found(asset, "layer_01.drc", "no texture coordinates")
+
+
+def test_vertices_not_finite(asset: Path) -> None:
+    mesh = cap_mesh(0.3, 4)
+    vertices = mesh.vertices.copy()
+    vertices[5, 2] = np.nan
+    replace_mesh(asset, draco(vertices, mesh.faces, mesh.st), 16, 18)
+    assert_found(asset, "layer_01.drc", "not finite")
+
+
+def test_degenerate_face(asset: Path) -> None:
+    mesh = cap_mesh(0.3, 4)
+    vertices = mesh.vertices.copy()
+    vertices[1] = vertices[0]
+    replace_mesh(asset, draco(vertices, mesh.faces, mesh.st), 16, 18)
+    assert any("without area" in problem for problem in validate_asset(asset))
+
+
+def test_not_a_mesh(asset: Path) -> None:
+    replace_mesh(asset, b"something else" * 9, 16, 18)
+    assert_found(asset, "layer_01.drc", "not a Draco mesh")
+
+
+def test_file_that_the_manifest_does_not_name(asset: Path) -> None:
+    (asset / "layer_02.drc").write_bytes(b"")
+    assert validate_asset(asset) == ["layer_02.drc: not named in the manifest"]
+
+
+def run_command(folder: Path) -> subprocess.CompletedProcess[str]:
+    root = Path(__file__).parents[2]
+    return subprocess.run(
+        [sys.executable, "-m", "stages.validate", str(folder)], cwd=root, capture_output=True, text=True, check=False
+    )
+
+
+def test_command_on_a_sound_asset(asset: Path) -> None:
+    done = run_command(asset)
+    assert done.returncode == 0 and len(done.stdout.splitlines()) == 1 and "sound" in done.stdout
+
+
+def test_command_on_a_damaged_asset(asset: Path) -> None:
+    (asset / "manifest.json").write_text("not JSON")
+    done = run_command(asset)
+    assert done.returncode == 1 and "garbled JSON" in done.stderr and "Traceback" not in done.stderr

@@ -1,0 +1,136 @@
+"""The texture video: frame k is frame k, and the picture survives within the codec's error."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from facefolds_core.asset.packing import AtlasLayout
+from facefolds_core.asset.video import (
+    KEYFRAME_INTERVAL,
+    decode_video,
+    encode_video,
+    pack_frame,
+    probe_video,
+    unpack_picture,
+)
+from facefolds_core.errors import UserError
+from facefolds_core.params import VideoCodec
+from tests.assets import cap_textures
+
+FRAMES = 2 * KEYFRAME_INTERVAL + 7
+LAYOUT = AtlasLayout.grid(2, 28)
+SIZE = (LAYOUT.width, LAYOUT.height)
+
+
+def numbered(frame: int) -> np.ndarray:
+    """(2, 28, 28, 4): six patches, black or white, spell the frame's number in binary; alpha is its complement."""
+    bits = np.array([frame >> bit & 1 for bit in range(6)]).reshape(2, 3) * 255
+    image = np.zeros((28, 28), np.uint8)
+    image[:24, :24] = np.kron(bits, np.ones((12, 8)))
+    texture = np.stack([image, image, image, 255 - image], -1).astype(np.uint8)
+    return np.stack([texture, texture])
+
+
+def number_of(textures: np.ndarray, channel: int) -> int:
+    patches = textures[0, [6, 6, 6, 18, 18, 18], [4, 12, 20, 4, 12, 20], channel]
+    bits = patches > 127 if channel < 3 else patches <= 127
+    return sum(int(bit) << place for place, bit in enumerate(bits))
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("video") / "texture.mp4"
+    pictures = (pack_frame(numbered(frame), LAYOUT) for frame in range(FRAMES))
+    assert encode_video(path, pictures, SIZE, Fraction(30), VideoCodec()) == FRAMES
+    return path
+
+
+@pytest.mark.parametrize("channel", [0, 3])
+def test_frames_come_in_order(video: Path, channel: int) -> None:
+    numbers = [number_of(unpack_picture(p, LAYOUT), channel) for p in decode_video(video, SIZE, 30.0)]
+    assert numbers == list(range(FRAMES))
+
+
+def test_random_access_gives_the_same_pictures(video: Path) -> None:
+    pictures = list(decode_video(video, SIZE, 30.0))
+    for frame in np.random.default_rng(0).permutation(FRAMES):
+        found = next(decode_video(video, SIZE, 30.0, start=int(frame)))
+        assert np.array_equal(found, pictures[frame]), frame
+
+
+@pytest.mark.parametrize(
+    "fps", [Fraction(1), Fraction(25), Fraction(30000, 1001), Fraction(24000, 1001), Fraction(120)]
+)
+def test_any_rate_keeps_frame_numbers(tmp_path: Path, fps: Fraction) -> None:
+    path = tmp_path / "texture.mp4"
+    encode_video(path, (pack_frame(numbered(k), LAYOUT) for k in range(20)), SIZE, fps, VideoCodec(preset="ultrafast"))
+    assert probe_video(path).rate == fps
+    for start in (0, 14, 15, 16, 19):
+        first = next(decode_video(path, SIZE, float(fps), start))
+        assert number_of(unpack_picture(first, LAYOUT), 0) == start
+
+
+def test_stream_is_tagged(video: Path) -> None:
+    facts = probe_video(video)
+    assert (facts.codec, facts.pixel_format, facts.width, facts.height) == ("h264", "yuv420p", *SIZE)
+    assert facts.tags == (1, 1)
+    with av.open(str(video)) as container:
+        context = container.streams.video[0].codec_context
+        assert (int(context.color_primaries), int(context.color_trc)) == (1, 13)
+
+
+def test_key_frames_and_no_reordering(video: Path) -> None:
+    with av.open(str(video)) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+    assert [k for k, packet in enumerate(packets) if packet.is_keyframe] == list(range(0, FRAMES, KEYFRAME_INTERVAL))
+    assert all(packet.pts == packet.dts for packet in packets)
+
+
+def test_header_comes_first(video: Path) -> None:
+    data = video.read_bytes()
+    assert data.index(b"moov") < data.index(b"mdat")
+
+
+def test_quality_at_the_default_setting(tmp_path: Path) -> None:
+    layout = AtlasLayout.grid(3, 124)
+    frames = np.stack([cap_textures(3, k, 124) for k in range(4)])
+    path, size = tmp_path / "texture.mp4", (layout.width, layout.height)
+    encode_video(path, (pack_frame(frame, layout) for frame in frames), size, Fraction(30), VideoCodec())
+    back = np.stack([unpack_picture(picture, layout) for picture in decode_video(path, size, 30.0)])
+    error = (back.astype(float) - frames) ** 2
+    colour, alpha = 10 * np.log10(255**2 / error[..., :3].mean()), 10 * np.log10(255**2 / error[..., 3].mean())
+    assert colour > 40 and alpha > 43, (colour, alpha)
+
+
+def test_flat_alpha_extremes_survive(tmp_path: Path) -> None:
+    textures = np.full((2, 28, 28, 4), 100, np.uint8)
+    textures[0, ..., 3], textures[1, ..., 3] = 0, 255
+    path = tmp_path / "texture.mp4"
+    encode_video(path, [pack_frame(textures, LAYOUT)] * 3, SIZE, Fraction(30), VideoCodec())
+    for picture in decode_video(path, SIZE, 30.0):
+        alpha = unpack_picture(picture, LAYOUT)[..., 3]
+        assert alpha[0].max() <= 1 and alpha[1].min() >= 254
+
+
+def test_same_input_same_bytes(video: Path, tmp_path: Path) -> None:
+    path = tmp_path / "again.mp4"
+    encode_video(path, (pack_frame(numbered(k), LAYOUT) for k in range(FRAMES)), SIZE, Fraction(30), VideoCodec())
+    assert path.read_bytes() == video.read_bytes()
+
+
+def test_another_size_is_refused(video: Path) -> None:
+    with pytest.raises(UserError, match="damaged texture video"):
+        next(decode_video(video, (SIZE[0] + 16, SIZE[1]), 30.0))
+
+
+@pytest.mark.parametrize("content", [b"", b"not a video" * 100])
+def test_not_a_video(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "texture.mp4"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="damaged texture video"):
+        probe_video(path)
