@@ -151,10 +151,13 @@ class SampleParams(Section):
     """`sample`.
 
     Attributes:
-        resolution: R; each layer is sampled at R x R directions over the hemisphere.
+        resolution: R; each layer is sampled at R x R directions over the window.
+        window: "full" is the whole hemisphere (the paper); "auto" is the part of it outside which no training ray that
+            was looked at changes by more than 1/255 (export/window.py).
     """
 
     resolution: Annotated[int, Field(ge=8, le=4096)] = 512
+    window: Literal["full", "auto"] = "auto"
 
 
 class ReconstructParams(Section):
@@ -163,9 +166,9 @@ class ReconstructParams(Section):
     Attributes:
         method: "poisson".
         resolution: samples a side that Poisson sees (the R x R grid is thinned to it); null takes all.
-        depth: of the octree.
+        depth: of the octree: 2^depth cells along the longest side of the layer's bounding box and a tenth.
         point_weight: of the samples (screening).
-        trim: vertices farther than this many sample spacings from the samples are removed.
+        trim: vertices farther than this many local sample spacings from the samples are removed.
     """
 
     method: Literal["poisson"] = "poisson"
@@ -180,9 +183,12 @@ class DecimateParams(Section):
 
     Attributes:
         resolution: R^m; each layer keeps at most R^m x R^m vertices.
+        uv: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper), "exact" those of its own
+            direction from the sphere centre.
     """
 
-    resolution: Annotated[int, Field(ge=4, le=2048)] = 64
+    resolution: Annotated[int, Field(ge=8, le=2048)] = 64
+    uv: Literal["nearest", "exact"] = "exact"
 
 
 class TextureParams(Section):

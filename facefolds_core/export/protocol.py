@@ -1,0 +1,57 @@
+"""What export asks of a model. `facefolds_core.model.RadianceManifolds` is one; tests use closed-form layers."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from torch import Tensor
+
+
+class CrossingsLike(Protocol):
+    """First crossings of R rays with N layers, outermost first."""
+
+    @property
+    def points(self) -> Tensor:
+        """[R, N, 3]."""
+        ...
+
+    @property
+    def hit(self) -> Tensor:
+        """[R, N] bool."""
+        ...
+
+
+class RenderedLike(Protocol):
+    """R composited rays."""
+
+    @property
+    def weights(self) -> Tensor:
+        """[R, N] compositing weights, outermost first."""
+        ...
+
+
+class LayeredModel(Protocol):
+    """N nested surfaces with textures in time, outermost first. See `RadianceManifolds` for each method."""
+
+    @property
+    def num_layers(self) -> int: ...
+
+    @property
+    def num_frames(self) -> int: ...
+
+    @property
+    def centre(self) -> Tensor:
+        """[3], c."""
+        ...
+
+    def crossings(self, origins: Tensor, directions: Tensor) -> CrossingsLike: ...
+
+    def render(self, origins: Tensor, directions: Tensor, time: float, view_effects: bool) -> RenderedLike: ...
+
+    def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        """[M, 2] -> points [N, M, 3], valid [N, M]."""
+        ...
+
+    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
+        """[M, 2] -> rgb [M, 3], alpha [M], in [0, 1]."""
+        ...

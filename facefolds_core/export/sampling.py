@@ -1,0 +1,169 @@
+"""Sample a model: grids of surface points with normals, and texture frames (paper, "Exporting Layered Meshes").
+
+Only the model's own interface is used (`protocol.LayeredModel`), so that any model can be exported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from tqdm import tqdm
+
+from facefolds_core.captures.frames import write_frames
+from facefolds_core.errors import UserError
+from facefolds_core.export.protocol import LayeredModel
+from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.sphere_uv import Window, texel_uv
+
+DIRECTIONS_AT_ONCE = 16384
+"""Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
+
+Array = NDArray[np.float64]
+
+
+def sample_grids(model: LayeredModel, resolution: int, window: Window, progress: bool = True) -> Grids:
+    """N grids of R x R points at the texel centres of `window`, with normals.
+
+    Args:
+        model: asked for its `surface_points`.
+        resolution: R.
+        window: (u0, u1, v0, v1), the same for all layers.
+        progress: show a progress bar.
+
+    Raises:
+        UserError: if the model gives a point that is not finite, or a layer has no point at all.
+    """
+    centre = model.centre.detach()
+    uv = torch.as_tensor(texel_uv(resolution, resolution, window).reshape(-1, 2)).to(centre)
+    points = np.zeros((model.num_layers, resolution, resolution, 3), np.float32)
+    valid = np.zeros((model.num_layers, resolution, resolution), bool)
+    flat_points, flat_valid = points.reshape(model.num_layers, -1, 3), valid.reshape(model.num_layers, -1)
+    with torch.no_grad(), tqdm(total=len(uv), desc="points", unit="direction", disable=not progress) as bar:
+        for start in range(0, len(uv), DIRECTIONS_AT_ONCE):
+            stop = start + DIRECTIONS_AT_ONCE
+            found, hit = model.surface_points(uv[start:stop])
+            flat_points[:, start:stop] = np.where(hit.cpu().numpy()[..., None], found.cpu().numpy(), 0.0)
+            flat_valid[:, start:stop] = hit.cpu().numpy()
+            bar.update(len(uv[start:stop]))
+    _check_points(points, valid)
+    c = centre.cpu().numpy().astype(np.float64)
+    normals = np.stack([grid_normals(p, v, c, window) for p, v in zip(points, valid, strict=True)])
+    windows = np.tile(np.array(window, np.float64), (model.num_layers, 1))
+    return Grids(points, normals.astype(np.float32), valid, windows)
+
+
+def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None:
+    for layer, (p, v) in enumerate(zip(points, valid, strict=True)):
+        if not np.isfinite(p).all():
+            raise UserError(
+                "the model's surface has points that are not finite",
+                place=f"layer {layer}",
+                expected="finite coordinates",
+                found=f"{int((~np.isfinite(p)).any(-1).sum())} points with NaN or infinity",
+                remedy="train again, with lower learning rates or another seed",
+            )
+        if not v.any():
+            raise UserError(
+                "a layer has no surface in any sampled direction",
+                place=f"layer {layer} (0 is the outermost)",
+                expected="a surface in front of the sphere centre",
+                found="no crossing",
+                remedy="train longer, with fewer layers (train.layers) or a smaller train.level_halfwidth",
+            )
+
+
+def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], centre: Array, window: Window) -> Array:
+    """Unit outward normals from neighbouring samples.
+
+    The normal is the cross product of two chords, from the previous to the next sample down the column and along the
+    row; where one of the two does not exist (border, invalid neighbour) the sample itself stands for it. Near the poles
+    a row's samples crowd together, so its chords span more columns, about as long as a column's. A sample without
+    usable neighbours gets the direction from `centre`.
+
+    Args:
+        points: (R, R, 3).
+        valid: (R, R).
+        centre: (3,), c; outward means away from it.
+        window: (u0, u1, v0, v1).
+
+    Returns:
+        (R, R, 3) float64; also where `valid` is false (the direction from `centre`, or +x).
+    """
+    r = len(points)
+    p = points.astype(np.float64)
+    rows, columns = np.meshgrid(np.arange(r), np.arange(r), indexing="ij")
+    stride = np.minimum(row_strides(r, window), max(r // 8, 1))[:, None]
+
+    def neighbour(i: NDArray[np.intp], j: NDArray[np.intp]) -> Array:
+        i, j = i.clip(0, r - 1), j.clip(0, r - 1)
+        return np.where(valid[i, j][..., None], p[i, j], p)
+
+    down = neighbour(rows + 1, columns) - neighbour(rows - 1, columns)
+    right = neighbour(rows, columns + stride) - neighbour(rows, columns - stride)
+    normal = np.cross(down, right)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    outward = p - centre
+    outward[~valid] = (1.0, 0.0, 0.0)
+    outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-12)
+    # Parallel or missing chords: the product's length is rounding error next to the chords'.
+    scale = np.linalg.norm(down, axis=-1, keepdims=True) * np.linalg.norm(right, axis=-1, keepdims=True)
+    usable = valid[..., None] & (length > 1e-3 * scale) & (scale > 0)
+    normal = np.where(usable, normal / np.where(usable, length, 1), outward)
+    return np.where((normal * outward).sum(-1, keepdims=True) < 0, -normal, normal)
+
+
+def row_strides(resolution: int, window: Window) -> NDArray[np.intp]:
+    """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation)."""
+    u = texel_uv(resolution, resolution, window)[:, 0, 0]
+    return np.maximum(np.rint(1 / np.maximum(np.cos(u * np.pi / 2), 1e-9)), 1).clip(max=resolution).astype(np.intp)
+
+
+def texture_rows(
+    model: LayeredModel, grids: Grids, progress: bool = True
+) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+    """Texture images, one at a time: frame by frame, in each the layers from the outermost in.
+
+    Yields:
+        (layer, frame, (R, R, 4) uint8 RGBA, straight alpha). Alpha is 0 where the layer has no point.
+
+    Raises:
+        UserError: if the model gives a colour or an alpha that is not finite.
+    """
+    centre = model.centre.detach()
+    r = grids.resolution
+    lookups = []
+    for layer in range(grids.num_layers):
+        uv = texel_uv(r, r, grids.window(layer))[grids.valid[layer]]
+        lookups.append(torch.as_tensor(uv).to(centre))
+    with tqdm(total=model.num_frames * grids.num_layers, desc="textures", unit="image", disable=not progress) as bar:
+        for frame in range(model.num_frames):
+            for layer, uv in enumerate(lookups):
+                image = np.zeros((r, r, 4), np.uint8)
+                image[grids.valid[layer]] = _texels(model, uv, layer, frame)
+                yield layer, frame, image
+                bar.update()
+
+
+@torch.no_grad()
+def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[np.uint8]:
+    rgb, alpha = model.texture(uv, layer, float(frame))
+    rgba = torch.cat([rgb, alpha[:, None]], -1)
+    if not torch.isfinite(rgba).all():
+        raise UserError(
+            "the model's texture has values that are not finite",
+            place=f"layer {layer}, frame {frame}",
+            expected="colours and alpha in [0, 1]",
+            found="NaN or infinity",
+            remedy="train again, with lower learning rates or another seed",
+        )
+    return np.asarray((rgba.clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
+
+
+def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool = True) -> None:
+    """Write all texture images to a layered frame store (camera := layer), holding one in memory."""
+    write_frames(path, (grids.resolution, grids.resolution, 4), texture_rows(model, grids, progress))

@@ -1,0 +1,188 @@
+"""The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
+
+- `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, windows (N, 4) float64;
+- `surfaces/surfaces.npz`: vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer;
+- `meshes/meshes.npz`: the same and st_00 (V, 2) float32, layer-local texture coordinates.
+
+Layers are outermost first. Every array is checked when it is read: shape, type, finite numbers, indices in range.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_file
+
+_REMEDY = "delete it and run `dvc repro`, which makes it again"
+
+
+@dataclass(frozen=True)
+class Grids:
+    """N grids of R x R samples; the sample (row i, column j) lies in the direction `texel_uv(R, R, window)[i, j]`.
+
+    Attributes:
+        points: (N, R, R, 3) float32; where a sample is not valid, anything finite.
+        normals: (N, R, R, 3) float32, unit length, outward.
+        valid: (N, R, R) bool: the layer has a point in this direction.
+        windows: (N, 4) float64, (u0, u1, v0, v1) of each layer's grid.
+    """
+
+    points: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    windows: NDArray[np.float64]
+
+    @property
+    def num_layers(self) -> int:
+        return len(self.points)
+
+    @property
+    def resolution(self) -> int:
+        return int(self.points.shape[1])
+
+    def window(self, layer: int) -> tuple[float, float, float, float]:
+        u0, u1, v0, v1 = (float(x) for x in self.windows[layer])
+        return u0, u1, v0, v1
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangle mesh.
+
+    Attributes:
+        vertices: (V, 3) float32, normalised world.
+        faces: (F, 3) int32, counter-clockwise seen from outside.
+    """
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class TexturedMesh(Surface):
+    """A triangle mesh with texture coordinates.
+
+    Attributes:
+        st: (V, 2) float32 in [0, 1], layer-local: s right, t down from the texture's top left corner.
+    """
+
+    st: NDArray[np.float32]
+
+
+def write_grids(path: Path, grids: Grids) -> None:
+    _write(path, {"points": grids.points, "normals": grids.normals, "valid": grids.valid, "windows": grids.windows})
+
+
+def read_grids(path: Path) -> Grids:
+    """Raises UserError if the file is missing, damaged or not what `write_grids` writes."""
+    arrays = _read(path)
+    n, r = _shape(arrays, path, "points")[:2]
+    grids = Grids(
+        points=_take(arrays, path, "points", (n, r, r, 3), np.float32),
+        normals=_take(arrays, path, "normals", (n, r, r, 3), np.float32),
+        valid=_take(arrays, path, "valid", (n, r, r), np.bool_),
+        windows=_take(arrays, path, "windows", (n, 4), np.float64),
+    )
+    u0, u1, v0, v1 = grids.windows.T
+    if not ((u0 < u1).all() and (v0 < v1).all() and (np.abs(grids.windows) <= 1).all()):
+        expected = "(u0, u1, v0, v1) with -1 <= u0 < u1 <= 1 and likewise v"
+        raise _damaged(path, "windows", expected, grids.windows.tolist())
+    return grids
+
+
+def write_surfaces(path: Path, surfaces: Sequence[Surface]) -> None:
+    arrays: dict[str, NDArray[Any]] = {}
+    for i, surface in enumerate(surfaces):
+        arrays |= {f"vertices_{i:02d}": surface.vertices, f"faces_{i:02d}": surface.faces}
+    _write(path, arrays)
+
+
+def read_surfaces(path: Path) -> list[Surface]:
+    """Raises UserError if the file is missing, damaged or not what `write_surfaces` writes."""
+    arrays = _read(path)
+    return [_surface(arrays, path, i) for i in range(_count(arrays, path))]
+
+
+def write_meshes(path: Path, meshes: Sequence[TexturedMesh]) -> None:
+    arrays: dict[str, NDArray[Any]] = {}
+    for i, mesh in enumerate(meshes):
+        arrays |= {f"vertices_{i:02d}": mesh.vertices, f"faces_{i:02d}": mesh.faces, f"st_{i:02d}": mesh.st}
+    _write(path, arrays)
+
+
+def read_meshes(path: Path) -> list[TexturedMesh]:
+    """Raises UserError if the file is missing, damaged or not what `write_meshes` writes."""
+    arrays = _read(path)
+    meshes = []
+    for i in range(_count(arrays, path)):
+        surface = _surface(arrays, path, i)
+        st = _take(arrays, path, f"st_{i:02d}", (len(surface.vertices), 2), np.float32)
+        if st.min() < 0 or st.max() > 1:
+            raise _damaged(path, f"st_{i:02d}", "texture coordinates in [0, 1]", f"{st.min()} to {st.max()}")
+        meshes.append(TexturedMesh(surface.vertices, surface.faces, st))
+    return meshes
+
+
+def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    with atomic_file(path) as temporary:
+        np.savez(temporary, **arrays)  # type: ignore[arg-type]  # numpy's stub takes the ** for its own keyword
+
+
+def _read(path: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy="run `dvc repro`, which makes it") from None
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, AttributeError) as error:
+        # AttributeError: np.load of a lone array has no `files`.
+        raise UserError("a damaged geometry file", file=path, found=str(error), remedy=_REMEDY) from None
+
+
+def _damaged(path: Path, name: str, expected: object, found: object) -> UserError:
+    return UserError("a damaged geometry file", file=path, place=name, expected=expected, found=found, remedy=_REMEDY)
+
+
+def _shape(arrays: dict[str, NDArray[Any]], path: Path, name: str) -> tuple[int, ...]:
+    if name not in arrays:
+        raise _damaged(path, name, "an array of this name", ", ".join(sorted(arrays)) or "nothing")
+    if arrays[name].ndim < 2 or 0 in arrays[name].shape:
+        raise _damaged(path, name, "an array that is not empty", arrays[name].shape)
+    return arrays[name].shape
+
+
+def _take(
+    arrays: dict[str, NDArray[Any]], path: Path, name: str, shape: tuple[int, ...], kind: type[np.generic]
+) -> NDArray[Any]:
+    _shape(arrays, path, name)
+    array = arrays[name]
+    if array.shape != shape or array.dtype != kind:
+        raise _damaged(path, name, f"{kind.__name__} {shape}", f"{array.dtype} {array.shape}")
+    if not np.isfinite(array).all():
+        raise _damaged(path, name, "finite numbers", "NaN or infinity")
+    return array
+
+
+def _count(arrays: dict[str, NDArray[Any]], path: Path) -> int:
+    count = sum(name.startswith("vertices_") for name in arrays)
+    if count == 0:
+        raise _damaged(path, "vertices_00", "an array of this name", ", ".join(sorted(arrays)) or "nothing")
+    return count
+
+
+def _surface(arrays: dict[str, NDArray[Any]], path: Path, layer: int) -> Surface:
+    vertices_name, faces_name = f"vertices_{layer:02d}", f"faces_{layer:02d}"
+    vertices = _take(arrays, path, vertices_name, (_shape(arrays, path, vertices_name)[0], 3), np.float32)
+    faces = _take(arrays, path, faces_name, (_shape(arrays, path, faces_name)[0], 3), np.int32)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise _damaged(path, faces_name, f"indices below {len(vertices)}", f"{faces.min()} to {faces.max()}")
+    return Surface(vertices, faces)

@@ -1,0 +1,106 @@
+"""Texture frames from the sampled R x R to the shipped R^t x R^t.
+
+Filtering happens in premultiplied alpha, so that what a transparent texel happens to hold never bleeds into its
+neighbours; then colours are divided by alpha again. Texels with alpha 0 get the colour of their surroundings, because a
+player interpolates colour and alpha apart, and because the video codec spends no bits on smooth colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from facefolds_core.captures.frames import FrameStore, write_frames
+from facefolds_core.errors import UserError
+
+Float = NDArray[np.float32]
+Image = NDArray[np.uint8]
+
+
+def resample(image: Image, size: int) -> Image:
+    """One texture to `size` x `size` texels: area means when shrinking, bilinear when enlarging.
+
+    Args:
+        image: (R, R, 4) uint8 RGBA, straight alpha.
+
+    Returns:
+        (size, size, 4) uint8 RGBA, straight alpha, no alpha-0 texel without a colour (unless all are).
+    """
+    premultiplied: Float = np.asarray(image / np.float32(255), np.float32)
+    premultiplied[..., :3] *= premultiplied[..., 3:]
+    if size != len(image):
+        method = cv2.INTER_AREA if size < len(image) else cv2.INTER_LINEAR
+        premultiplied = np.asarray(cv2.resize(premultiplied, (size, size), interpolation=method), np.float32)
+    alpha = np.rint(premultiplied[..., 3] * 255).clip(0, 255).astype(np.uint8)
+    colour = fill_colour(premultiplied, alpha > 0)
+    result = np.concatenate([np.rint(colour * 255).clip(0, 255).astype(np.uint8), alpha[..., None]], -1)
+    if size == len(image):  # exactly what was there, where it shows
+        result[alpha > 0] = image[alpha > 0]
+    return result
+
+
+def fill_colour(premultiplied: Float, shown: NDArray[np.bool_]) -> Float:
+    """Straight colours; where `shown` is false, those of the surroundings, by pull and push over a pyramid.
+
+    Args:
+        premultiplied: (S, S, 4) float32 in [0, 1].
+        shown: (S, S); alpha is above 0 there.
+
+    Returns:
+        (S, S, 3) float32; 0 if nothing is shown.
+    """
+    level = premultiplied * shown[..., None]
+    levels = [level]
+    while len(levels[-1]) > 1 and not (levels[-1][..., 3] > 0).all():
+        half = (len(levels[-1]) + 1) // 2
+        levels.append(np.asarray(cv2.resize(levels[-1], (half, half), interpolation=cv2.INTER_AREA), np.float32))
+    colour = np.zeros((*levels[-1].shape[:2], 3), np.float32)
+    for level in reversed(levels):
+        size = len(level)
+        coarse = cv2.resize(colour, (size, size), interpolation=cv2.INTER_LINEAR)
+        alpha = level[..., 3:]
+        colour = np.where(alpha > 0, level[..., :3] / np.where(alpha > 0, alpha, 1), coarse)
+    return np.asarray(colour, np.float32)
+
+
+def texture_rows(store: FrameStore, size: int, progress: bool = True) -> Iterator[tuple[int, int, Image]]:
+    """All textures of a layered store, resampled one at a time: frame by frame, layers from the outermost in.
+
+    Yields:
+        (layer, frame, (size, size, 4) uint8).
+    """
+    keys = sorted(store.keys(), key=lambda key: (key[1], key[0]))
+    for layer, frame in tqdm(keys, desc="textures", unit="image", disable=not progress):
+        yield layer, frame, resample(store.image(layer, frame), size)
+
+
+def resample_store(source: Path, target: Path, size: int, progress: bool = True) -> FrameStore:
+    """Resample a layered frame store (camera := layer) to `size` x `size`; returns the source.
+
+    Raises:
+        UserError: if the source is missing, damaged, or not a complete set of square RGBA images.
+    """
+    store = FrameStore(source)
+    _check_complete(store)
+    write_frames(target, (size, size, 4), texture_rows(store, size, progress))
+    return store
+
+
+def _check_complete(store: FrameStore) -> None:
+    keys = store.keys()
+    layers, frames = {layer for layer, _ in keys}, {frame for _, frame in keys}
+    complete = len(keys) == len(layers) * len(frames) and layers == set(range(len(layers)))
+    if keys and complete and frames == set(range(len(frames))) and store.height == store.width and store.channels == 4:
+        return
+    raise UserError(
+        "texture samples are incomplete",
+        file=store.path,
+        expected="square RGBA images, one for each layer and frame",
+        found=f"{len(keys)} images of {store.height} x {store.width} x {store.channels} for {len(layers)} layers",
+        remedy="delete the file and run `dvc repro`, which samples the model again",
+    )
