@@ -14,7 +14,7 @@ from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import Lens
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import FrameRange
+from facefolds_core.params import FrameRange, Subject
 
 Array = NDArray[np.float64]
 
@@ -118,6 +118,14 @@ def select_frames(
             remedy="correct `frames` of this subject in params.yaml",
         )
     return chosen
+
+
+def frame_rate(subject: Subject, default: float, count: int) -> float:
+    """Frames a second of the frames in use: a range that takes every n-th one divides the rate. 0 for a single frame."""
+    if count < 2:
+        return 0.0
+    step = subject.frames.step if isinstance(subject.frames, FrameRange) else 1
+    return (subject.fps or default) / step
 
 
 def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int], list[int], list[str]]:

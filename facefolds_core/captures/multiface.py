@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from facefolds_core.captures.capture import Capture, View, closest_rotation, select_frames, shorten
+from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, pinhole_K, read_krt
 from facefolds_core.captures.lens import make_lens
@@ -62,9 +62,8 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS, pixel_centres
         for c, f in images
         if (path := root / "masks" / segment / views[c].name / f"{frames[f]}.png").exists()
     }
-    rate = subject.fps or fps
     return Capture(
-        root, views, tuple(frames), rate if len(frames) > 1 else 0.0, images, masks, tracking, tuple(left_out)
+        root, views, tuple(frames), frame_rate(subject, fps, len(frames)), images, masks, tracking, tuple(left_out)
     )
 
 

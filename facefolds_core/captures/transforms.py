@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import Capture, View, closest_rotation, select_frames, shorten
+from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.errors import UserError
@@ -107,7 +107,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
                 if (c, position[name]) in images:
                     raise _fail(path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label)
                 images[c, position[name]] = entry.image
-    rate = (subject.fps or FPS) if len(frames) > 1 else 0.0
+    rate = frame_rate(subject, FPS, len(frames))
     return Capture(path.parent, views, tuple(frames), rate, images, {}, None, tuple(left_out))
 
 

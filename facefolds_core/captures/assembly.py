@@ -1,0 +1,169 @@
+"""Put a capture into the normalised form: decide everything, check every header, then write the scene in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
+from facefolds_core.captures.frames import Image, write_frames
+from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
+from facefolds_core.captures.lens import undistort
+from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
+from facefolds_core.captures.scene import Scene, Split, write_scene
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.params import NormalizeParams, Subject
+
+
+@dataclass(frozen=True)
+class Row:
+    """One image of the scene and where it comes from.
+
+    Attributes:
+        camera, frame: indices in the scene.
+        source: (camera index, frame index) in the capture.
+    """
+
+    camera: int
+    frame: int
+    source: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The scene that will be written.
+
+    Attributes:
+        capture: what it is made from.
+        scene: all of it but pixels and mesh.
+        rows: its images, ordered by camera, then frame.
+        vertices: (K, V, 3) float32 normalised tracked mesh, or None.
+    """
+
+    capture: Capture
+    scene: Scene
+    rows: tuple[Row, ...]
+    vertices: NDArray[np.float32] | None
+
+
+def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeParams, folder: Path) -> Plan:
+    """Decide cameras, frames, split and coordinates, and check the headers of all images in use.
+
+    Args:
+        name: of the subject.
+        folder: where the scene will be written.
+
+    Raises:
+        UserError: for everything that is wrong with the capture and shows without decoding its images.
+    """
+    moves = _stabilizing(capture, params)
+    still = capture if capture.tracking is None else replace(capture, tracking=_moved(capture.tracking, moves))
+    similarity, notes = normalizing_similarity(still, subject.front)
+    culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
+    kept, frames, incomplete = complete_subset(capture, culling.kept)
+    left_out = [*capture.left_out, *notes, *culling.lines, *incomplete]
+    splits = split_cameras([capture.views[c].name for c in kept], subject, left_out, capture.root)
+    width, height = fit_box(*check_image_sizes(capture, kept, frames), params.long_side, params.short_side)
+
+    cameras: list[Camera] = []
+    rows: list[Row] = []
+    each: list[Split] = []
+    for c, split in zip(kept, splits, strict=True):
+        camera = capture.views[c].camera.resized(width, height)
+        for f, source in enumerate(frames):
+            if params.stabilize:
+                moved = replace(camera, name=f"{camera.name}@{capture.frame_ids[source]}").transformed(moves[source])
+                cameras.append(moved.transformed(similarity))
+            elif f == 0:
+                cameras.append(camera.transformed(similarity))
+            each += [split] * (len(cameras) - len(each))
+            rows.append(Row(len(cameras) - 1, f, (c, source)))
+    scene = Scene(
+        subject=name,
+        cameras=tuple(cameras),
+        splits=tuple(each),
+        frame_ids=tuple(capture.frame_ids[f] for f in frames),
+        times=np.arange(len(frames)) / (capture.fps or 1.0),
+        fps=capture.fps if len(frames) > 1 else 0.0,
+        from_capture=similarity,
+        left_out=tuple(left_out),
+        folder=folder,
+    )
+    vertices = None
+    if still.tracking is not None:
+        vertices = similarity.apply(still.tracking.world_vertices()[frames]).astype(np.float32)
+    return Plan(capture, scene, tuple(rows), vertices)
+
+
+def _stabilizing(capture: Capture, params: NormalizeParams) -> list[Similarity]:
+    """For each frame of the capture, what moves its world so that the head stands still; identities if not asked for."""
+    if not params.stabilize:
+        return [Similarity.identity()] * len(capture.frame_ids)
+    if capture.tracking is None:
+        raise UserError(
+            "there are no head poses to stabilise by",
+            file=capture.root,
+            expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
+            remedy="set `stabilize: false` in `normalize` for this subject",
+        )
+    return stabilizing_similarities(capture.tracking)
+
+
+def _moved(tracking: Tracking, moves: list[Similarity]) -> Tracking:
+    """The tracked head after the world of each frame was moved."""
+    poses = [
+        np.concatenate([move.rotation @ pose[:, :3], move.apply(pose[:, 3])[:, None]], 1)
+        for move, pose in zip(moves, tracking.poses, strict=True)
+    ]
+    return replace(tracking, poses=np.array(poses))
+
+
+def write_plan(plan: Plan, params: NormalizeParams) -> None:
+    """Write the scene's folder, whole or not at all; one image is held in memory at a time.
+
+    Raises:
+        UserError: if an image is damaged.
+    """
+    scene, capture = plan.scene, plan.capture
+    masked = [
+        row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks
+    ]
+    with atomic_folder(scene.folder) as temporary:
+        shape = (scene.height, scene.width, 3)
+        write_frames(temporary / "frames.arrow", shape, _photos(plan, params))
+        if masked:
+            write_frames(temporary / "masks.arrow", (scene.height, scene.width, 1), _masks(plan, masked))
+        if plan.vertices is not None and capture.tracking is not None and capture.tracking.faces is not None:
+            np.savez(temporary / "surface.npz", vertices=plan.vertices, faces=capture.tracking.faces)
+        write_scene(scene, temporary)
+
+
+def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:
+    capture, scene = plan.capture, plan.scene
+    for row in tqdm(plan.rows, desc="normalize", unit="image"):
+        photo = decode_image(capture.images[row.source], capture.place(*row.source))
+        values = downsample(_straight(plan, row, photo), scene.width, scene.height)
+        yield row.camera, row.frame, to_8bit(display_colour(values) if params.display_colour else values)
+
+
+def _masks(plan: Plan, rows: list[Row]) -> Iterator[tuple[int, int, Image]]:
+    capture, scene = plan.capture, plan.scene
+    for row in rows:
+        mask = decode_mask(capture.masks[row.source], f"mask of {capture.place(*row.source)}")
+        yield row.camera, row.frame, to_8bit(downsample(_straight(plan, row, mask), scene.width, scene.height))
+
+
+def _straight(plan: Plan, row: Row, photo: Image) -> Image:
+    """The photo without distortion."""
+    lens = plan.capture.views[row.source[0]].lens
+    if lens is None:
+        return photo
+    return undistort(photo, lens.maps(photo.shape[1], photo.shape[0]))

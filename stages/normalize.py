@@ -1,0 +1,63 @@
+"""Read a capture and write it in the one convention: data/<subject>/scene/."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
+from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.multiface import read_multiface
+from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.config import read_stage, read_subject
+from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from facefolds_core.paths import SubjectFolders
+from stages.common import run_stage
+
+SHOWN = 5
+"""Lines on what was left out that are printed; scene.json has all."""
+
+
+def read_capture(subject: Subject, folders: SubjectFolders) -> Capture:
+    """The capture of any source."""
+    if subject.source == "actor":
+        fps = read_stage(CaptureParams, folders.config).fps
+        return read_multiface(folders.capture, subject, fps=fps, pixel_centres=0.5)
+    if subject.source == "multiface":
+        return read_multiface(Path(subject.path), subject)
+    return read_transforms(Path(subject.path), subject)
+
+
+def summary(plan: Plan) -> str:
+    """One line on the scene."""
+    scene = plan.scene
+    train, held = len(scene.indices("train")), len(scene.indices("holdout"))
+    culled = sum(": culled," in line for line in scene.left_out)
+    return (
+        f"{len(scene.cameras)} cameras ({train} train, {held} holdout; {culled} culled), {scene.num_frames} frames, "
+        f"{scene.width} x {scene.height} pixels, in {scene.folder}"
+    )
+
+
+def left_out(plan: Plan) -> list[str]:
+    """The first lines on what the scene does not have."""
+    lines = plan.scene.left_out
+    shown = [f"  {line}" for line in lines[:SHOWN]]
+    if len(lines) > SHOWN:
+        shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")
+    return [f"normalize: left out, and notes ({len(lines)}):", *shown] if lines else []
+
+
+def normalize(folders: SubjectFolders) -> str:
+    subject = read_subject(folders.config)
+    params = read_stage(NormalizeParams, folders.config)
+    plan = plan_scene(read_capture(subject, folders), folders.root.name, subject, params, folders.scene)
+    write_plan(plan, params)
+    for line in left_out(plan):
+        typer.echo(line)
+    return summary(plan)
+
+
+if __name__ == "__main__":
+    run_stage("normalize", normalize, __doc__ or "")
