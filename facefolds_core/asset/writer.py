@@ -74,7 +74,12 @@ def write_asset(
     """
     frames = _check_textures(textures, len(meshes))
     if len(windows) != len(meshes):
-        raise ValueError(f"{len(windows)} windows for {len(meshes)} meshes")
+        raise UserError(
+            "the meshes and the texture windows do not belong together",
+            expected=f"{len(meshes)} windows",
+            found=len(windows),
+            remedy="run `dvc repro` to make both again",
+        )
     for index, mesh in enumerate(meshes):
         _check_mesh(mesh, f"layer {index}")
     layout = AtlasLayout.grid(len(meshes), textures.height)
