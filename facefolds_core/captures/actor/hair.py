@@ -55,7 +55,7 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
     locks = value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, seed + 11)
     # The meridians meet at the crown: no locks there.
     away = smoothstep(0.15, 0.55, rho / r)
-    locks = 0.5 + (locks - 0.5) * away
+    locks = 0.62 + (locks - 0.62) * away
     fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
     fine = 0.5 + (fine - 0.5) * away
     return locks, fine
@@ -106,8 +106,8 @@ def hair_colour(
     length = max(math.sqrt(tx * tx + ty * ty + tz * tz), 1e-6)
     tx, ty, tz = tx / length, ty / length, tz / length
     shade = 0.25 + 0.75 * smoothstep(-26.0, 2.0, depth) * (0.55 + 0.75 * locks)
-    tone = 0.55 + 0.75 * fine
-    base_r, base_g, base_b = 0.30 * tone + 0.05 * locks, 0.165 * tone + 0.03 * locks, 0.085 * tone + 0.015 * locks
+    tone = 0.35 + 1.15 * fine
+    base_r, base_g, base_b = 0.34 * tone + 0.05 * locks, 0.19 * tone + 0.03 * locks, 0.095 * tone + 0.015 * locks
     red, green, blue = 0.30 * base_r, 0.30 * base_g, 0.30 * base_b
     for i in range(lights.shape[0]):
         lx, ly, lz = lights[i, 0], lights[i, 1], lights[i, 2]

@@ -1,7 +1,7 @@
 """Rays, hair, light: the actor's own renderer. It shares nothing with the product's rendering but the `Camera`.
 
 Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour, opacity or depth, the
-pixel becomes the mean of four more samples on a rotated grid. Nothing is random, so a picture depends on its arguments only.
+pixel becomes the mean of that sample and three more around it. Nothing is random, so a picture depends on its arguments only.
 """
 
 from __future__ import annotations
@@ -200,16 +200,16 @@ def _build(digest: int) -> Callable[..., tuple[Array, Array]]:
             for j in range(width):
                 smooth[i, j] = first[i, j, :4]
                 if _differs(first, i, j):
-                    smooth[i, j] = 0.0
-                    for k in range(4):
-                        # A rotated grid: rows and columns of the four samples are all different.
-                        u = j + 0.125 + 0.25 * ((2 * k + 1) % 5 if k != 2 else 0)
-                        v = i + 0.125 + 0.25 * k
+                    for k in range(3):
+                        # A triangle about the centre, turned so that no two samples share a row or a column.
+                        angle = 2.0 * math.pi * (k / 3.0 + 0.04)
+                        u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
                         r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
-                        smooth[i, j, 0] += 0.25 * min(r, 1.0)
-                        smooth[i, j, 1] += 0.25 * min(g, 1.0)
-                        smooth[i, j, 2] += 0.25 * min(b, 1.0)
-                        smooth[i, j, 3] += 0.25 * a
+                        smooth[i, j, 0] += min(r, 1.0)
+                        smooth[i, j, 1] += min(g, 1.0)
+                        smooth[i, j, 2] += min(b, 1.0)
+                        smooth[i, j, 3] += a
+                    smooth[i, j] *= 0.25
         return first, smooth
 
     return render_samples

@@ -247,7 +247,7 @@ def surface_colour(
         cosine = n[0] * lx + n[1] * ly + n[2] * lz
         lit = 0.4 + 0.6 * open_sky
         if i == 0 and cosine > -wrap:
-            lit *= 0.25 + 0.75 * shadow(p[0], p[1], p[2], lx, ly, lz, pose)
+            lit *= 0.40 + 0.60 * shadow(p[0], p[1], p[2], lx, ly, lz, pose)
         soft = clamp((cosine + wrap) / (1.0 + wrap), 0.0, 1.0)
         hard = clamp((cosine + 0.1) / 1.1, 0.0, 1.0)
         hx, hy, hz = lx + view[0], ly + view[1], lz + view[2]

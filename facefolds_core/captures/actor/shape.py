@@ -146,10 +146,10 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
     neck = cone(x, y, z, -60.0, -24.0, -230.0, -40.0, 44.0, 52.0)
     d = smooth_min(d, neck, 18.0)
     d = smooth_min(d, _jaw(ax, y, z), 22.0)
-    if d > 40.0:
+    if d > 65.0:
         # The features stand out from this by less than 25 mm.
-        return d - 25.0
-    if z < 5.0:
+        return d - (25.0 if z > 5.0 else 5.0)
+    if z < -12.0:
         return d
     # Each feature is measured only where it can change the blend.
     if y < 30.0:
@@ -258,7 +258,7 @@ def trace(
         d = distance(ox + t * dx, oy + t * dy, oz + t * dz, pose)
         if d < 0.03:
             return t
-        t += 0.8 * d
+        t += d * (0.97 if d > 12.0 else 0.8)
         if t > far:
             break
     return math.inf
