@@ -104,7 +104,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
 
 
 def _stabilizing(capture: Capture, params: NormalizeParams) -> list[Similarity]:
-    """For each frame of the capture, what moves its world so that the head stands still; identities if not asked for."""
+    """For each frame of the capture, what moves its world so that the head stands still; else identities."""
     if not params.stabilize:
         return [Similarity.identity()] * len(capture.frame_ids)
     if capture.tracking is None:
@@ -133,9 +133,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
         UserError: if an image is damaged.
     """
     scene, capture = plan.scene, plan.capture
-    masked = [
-        row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks
-    ]
+    masked = [row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks]
     with atomic_folder(scene.folder) as temporary:
         shape = (scene.height, scene.width, 3)
         write_frames(temporary / "frames.arrow", shape, _photos(plan, params))

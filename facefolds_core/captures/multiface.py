@@ -16,7 +16,7 @@ import numpy as np
 
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
-from facefolds_core.captures.krt import Calibration, krt_reference, pinhole_K, read_krt
+from facefolds_core.captures.krt import Calibration, krt_reference, scaled_intrinsics, read_krt
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
@@ -81,7 +81,12 @@ def _segment(root: Path, wanted: str | None) -> str:
     else:
         problem, remedy = "no such segment", "correct `segment` of this subject in params.yaml"
     raise UserError(
-        problem, file=folder, place="segment", expected=f"one of {shorten(segments, 100)}" if segments else None, found=wanted, remedy=remedy
+        problem,
+        file=folder,
+        place="segment",
+        expected=f"one of {shorten(segments, 100)}" if segments else None,
+        found=wanted,
+        remedy=remedy,
     )
 
 
@@ -133,8 +138,8 @@ def _views(
     centres = pixel_centres if subject.pixel_centres is None else subject.pixel_centres
     views = []
     for calibration, size in zip(used, sizes, strict=True):
-        K = pinhole_K(calibration.K, reference, size, centres)
+        K = scaled_intrinsics(calibration.K, reference, size, centres)
         lens = make_lens(K, calibration.distortion, *size, root / "KRT", f"camera {calibration.name}")
-        pinhole = K if lens is None else lens.pinhole_K
+        pinhole = K if lens is None else lens.pinhole
         views.append(View(Camera(calibration.name, np.array(pinhole), closest_rotation(calibration.w2c), *size), lens))
     return tuple(views), note
