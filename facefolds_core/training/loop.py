@@ -80,7 +80,7 @@ def pick_device(name: str) -> torch.device:
 
 
 def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
-    """lr_0 decay^(iteration / interval): the paper's "decay rates of 0.05 and 0.20 per 200 000 iterations" as factors."""
+    """lr_0 decay^(iteration / interval): the paper's decay "of 0.05 and 0.20 per 200 000 iterations" as factors."""
     time_constant = iteration / params.decay_interval
     return {
         "manifold": params.lr_manifold * params.decay_manifold**time_constant,
