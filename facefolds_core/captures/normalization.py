@@ -97,8 +97,8 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
     """Capture -> normalised coordinates, and notes.
 
     Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh,
-    centre and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject faces
-    against the viewing direction of the camera `front`, whose image is upright.
+    centre and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject
+    faces against the viewing direction of the camera `front`, whose image is upright.
 
     Raises:
         UserError: if the front camera does not exist, or all cameras stand in the centre.
