@@ -23,7 +23,7 @@ Progress = Callable[[], None]
 
 
 def frame_times(params: CaptureParams) -> NDArray[np.float64]:
-    """(frames,) seconds within the performance: one full cycle, so that the clip loops. Frame k of 12 at 30 is k / 30."""
+    """(frames,) seconds within the performance: one full cycle, so that the clip loops (of 12 frames: k / 30)."""
     return np.arange(params.frames) / params.frames * PERIOD
 
 

@@ -1,8 +1,8 @@
 """Volumetric hair: a density around the skull, combed into strands, marched with absorption.
 
 The envelope is a signed distance; the density rises from its edge inwards, cut into locks and strands by noise that is
-drawn out along the strands, so that the outline is thin and semi-transparent. Strands run along the meridians of an axis
-through the crown, slightly twisted.
+drawn out along the strands, so that the outline is thin and semi-transparent. Strands run along the meridians of an
+axis through the crown, slightly twisted.
 """
 
 from __future__ import annotations
@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.jit import compiled
-from facefolds_core.captures.actor.noise import Vector, clamp, ellipsoid, smooth_max, smooth_min, smoothstep, value_noise
+from facefolds_core.captures.actor.noise import (
+    Vector,
+    clamp,
+    ellipsoid,
+    smooth_max,
+    smooth_min,
+    smoothstep,
+    value_noise,
+)
 
 _CENTRE_Y, _CENTRE_Z = 25.0, -12.0
 # Unit axis through the crown, and two unit vectors across it.
@@ -34,8 +42,7 @@ def envelope(x: float, y: float, z: float) -> float:
     d = smooth_min(d, side, 22.0)
     d = smooth_min(d, ellipsoid(x, y + 40.0, z + 58.0, 84.0, 90.0, 48.0), 25.0)
     # The face stays free: an oval that leans back at the hairline, higher on the side of the parting.
-    part = x + 0.0
-    hairline = 54.0 + 9.0 * math.exp(-(((part - 18.0) / 26.0) ** 2))
+    hairline = 54.0 + 9.0 * math.exp(-(((x - 18.0) / 26.0) ** 2))
     face = ellipsoid(x, y + 22.0, z - 100.0, 66.0, 22.0 + hairline, 84.0)
     return smooth_max(d, -face, 12.0)
 
@@ -54,7 +61,7 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
     a, b = (a * c - b * s) / rho, (a * s + b * c) / rho
     locks = value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, seed + 11)
     # The meridians meet at the crown: no locks there.
-    away = smoothstep(0.15, 0.55, rho / r)
+    away = smoothstep(0.30, 0.75, rho / r)
     locks = 0.62 + (locks - 0.62) * away
     fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
     fine = 0.5 + (fine - 0.5) * away

@@ -22,7 +22,8 @@ _AZIMUTH = 105.0
 _ELEVATIONS = (84.0, -32.0)
 _CENTRES = (20.0, -112.0)
 """y of the point that the rays aim at, mm: the upper value down to the horizon, then it slides into the neck."""
-_START = 300.0
+_STARTS = (300.0, 110.0)
+"""Distance from that point at which the rays start, mm: the lowest start between chin and shoulders."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class TrackedMesh:
     """Constant topology: only `vertices` depend on the time.
 
     Attributes:
-        vertices: (V, 3) float32, head frame, mm. Each lies on the surface that is outermost along its ray: skin, eyeball,
-            or what shows between open lips; never hair.
+        vertices: (V, 3) float32, head frame, mm. Each lies on the surface that is outermost along its ray: skin,
+            eyeball, or what shows between open lips; never hair.
         faces: (F, 3) int32, counter-clockwise from outside.
         uv: (V, 2) float32 in [0, 1]: u right as seen from the front, v up.
     """
@@ -72,7 +73,8 @@ def _rays() -> tuple[Array, Array, NDArray[np.float32]]:
     out = np.stack([flat * np.sin(azimuth), np.sin(elevation), flat * np.cos(azimuth)], -1).reshape(-1, 3)
     centres = np.stack([np.zeros_like(centre_y), centre_y, np.full_like(centre_y, -15.0)], -1).reshape(-1, 3)
     uv = np.stack([s, 1 - t], -1).reshape(-1, 2).astype(np.float32)
-    return centres + _START * out, -out, uv
+    start = (_STARTS[0] + (_STARTS[1] - _STARTS[0]) * below).reshape(-1, 1)
+    return centres + start * out, -out, uv
 
 
 def _faces() -> NDArray[np.int32]:
@@ -85,7 +87,7 @@ def _faces() -> NDArray[np.int32]:
 def tracked_mesh(time: float) -> TrackedMesh:
     """The mesh at a time in seconds. Vertices are within 0.1 mm of the rendered surface (but slide on the skin)."""
     origins, directions, uv = _rays()
-    hits = _cut(origins, directions, pose_at(time), _START)
+    hits = _cut(origins, directions, pose_at(time), _STARTS[0])
     if not np.isfinite(hits).all():
         raise AssertionError("a ray of the tracked mesh misses the head")
     vertices = (origins + hits[:, None] * directions).astype(np.float32)

@@ -1,7 +1,8 @@
 """Rays, hair, light: the actor's own renderer. It shares nothing with the product's rendering but the `Camera`.
 
 Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour, opacity or depth, the
-pixel becomes the mean of that sample and three more around it. Nothing is random, so a picture depends on its arguments only.
+pixel becomes the mean of that sample and three more around it. Nothing is random: a picture depends on its arguments
+only.
 """
 
 from __future__ import annotations
@@ -116,7 +117,15 @@ def _hair(
 
 @compiled
 def _sample(
-    u: float, v: float, to_world: Array, centre: Array, frame: Array, pose: Array, lights: Array, settings: Array, seed: int
+    u: float,
+    v: float,
+    to_world: Array,
+    centre: Array,
+    frame: Array,
+    pose: Array,
+    lights: Array,
+    settings: Array,
+    seed: int,
 ) -> tuple[float, float, float, float, float]:
     """One ray through continuous image coordinates (u, v): colour, opacity, distance along the ray (inf for none)."""
     wx = to_world[0, 0] * u + to_world[0, 1] * v + to_world[0, 2]

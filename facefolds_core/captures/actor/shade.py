@@ -33,7 +33,7 @@ from facefolds_core.captures.actor.shape import (
 def _freckles(x: float, y: float, z: float, seed: int) -> float:
     """Darkness of freckles in [0, 1]: at most one dot a cell of 4.5 mm."""
     cell = 4.5
-    i, j, k = int(math.floor(x / cell)), int(math.floor(y / cell)), int(math.floor(z / cell))
+    i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
     if hash3(i, j, k, seed + 21) > 0.34:
         return 0.0
     dx = x / cell - i - 0.3 - 0.4 * hash3(i, j, k, seed + 22)
@@ -224,7 +224,7 @@ def surface_colour(
     gloss: float,
     seed: int,
 ) -> Vector:
-    """Colour of an opaque point towards the eye: wrapped diffuse, Blinn-Phong gloss, occlusion, shadow of the key light.
+    """Colour of an opaque point towards the eye: wrapped diffuse, Blinn-Phong gloss, occlusion, the key light's shadow.
 
     Args:
         p: point, head mm.

@@ -4,8 +4,8 @@ The eyes lie at y = 0, the mouth at y = -67, the chin at y = -114, the top of th
 approximate (blended ellipsoids), right to first order at the surface and never much too long, so that sphere tracing
 with a shortened step finds the first crossing.
 
-The jaw and the smile move the face by a warp: a point is carried back to the rest pose and measured there. The mouth and
-the eyes open as slots cut into the skin.
+The jaw and the smile move the face by a warp: a point is carried back to the rest pose and measured there. The mouth
+and the eyes open as slots cut into the skin.
 """
 
 from __future__ import annotations
@@ -28,8 +28,6 @@ _EYE_HALFWIDTH = 14.8
 MOUTH_Y = -67.0
 MOUTH_HALFWIDTH = 25.0
 _JAW_DROP = 21.0
-BOUND = 190.0
-"""No part of head and hair lies farther from the origin in x or z; shoulders do, and are bounded by `BOUND_BODY`."""
 
 
 @compiled
@@ -163,8 +161,9 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
             d = smooth_min(d, ellipsoid(x, y + 101.0, z - 64.0, 19.0, 13.0, 18.0), 16.0)
     if y > -32.0 and y < 55.0:
         d = _eye_region(ax, y, z, brow, d)
-    if y < 45.0 and y > -75.0 and z > 50.0 and ax < 45.0:
-        d = _nose(ax, y, z, d)
+    # Away from the nose a bound will do: it lies within |x| < 20, -55 < y < 20, z > 80.
+    aside = max(ax - 20.0, y - 20.0, -55.0 - y, 80.0 - z)
+    d = _nose(ax, y, z, d) if aside < 25.0 else min(d, aside)
     if y < -45.0 and z > 60.0:
         d = _lips(ax, y, z, d)
         # Philtrum.
