@@ -143,8 +143,8 @@ def _read(path: Path) -> dict[str, NDArray[Any]]:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy="run `dvc repro`, which makes it") from None
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, AttributeError) as error:
-        # AttributeError: np.load of a lone array has no `files`.
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, TypeError, RuntimeError) as error:
+        # TypeError: a lone array is no archive. RuntimeError: flags that make zipfile look for a password.
         raise UserError("a damaged geometry file", file=path, found=str(error), remedy=_REMEDY) from None
 
 
