@@ -26,7 +26,7 @@ from facefolds_core.geometry.cameras import Camera
 
 Array = NDArray[np.float64]
 
-_DIFFERENT = 0.06
+_DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
 _DEPTH_JUMP = 4.0
 """Likewise in depth, mm."""
