@@ -57,8 +57,8 @@ def find_start(scene: Scene, layers: int, halfwidth: float) -> Start:
 
     With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of the scene's centre
     (x > 0: the face, not the sides of the head), and the ball encloses all outermost vertices. Without, see
-    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `MARGIN` beyond the
-    outermost layer if that lay `halfwidth` outside the surface's farthest point.
+    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `MARGIN` beyond
+    the outermost layer if that lay `halfwidth` outside the surface's farthest point.
     """
     surface = scene.load_surface()
     outline = None
