@@ -128,7 +128,7 @@ def krt_reference(
     so the one with the smaller median distance |c / size - 1/2| holds, if that is under 1/4.
 
     Args:
-        image: (width, height) of the images at hand.
+        image: (width, height) of most images at hand.
         given: `krt_size` of params.yaml, which overrides.
 
     Returns:

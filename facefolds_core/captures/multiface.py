@@ -10,6 +10,7 @@ Cameras, frames or images may be missing; what is not used is named in `Capture.
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,7 @@ def _views(
     for camera in used:
         frame, path = next(iter(photos[camera.name].items()))
         sizes.append(image_size(path, f"camera {camera.name}, frame {frame}"))
-    reference, note = krt_reference(used, sizes[0], subject.krt_size, root / "KRT")
+    reference, note = krt_reference(used, Counter(sizes).most_common(1)[0][0], subject.krt_size, root / "KRT")
     centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
     views = []
     for calibration, size in zip(used, sizes, strict=True):

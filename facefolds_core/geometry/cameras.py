@@ -44,7 +44,7 @@ class Camera:
     @property
     def centre(self) -> Array:
         """(3,) camera centre in the world."""
-        return -self.rotation.T @ self.w2c[:, 3]
+        return np.asarray(-self.rotation.T @ self.w2c[:, 3])
 
     @property
     def forward(self) -> Array:

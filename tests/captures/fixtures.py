@@ -92,7 +92,9 @@ def write_obj(path: Path, vertices: Array) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def write_multiface(root: Path, frames: tuple[str, ...] = ("000003", "000006", "000009"), turn: float = 0.0) -> MultifaceCapture:
+def write_multiface(
+    root: Path, frames: tuple[str, ...] = ("000003", "000006", "000009"), turn: float = 0.0
+) -> MultifaceCapture:
     """A complete capture of `RING`; the head moves by (3, 1, -2) mm a frame and turns by `turn` degrees."""
     cameras = tuple(world_camera(*view) for view in RING)
     capture = MultifaceCapture(root, cameras, frames)

@@ -52,7 +52,7 @@ def test_global_intrinsics(tmp_path: Path) -> None:
     for entry in range(5):
         edit_transforms(path, entry, fl_x=None, fl_y=None, cx=None, cy=None, w=None, h=None)
     view = read_transforms(tmp_path, subject(tmp_path)).views[3]
-    assert view.camera.K == pytest.approx(cameras[3].K)
+    assert pytest.approx(cameras[3].K) == view.camera.K
 
 
 def test_angles_of_view_and_centred_principal_point(tmp_path: Path) -> None:
@@ -129,7 +129,10 @@ def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: 
 
 @pytest.mark.parametrize("coefficients", [(-0.2, 0.05, 0.003, -0.002, 0.0), (0.15, 0.02, -0.001, 0.002, 0.01)])
 def test_distortion_formula_agrees_with_opencv(coefficients: tuple[float, ...]) -> None:
-    K, points = np.array([[150.0, 0, 22], [0, 151, 31], [0, 0, 1]]), np.random.default_rng(1).uniform(-0.2, 0.2, (30, 2))
+    K, points = (
+        np.array([[150.0, 0, 22], [0, 151, 31], [0, 0, 1]]),
+        np.random.default_rng(1).uniform(-0.2, 0.2, (30, 2)),
+    )
     homogeneous = np.concatenate([points, np.ones((30, 1))], 1)
     expected, _ = cv2.projectPoints(homogeneous, np.zeros(3), np.zeros(3), K, np.array(coefficients))
     assert Lens(K, np.array(coefficients), K).distort(points) == pytest.approx(expected[:, 0], abs=1e-9)
