@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from tqdm import tqdm
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
 from facefolds_core.captures.frames import Image, write_frames
 from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
-from facefolds_core.captures.lens import undistort
+from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
 from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.errors import UserError
@@ -164,4 +165,10 @@ def _straight(plan: Plan, row: Row, photo: Image) -> Image:
     lens = plan.capture.views[row.source[0]].lens
     if lens is None:
         return photo
-    return undistort(photo, lens.maps(photo.shape[1], photo.shape[0]))
+    return undistort(photo, _maps(lens, photo.shape[1], photo.shape[0]))
+
+
+@lru_cache(maxsize=1)
+def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """`Lens.maps`, kept while the frames of one camera are read."""
+    return lens.maps(width, height)

@@ -13,7 +13,7 @@ from facefolds_core.errors import UserError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lens:
     """The intrinsics of a photo with distortion, and of the pinhole image made from it.
 

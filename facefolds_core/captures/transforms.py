@@ -41,13 +41,14 @@ class Entry:
     """One entry of `frames`, with the global values filled in.
 
     Attributes:
-        place: where it stands, for messages.
+        file, place: where it stands, for messages.
         label: its file_path.
         image: the file, or None where it is missing.
         values: the entry's keys over the global ones.
         w2c: (3, 4) world -> camera, OpenCV axes.
     """
 
+    file: Path
     place: str
     label: str
     image: Path | None
@@ -66,9 +67,7 @@ def _fail(path: Path, place: str, message: str, expected: object, found: object,
 def _number(entry: Entry, key: str) -> float:
     value = entry.values[key]
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _fail(
-            Path(entry.values["_file"]), f"{entry.place}, {key}", "not a number", "a finite number", repr(value)
-        )
+        raise _fail(entry.file, f"{entry.place}, {key}", "not a number", "a finite number", repr(value))
     return float(value)
 
 
@@ -86,7 +85,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     value = read_json(path, remedy="point `path` at the folder that holds transforms.json, or make the file again")
     if not isinstance(value, dict) or not isinstance(value.get("frames"), list) or not value["frames"]:
         raise _fail(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
-    common = {key: entry for key, entry in value.items() if key != "frames"} | {"_file": str(path)}
+    common = {key: entry for key, entry in value.items() if key != "frames"}
     entries = [_entry(e, common, path, f"frames[{i}]") for i, e in enumerate(value["frames"])]
     left_out = [f"{e.place}: no image {e.label}" for e in entries if e.image is None]
     present = [e for e in entries if e.image is not None]
@@ -129,9 +128,8 @@ def _entry(value: Any, common: dict[str, Any], path: Path, place: str) -> Entry:
         raise _fail(path, f"{place}, file_path", "a key is missing", "the path of an image", repr(label))
     if "transform_matrix" not in value:
         raise _fail(path, f"{place} ({label}), transform_matrix", "a key is missing", "a 4 x 4 matrix", "nothing")
-    return Entry(
-        f"{place} ({label})", label, _find(path.parent, label), common | value, _w2c(value, path, f"{place} ({label})")
-    )
+    place = f"{place} ({label})"
+    return Entry(path, place, label, _find(path.parent, label), common | value, _w2c(value, path, place))
 
 
 def _find(folder: Path, label: str) -> Path | None:
