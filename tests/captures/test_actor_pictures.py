@@ -56,8 +56,8 @@ def test_opacity_lies_between_zero_and_one(rest: Picture) -> None:
 
 
 def test_room_has_no_opacity(rest: Picture) -> None:
-    assert np.all(rest.opacity[:6] == 0)
-    assert np.all(np.isinf(rest.depth[:6]))
+    assert np.all(rest.opacity[:4] == 0)
+    assert np.all(np.isinf(rest.depth[:4]))
 
 
 def test_hair_is_semi_transparent(rest: Picture) -> None:
@@ -86,7 +86,7 @@ def test_room_is_static() -> None:
 
 def test_grey_room_is_grey() -> None:
     picture = render(frontal(), 0.0, ActorOptions(room_colour=0.0))
-    assert np.ptp(picture.rgb[:6], axis=-1).max() == 0
+    assert np.ptp(picture.rgb[:4], axis=-1).max() == 0
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 50.0, -50.0])

@@ -42,9 +42,9 @@ def envelope(x: float, y: float, z: float) -> float:
     d = smooth_min(d, side, 22.0)
     d = smooth_min(d, ellipsoid(x, y + 40.0, z + 58.0, 84.0, 90.0, 48.0), 25.0)
     # The face stays free: an oval that leans back at the hairline, higher on the side of the parting.
-    hairline = 54.0 + 9.0 * math.exp(-(((x - 18.0) / 26.0) ** 2))
+    hairline = 56.0 + 9.0 * math.exp(-(((x - 18.0) / 26.0) ** 2))
     face = ellipsoid(x, y + 22.0, z - 100.0, 66.0, 22.0 + hairline, 84.0)
-    return smooth_max(d, -face, 12.0)
+    return smooth_max(d, -face, 8.0)
 
 
 @compiled
@@ -64,7 +64,8 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
     away = smoothstep(0.30, 0.75, rho / r)
     locks = 0.62 + (locks - 0.62) * away
     fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
-    fine = 0.5 + (fine - 0.5) * away
+    finest = value_noise(68.0 * a, 68.0 * b, 3.4 * along + 0.25 * r, seed + 13)
+    fine = 0.5 + (0.75 * (fine - 0.5) + 0.55 * (finest - 0.5)) * away
     return locks, fine
 
 
@@ -76,7 +77,7 @@ def density(x: float, y: float, z: float, amount: float, seed: int) -> tuple[flo
         return 0.0, d, 0.5, 0.5
     locks, fine = strands(x, y, z, seed)
     inside = -(d + 9.0 * (locks - 0.45))
-    body = smoothstep(-3.0, 13.0, inside)
+    body = smoothstep(-3.0, 11.0, inside)
     if body <= 0.0:
         return 0.0, d, locks, fine
     # Near the outline only the thickest strands remain.

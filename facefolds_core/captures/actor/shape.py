@@ -53,23 +53,24 @@ def eye_slot(ex: float, ey: float, blink: float) -> float:
     """Signed distance, in the plane of the face, to the opening between the lids: negative inside, mm."""
     lower, upper = lid_edges(ex, blink)
     slope = math.sqrt(1.0 + (0.75 * ex / _EYE_HALFWIDTH) ** 2)
-    return max(ey - upper, lower - ey) / slope
+    # Beyond the corners there is no slot, even where the lids' edges would meet.
+    return max(max(ey - upper, lower - ey) / slope, 0.8 * (abs(ex) - _EYE_HALFWIDTH))
 
 
 @compiled
-def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float]:
-    """The opening of the mouth at x: (height in mm, y of its upper edge)."""
+def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float, float]:
+    """The opening of the mouth at x: (height in mm, y of its upper edge, half its width)."""
     half = MOUTH_HALFWIDTH - 3.0 * pose[JAW] + 3.5 * pose[SMILE]
     s = x / half
     height = _JAW_DROP * pose[JAW] * max(1.0 - s * s, 0.0) ** 0.75
-    return height, MOUTH_Y + 1.5 * pose[JAW] * max(1.0 - s * s, 0.0) + 4.0 * pose[SMILE] * s * s
+    return height, MOUTH_Y + 1.5 * pose[JAW] * max(1.0 - s * s, 0.0) + 4.0 * pose[SMILE] * s * s, half
 
 
 @compiled
 def to_rest(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
     """Carry a point of the moving face back to the rest pose."""
     if z > -20.0 and y < MOUTH_Y + 5.0 and pose[JAW] > 0.0:
-        height, edge = mouth_gap(x, pose)
+        height, edge, _ = mouth_gap(x, pose)
         if y < edge - 0.5 * height:
             drop = _JAW_DROP * pose[JAW]
             below = edge - height - y
@@ -189,7 +190,7 @@ def shirt(x: float, y: float, z: float) -> float:
     d = ellipsoid(ax - 62.0, y + 262.0, z + 38.0, 135.0, 84.0, 74.0)
     d = smooth_min(d, ellipsoid(x, y + 300.0, z + 25.0, 130.0, 130.0, 95.0), 25.0)
     tilt = y + 172.0 + 0.22 * (z + 36.0)
-    ring = math.sqrt((math.sqrt(x * x + (z + 36.0) ** 2) - 58.0) ** 2 + tilt * tilt) - 7.0
+    ring = math.sqrt((math.sqrt(x * x + (z + 36.0) ** 2) - 55.0) ** 2 + tilt * tilt) - 7.0
     return smooth_min(d, ring, 12.0)
 
 
@@ -208,11 +209,11 @@ def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[fl
             if ball < d:
                 d, material = ball, EYE
         elif pose[JAW] > 0.01 and y < -40.0:
-            height, edge = mouth_gap(x, pose)
+            height, edge, half = mouth_gap(x, pose)
             slot = (abs(y - edge + 0.5 * height) - 0.5 * height) * 0.8
-            slot = max(slot, 46.0 - z, abs(x) - MOUTH_HALFWIDTH - 4.0)
+            slot = max(slot, 46.0 - z, abs(x) - half + 1.0)
             d = smooth_max(skin, -slot, 3.0 * clamp(height / 6.0, 0.05, 1.0))
-            middle, _ = mouth_gap(0.0, pose)
+            middle, _, _ = mouth_gap(0.0, pose)
             upper = _teeth(x, y, z, MOUTH_Y + 2.0, 7.5)
             lower = _teeth(x, y, z + 4.0 + 0.22 * middle, MOUTH_Y - middle - 2.5, 5.0)
             row = min(upper, lower)
