@@ -35,12 +35,14 @@ QUICK: dict[str, Any] = {
     "manifold_width": 64,
     "texture_layers": 4,
     "texture_width": 96,
-    "search_samples": 48,
+    "uv_frequencies": 7,
+    "search_samples": 24,
     "rays": 2048,
-    "iterations": 2_000,
-    "lr_manifold": 7e-4,
+    "iterations": 2_400,
+    "lr_manifold": 2e-4,
     "lr_texture": 4e-3,
-    "decay_interval": 2_000,
+    "lambda_reg": 1e-6,
+    "decay_interval": 2_400,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {"paper": PAPER, "quick": QUICK}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import resource
 import shutil
 import time
@@ -155,7 +156,9 @@ class _Progress:
         self.params = params
         self.every = max(1, min(100, params.iterations // LOG_POINTS))
         _trim_log(folder, iteration)
-        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else.
+        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else. A user's token for
+        # DVC Studio must not make dvclive send it anywhere.
+        os.environ["DVC_STUDIO_OFFLINE"] = "true"
         self.live = Live(dir=str(folder), resume=iteration > 0, save_dvc_exp=False, dvcyaml=None, report=None)
         self.bar = tqdm(total=params.iterations, initial=iteration, unit="it", desc="train", mininterval=1.0)
         self.sums: list[float] = []

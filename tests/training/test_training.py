@@ -1,6 +1,7 @@
 """Training: rays, losses, recovery of a known radius, interruption, divergence, foreign checkpoints."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -125,8 +126,9 @@ class Killed(BaseException):
     """Stands for a signal that ends the process."""
 
 
+@pytest.mark.parametrize("log_lost", [False, True])
 def test_an_interrupted_run_ends_at_the_same_result(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    scene: Scene, tmp_path: Path, log_lost: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     settings = params(manifold_start="surface", checkpoint_seconds=1e-9)
     monkeypatch.setattr(loop, "START_ITERATIONS", 5)
@@ -143,6 +145,8 @@ def test_an_interrupted_run_ends_at_the_same_result(
         run(scene, settings, tmp_path / "parts")
     assert not (tmp_path / "parts" / "model").exists()
     monkeypatch.setattr(loop, "train_step", step)
+    if log_lost:  # `dvc repro` deletes a stage's outputs before it runs the stage again
+        shutil.rmtree(tmp_path / "parts" / "log")
     resumed = run(scene, settings, tmp_path / "parts")
     assert "continuing from iteration 7" in capsys.readouterr().out
     assert whole.keys() == resumed.keys()
@@ -163,6 +167,16 @@ def test_the_log_holds_losses_rates_and_speed(scene: Scene, tmp_path: Path) -> N
     names = {str(p.relative_to(tmp_path / "log" / "plots" / "metrics")) for p in (tmp_path / "log").rglob("*.tsv")}
     losses = {f"loss/{name}.tsv" for name in ("total", "reconstruction", "view", "regularisation")}
     assert names == {*losses, "psnr.tsv", "lr/manifold.tsv", "lr/texture.tsv", "rays_per_second.tsv"}
+
+
+def test_nothing_is_sent_to_dvc_studio(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DVC_STUDIO_TOKEN", "token")
+    monkeypatch.setenv("DVC_STUDIO_REPO_URL", "git@example.invalid:a/b.git")
+    monkeypatch.delenv("DVC_STUDIO_OFFLINE", raising=False)
+    sent: list[object] = []
+    monkeypatch.setattr("dvclive.studio.post_live_metrics", lambda *a, **k: sent.append(a))
+    run(scene, params(), tmp_path)
+    assert not sent
 
 
 def test_divergence_is_caught_and_the_last_checkpoint_kept(
