@@ -173,7 +173,7 @@ class ReconstructParams(Section):
 
     method: Literal["poisson"] = "poisson"
     resolution: Annotated[int, Field(ge=8)] | None = None
-    depth: Annotated[int, Field(ge=4, le=12)] = 8
+    depth: Annotated[int, Field(ge=4, le=12)] = 7
     point_weight: Annotated[float, Field(ge=0)] = 4.0
     trim: Annotated[float, Field(gt=0)] = 2.0
 
