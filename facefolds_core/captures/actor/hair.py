@@ -29,7 +29,7 @@ _AXIS: Vector = (0.20, 0.80, -0.5657)
 _ACROSS_1: Vector = (0.9701, -0.2425, 0.0)
 _ACROSS_2: Vector = (-0.1372, -0.5488, -0.8246)
 STEP = 2.5
-_FULL = 0.20
+_FULL = 0.17
 """Extinction of dense hair, per mm."""
 
 
@@ -73,11 +73,11 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
 def density(x: float, y: float, z: float, amount: float, seed: int) -> tuple[float, float, float, float]:
     """Extinction per mm at a point, with what shading needs: (extinction, depth below the outline, locks, strands)."""
     d = envelope(x, y, z)
-    if d > 7.0:
+    if d > 10.0:
         return 0.0, d, 0.5, 0.5
     locks, fine = strands(x, y, z, seed)
     inside = -(d + 9.0 * (locks - 0.45))
-    body = smoothstep(-3.0, 11.0, inside)
+    body = smoothstep(-6.0, 15.0, inside)
     if body <= 0.0:
         return 0.0, d, locks, fine
     # Near the outline only the thickest strands remain.

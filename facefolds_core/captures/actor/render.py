@@ -95,8 +95,8 @@ def _hair(
     while t < stop:
         x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
         outside = envelope(x, y, z)
-        if outside > 8.0:
-            t += max(0.8 * (outside - 6.0), STEP)
+        if outside > 10.0:
+            t += max(0.8 * (outside - 8.0), STEP)
             continue
         step = min(STEP, stop - t)
         half = t + 0.5 * step

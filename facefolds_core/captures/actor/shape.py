@@ -190,8 +190,9 @@ def shirt(x: float, y: float, z: float) -> float:
     d = ellipsoid(ax - 62.0, y + 262.0, z + 38.0, 135.0, 84.0, 74.0)
     d = smooth_min(d, ellipsoid(x, y + 300.0, z + 25.0, 130.0, 130.0, 95.0), 25.0)
     tilt = y + 172.0 + 0.22 * (z + 36.0)
-    ring = math.sqrt((math.sqrt(x * x + (z + 36.0) ** 2) - 55.0) ** 2 + tilt * tilt) - 7.0
-    return smooth_min(d, ring, 12.0)
+    # A rounded disc that the neck pierces, so that nothing shows between them.
+    beyond = max(math.sqrt(x * x + (z + 36.0) ** 2) - 56.0, 0.0)
+    return smooth_min(d, math.sqrt(beyond * beyond + tilt * tilt) - 7.0, 12.0)
 
 
 @compiled
