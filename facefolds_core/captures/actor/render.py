@@ -1,6 +1,6 @@
 """Rays, hair, light: the actor's own renderer. It shares nothing with the product's rendering but the `Camera`.
 
-Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour, opacity or depth, the
+Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour or opacity, the
 pixel becomes the mean of that sample and three more around it. Nothing is random: a picture depends on its arguments
 only.
 """
@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 
 _DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
-_DEPTH_JUMP = 4.0
-"""Likewise in depth, mm."""
 _BOUND = 480.0
 """Everything opaque lies within this distance of the head's origin, mm."""
 
@@ -175,9 +173,6 @@ def _differs(image: Array, i: int, j: int) -> bool:
             for c in range(4):
                 if abs(image[a, b, c] - image[i, j, c]) > _DIFFERENT:
                     return True
-            one, other = image[a, b, 4], image[i, j, 4]
-            if (one < math.inf) != (other < math.inf) or (one < math.inf and abs(one - other) > _DEPTH_JUMP):
-                return True
     return False
 
 
