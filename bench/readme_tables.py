@@ -1,7 +1,7 @@
 """Write the tables of the README from data/<subject>/metrics.json, so that no figure is typed by hand.
 
-    python bench/readme_tables.py            prints them
-    python bench/readme_tables.py --write    replaces the part of README.md between the markers
+python bench/readme_tables.py            prints them
+python bench/readme_tables.py --write    replaces the part of README.md between the markers
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ PAPER_ROWS = [
     "| paper, 002914589, R^m = 32 | 29.12 | 0.831 | LPIPS 0.291 | | | | 9 962 | 170 KB + 5.9 MB | V100, days |",
 ]
 HEADER = [
-    "| | PSNR | SSIM | perceptual | PSNR subject: asset | diffuse | model | triangles | mesh + video | trained on, for |",
+    "| | PSNR | SSIM | perceptual | PSNR of the subject: asset | diffuse | model "
+    "| triangles | mesh + video | trained on, for |",
     "|---|---|---|---|---|---|---|---|---|---|",
 ]
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tqdm import tqdm
-
 from facefolds_core.captures.actor import write_capture
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.progress import progress
 from stages.common import run_stage
 
 
@@ -36,7 +35,7 @@ def capture(folders: SubjectFolders) -> str:
 
 def _generate(folders: SubjectFolders, subject: Subject, params: CaptureParams) -> str:
     count = params.cameras * params.frames
-    with tqdm(total=count, desc="capture", unit="picture") as bar, atomic_folder(folders.capture) as temporary:
+    with progress(total=count, desc="capture", unit="picture") as bar, atomic_folder(folders.capture) as temporary:
         write_capture(temporary, params, lambda: bar.update())
         _write_source(temporary, subject)
     return f"{count} pictures of {params.width} x {params.height} in {folders.capture}"

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
 from facefolds_core.captures.frames import Image, write_frames
@@ -22,6 +21,7 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
+from facefolds_core.progress import progress
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
 
 def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:
     capture, scene = plan.capture, plan.scene
-    for row in tqdm(plan.rows, desc="normalize", unit="image"):
+    for row in progress(plan.rows, desc="normalize", unit="image"):
         photo = decode_image(capture.images[row.source], capture.place(*row.source))
         values = downsample(_straight(plan, row, photo), scene.width, scene.height)
         yield row.camera, row.frame, to_8bit(display_colour(values) if params.display_colour else values)

@@ -16,10 +16,10 @@ from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids, write_textures
-from facefolds_core.export.stores import TexturedMesh
 from facefolds_core.export.textures import resample_store
 from facefolds_core.export.window import visible_window
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams, ReconstructParams
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.ellipsoids import Ellipsoids

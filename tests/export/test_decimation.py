@@ -16,7 +16,8 @@ from facefolds_core.export.decimation import (
 )
 from facefolds_core.export.poisson import boundary_loops, gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.stores import Grids, Surface
+from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.params import DecimateParams, ReconstructParams
 from tests.ellipsoids import Ellipsoids

@@ -18,7 +18,7 @@ from facefolds_core.export.poisson import (
     reconstruct_layers,
 )
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.stores import Surface
+from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv
 from facefolds_core.params import ReconstructParams
 from tests.ellipsoids import Ellipsoids

@@ -13,8 +13,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.stores import (
     Grids,
-    Surface,
-    TexturedMesh,
     read_grids,
     read_meshes,
     read_surfaces,
@@ -22,6 +20,7 @@ from facefolds_core.export.stores import (
     write_meshes,
     write_surfaces,
 )
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from tests.ellipsoids import Ellipsoids
 
 TRIANGLE = TexturedMesh(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from facefolds_core.asset import LayerMesh
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_st
 from facefolds_core.rendering import AssetCaster
 from tests.assets import WINDOW, cap_mesh
@@ -18,7 +18,7 @@ RADII = (0.36, 0.30)
 
 @dataclass(frozen=True)
 class Caps:
-    layers: tuple[LayerMesh, ...]
+    layers: tuple[TexturedMesh, ...]
 
     def frame(self, k: int) -> np.ndarray:
         raise NotImplementedError

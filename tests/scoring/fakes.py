@@ -11,9 +11,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.asset import Asset, LayerMesh
+from facefolds_core.asset import Asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
 from tests.scenes import look_at_origin, make_scene
@@ -73,10 +74,10 @@ class FlatAsset:
         return len(self.frames_)
 
     @property
-    def layers(self) -> tuple[LayerMesh, ...]:
+    def layers(self) -> tuple[TexturedMesh, ...]:
         st = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
         vertices = np.stack([np.zeros(4), 0.7 * st[:, 0] - 0.35, 0.35 - 0.7 * st[:, 1]], 1).astype(np.float32)
-        return (LayerMesh(vertices, np.array([[0, 2, 1], [1, 2, 3]], np.int32), st),)
+        return (TexturedMesh(vertices, np.array([[0, 2, 1], [1, 2, 3]], np.int32), st),)
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         for frame in self.frames_:
