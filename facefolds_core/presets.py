@@ -31,6 +31,7 @@ PAPER: dict[str, Any] = {
 
 QUICK: dict[str, Any] = {
     **PAPER,
+    "layers": 6,
     "manifold_start": "surface",
     "manifold_width": 64,
     "texture_layers": 4,
@@ -38,11 +39,9 @@ QUICK: dict[str, Any] = {
     "uv_frequencies": 7,
     "search_samples": 24,
     "rays": 2048,
-    "iterations": 2_400,
-    "lr_manifold": 2e-4,
+    "iterations": 4_000,
     "lr_texture": 4e-3,
-    "lambda_reg": 1e-6,
-    "decay_interval": 2_400,
+    "decay_interval": 4_000,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {"paper": PAPER, "quick": QUICK}
