@@ -35,9 +35,14 @@ def atomic_file(target: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(target: str | Path) -> Iterator[Path]:
-    """Yield a temporary folder beside `target`; on success it replaces `target` whole, on failure it is deleted."""
+    """Yield a temporary folder beside `target`; on success it replaces `target` whole, on failure it is deleted.
+
+    What a killed run left behind under a temporary name is deleted first: one process at a time may write `target`.
+    """
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
+    for leftover in target.parent.glob(f".{target.name}-????????"):
+        shutil.rmtree(leftover, ignore_errors=True)
     temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
     try:
         yield temporary

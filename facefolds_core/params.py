@@ -95,7 +95,7 @@ class TrainParams(Section):
         seed: of initialisation and ray sampling.
         layers: N, number of manifolds.
         level_halfwidth: the N levels lie within this distance of the face surface, units.
-        manifold_start: "sphere" (the paper's), or "surface": the tracked mesh, where there is one, by a short regression
+        manifold_start: "sphere" (the paper's), or "surface": the tracked mesh, where there is one, by a short fit
             before training; without one it is the sphere.
         manifold_layers, manifold_width: hidden layers of the manifold predictor.
         texture_layers, texture_width: hidden layers of the texture predictor.
@@ -173,7 +173,7 @@ class ReconstructParams(Section):
 
     method: Literal["poisson"] = "poisson"
     resolution: Annotated[int, Field(ge=8)] | None = None
-    depth: Annotated[int, Field(ge=4, le=12)] = 8
+    depth: Annotated[int, Field(ge=4, le=12)] = 7
     point_weight: Annotated[float, Field(ge=0)] = 4.0
     trim: Annotated[float, Field(gt=0)] = 2.0
 
@@ -226,9 +226,9 @@ class VideoCodec(Section):
 
     codec: Literal["h264"] = "h264"
     crf: Annotated[int, Field(ge=0, le=51)] = 18
-    preset: Literal[
-        "ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"
-    ] = "medium"
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
+        "medium"
+    )
 
 
 class CompressParams(Section):

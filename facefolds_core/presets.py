@@ -31,16 +31,17 @@ PAPER: dict[str, Any] = {
 
 QUICK: dict[str, Any] = {
     **PAPER,
+    "layers": 6,
     "manifold_start": "surface",
     "manifold_width": 64,
     "texture_layers": 4,
     "texture_width": 96,
-    "search_samples": 48,
+    "uv_frequencies": 7,
+    "search_samples": 24,
     "rays": 2048,
-    "iterations": 2_000,
-    "lr_manifold": 7e-4,
+    "iterations": 4_000,
     "lr_texture": 4e-3,
-    "decay_interval": 2_000,
+    "decay_interval": 4_000,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {"paper": PAPER, "quick": QUICK}

@@ -23,7 +23,7 @@ def read_capture(subject: Subject, folders: SubjectFolders) -> Capture:
     """The capture of any source."""
     if subject.source == "actor":
         fps = read_stage(CaptureParams, folders.config).fps
-        return read_multiface(folders.capture, subject, fps=fps, pixel_centres=0.5)
+        return read_multiface(folders.capture, subject, fps)
     if subject.source == "multiface":
         return read_multiface(Path(subject.path), subject)
     return read_transforms(Path(subject.path), subject)

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset import AssetSource, LayerMesh, Manifest, write_asset
+from facefolds_core.asset import AssetSource, Manifest, write_asset
 from facefolds_core.captures.frames import FrameStore, write_frames
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
 from facefolds_core.params import CompressParams
@@ -26,7 +27,7 @@ def radius_of(layer: int) -> float:
     return 0.40 - 0.03 * layer
 
 
-def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) -> LayerMesh:
+def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) -> TexturedMesh:
     """A grid over `window` on the sphere of `radius` about CENTRE; faces turn counter-clockwise seen from outside."""
     n = vertices_a_side
     s, t = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
@@ -35,7 +36,7 @@ def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) 
     index = np.arange(n * n).reshape(n, n)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
     faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
-    return LayerMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+    return TexturedMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
 
 
 def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:

@@ -1,8 +1,7 @@
 """RGB <-> Y'CbCr 4:2:0, BT.709, limited range, chroma sited left: the one conversion of the asset's video.
 
-Own code rather than swscale's: PyAV has no way to name the siting, and swscale then takes chroma to be centred
-horizontally, half a pixel from where H.264 puts it by default: 42 dB instead of 50 on a fine texture, before the codec,
-in a round trip through a decoder that follows the standard.
+Own code rather than swscale's: PyAV has no way to name the siting, and swscale (measured) does not place chroma there:
+on a fine texture, before the codec, its frames read by a decoder that follows the standard give 42 dB, ours 50.
 
 Matrix (ITU-R BT.709-6, items 3.2 and 3.3), with R, G, B, Y' in [0, 1] and Cb, Cr in [-0.5, 0.5]:
 Y' = 0.2126 R + 0.7152 G + 0.0722 B, Cb = (B - Y') / 1.8556, Cr = (R - Y') / 1.5748; codes 16 + 219 Y', 128 + 224 C.

@@ -10,31 +10,15 @@ Keeping the order costs space where values are quantised (400 vertices, 14/12 bi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import DracoPy
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import MeshCodec
 
 DEGENERATE = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
-
-
-@dataclass(frozen=True)
-class LayerMesh:
-    """One layer's surface.
-
-    Attributes:
-        vertices: (V, 3) float32, normalised world.
-        faces: (F, 3) int32 indices into `vertices`.
-        st: (V, 2) float32 in [0, 1], s right, t down from the top left corner of the layer's own texture.
-    """
-
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int32]
-    st: NDArray[np.float32]
 
 
 class DracoError(ValueError):
@@ -49,7 +33,7 @@ def degenerate_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32]) ->
     return np.asarray(np.linalg.norm(np.cross(a, b), axis=-1) <= DEGENERATE * longest)
 
 
-def encode_mesh(mesh: LayerMesh, codec: MeshCodec) -> tuple[bytes, LayerMesh]:
+def encode_mesh(mesh: TexturedMesh, codec: MeshCodec) -> tuple[bytes, TexturedMesh]:
     """Encode a layer.
 
     Faces that have no area, or lose it by quantisation, are left out: they cover no pixel. Vertices all stay.
@@ -61,12 +45,12 @@ def encode_mesh(mesh: LayerMesh, codec: MeshCodec) -> tuple[bytes, LayerMesh]:
     decoded = decode_mesh(data)
     flat = degenerate_faces(decoded.vertices, decoded.faces)
     if flat.any() and not flat.all():
-        data = _encode(LayerMesh(mesh.vertices, mesh.faces[~flat], mesh.st), codec)
+        data = _encode(TexturedMesh(mesh.vertices, mesh.faces[~flat], mesh.st), codec)
         decoded = decode_mesh(data)
     return data, decoded
 
 
-def _encode(mesh: LayerMesh, codec: MeshCodec) -> bytes:
+def _encode(mesh: TexturedMesh, codec: MeshCodec) -> bytes:
     quantized = codec.quantization_bits > 0
     return bytes(
         DracoPy.encode(
@@ -83,7 +67,7 @@ def _encode(mesh: LayerMesh, codec: MeshCodec) -> bytes:
     )
 
 
-def decode_mesh(data: bytes) -> LayerMesh:
+def decode_mesh(data: bytes) -> TexturedMesh:
     """Decode a layer.
 
     Raises:
@@ -102,4 +86,4 @@ def decode_mesh(data: bytes) -> LayerMesh:
     st = np.asarray(st, np.float32)
     if st.shape != (len(vertices), 2):
         raise DracoError(f"texture coordinates of shape {st.shape} for {len(vertices)} vertices")
-    return LayerMesh(vertices, np.asarray(faces).astype(np.int32), st)
+    return TexturedMesh(vertices, np.asarray(faces).astype(np.int32), st)

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset.draco import DracoError, LayerMesh, decode_mesh
+from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.manifest import MANIFEST_NAME, REMEDY, Manifest, parse_manifest, seal_is_whole
 from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import file_sha256
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.meshes import TexturedMesh
 
 Frame = NDArray[np.uint8]
 """(N, R, R, 4) RGBA, straight alpha, layers outermost first, row 0 at the top of the head."""
@@ -33,7 +34,7 @@ class Asset:
 
     folder: Path
     manifest: Manifest
-    layers: tuple[LayerMesh, ...]
+    layers: tuple[TexturedMesh, ...]
 
     @property
     def num_layers(self) -> int:
@@ -173,7 +174,7 @@ def read_asset(folder: str | Path) -> Asset:
     return Asset(folder, manifest, tuple(layers))
 
 
-def mesh_problems(mesh: LayerMesh, vertices: int, triangles: int) -> list[str]:
+def mesh_problems(mesh: TexturedMesh, vertices: int, triangles: int) -> list[str]:
     """What makes a decoded mesh unusable or different from its manifest's counts, in words."""
     problems = []
     if len(mesh.vertices) != vertices:

@@ -156,11 +156,13 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             if not container.streams.video:
                 raise _damaged(path, "it has no video stream")
             stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise _damaged(path, "its video stream is of no known codec")
             stream.thread_type = "AUTO"
             yield container, stream
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy="make the asset again, or copy it again") from None
-    except FFmpegError as error:
+    except (FFmpegError, UnicodeDecodeError) as error:  # PyAV decodes the container's metadata as text
         raise _damaged(path, str(error)) from None
 
 

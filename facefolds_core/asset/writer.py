@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core import __version__
-from facefolds_core.asset.draco import LayerMesh, encode_mesh
+from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Coordinates,
@@ -26,6 +26,7 @@ from facefolds_core.asset.video import Picture, encode_video, pack_frame, probe_
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import CompressParams
@@ -54,7 +55,7 @@ class AssetSource:
 
 def write_asset(
     folder: str | Path,
-    meshes: Sequence[LayerMesh],
+    meshes: Sequence[TexturedMesh],
     windows: Sequence[Window],
     textures: FrameStore,
     source: AssetSource,
@@ -101,7 +102,7 @@ def write_asset(
 
 
 def _write_layer(
-    folder: Path, index: int, mesh: LayerMesh, window: Window, layout: AtlasLayout, params: CompressParams
+    folder: Path, index: int, mesh: TexturedMesh, window: Window, layout: AtlasLayout, params: CompressParams
 ) -> Layer:
     name = f"layer_{index:02d}.drc"
     data, decoded = encode_mesh(mesh, params.mesh)
@@ -172,7 +173,7 @@ def _check_textures(textures: FrameStore, layers: int) -> int:
     return frames
 
 
-def _check_mesh(mesh: LayerMesh, place: str) -> None:
+def _check_mesh(mesh: TexturedMesh, place: str) -> None:
     problem = None
     if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
         problem = "no faces"

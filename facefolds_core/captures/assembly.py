@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
 from facefolds_core.captures.frames import Image, write_frames
 from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
-from facefolds_core.captures.lens import undistort
+from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
 from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.errors import UserError
@@ -21,6 +21,7 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
+from facefolds_core.progress import progress
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
 
 
 def _stabilizing(capture: Capture, params: NormalizeParams) -> list[Similarity]:
-    """For each frame of the capture, what moves its world so that the head stands still; identities if not asked for."""
+    """For each frame of the capture, what moves its world so that the head stands still; else identities."""
     if not params.stabilize:
         return [Similarity.identity()] * len(capture.frame_ids)
     if capture.tracking is None:
@@ -133,9 +134,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
         UserError: if an image is damaged.
     """
     scene, capture = plan.scene, plan.capture
-    masked = [
-        row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks
-    ]
+    masked = [row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks]
     with atomic_folder(scene.folder) as temporary:
         shape = (scene.height, scene.width, 3)
         write_frames(temporary / "frames.arrow", shape, _photos(plan, params))
@@ -148,7 +147,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
 
 def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:
     capture, scene = plan.capture, plan.scene
-    for row in tqdm(plan.rows, desc="normalize", unit="image"):
+    for row in progress(plan.rows, desc="normalize", unit="image"):
         photo = decode_image(capture.images[row.source], capture.place(*row.source))
         values = downsample(_straight(plan, row, photo), scene.width, scene.height)
         yield row.camera, row.frame, to_8bit(display_colour(values) if params.display_colour else values)
@@ -166,4 +165,10 @@ def _straight(plan: Plan, row: Row, photo: Image) -> Image:
     lens = plan.capture.views[row.source[0]].lens
     if lens is None:
         return photo
-    return undistort(photo, lens.maps(photo.shape[1], photo.shape[0]))
+    return undistort(photo, _maps(lens, photo.shape[1], photo.shape[0]))
+
+
+@lru_cache(maxsize=1)
+def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """`Lens.maps`, kept while the frames of one camera are read."""
+    return lens.maps(width, height)

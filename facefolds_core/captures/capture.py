@@ -121,7 +121,7 @@ def select_frames(
 
 
 def frame_rate(subject: Subject, default: float, count: int) -> float:
-    """Frames a second of the frames in use: a range that takes every n-th one divides the rate. 0 for a single frame."""
+    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame."""
     if count < 2:
         return 0.0
     step = subject.frames.step if isinstance(subject.frames, FrameRange) else 1
@@ -146,7 +146,9 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
     has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
     kept = [c for c in cameras if 2 * len(has[c]) >= total]
     left_out = [
-        f"camera {capture.views[c].name}: has {len(has[c])} of {total} frames, fewer than half" for c in cameras if c not in kept
+        f"camera {capture.views[c].name}: has {len(has[c])} of {total} frames, fewer than half"
+        for c in cameras
+        if c not in kept
     ]
     frames = []
     for f in range(total):

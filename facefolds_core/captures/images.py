@@ -107,7 +107,8 @@ def downsample(image: Image, width: int, height: int) -> NDArray[np.float32]:
     """
     values = image.astype(np.float32)
     if image.shape[:2] != (height, width):
-        values = cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)
+        resized = cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA)
+        values = np.asarray(resized, np.float32)
     return values.reshape(height, width, image.shape[2])
 
 

@@ -77,7 +77,11 @@ def read_krt(path: Path) -> list[Calibration]:
         camera = _camera(block, path)
         if any(camera.name == other.name for other in cameras):
             raise UserError(
-                "a camera appears twice in KRT", file=path, place=f"line {block[0][0]}", found=camera.name, remedy=_REMEDY
+                "a camera appears twice in KRT",
+                file=path,
+                place=f"line {block[0][0]}",
+                found=camera.name,
+                remedy=_REMEDY,
             )
         cameras.append(camera)
     if not cameras:
@@ -90,7 +94,12 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
     number, name = block[0]
     if len(name.split()) != 1:
         raise UserError(
-            "garbled KRT", file=path, place=f"line {number}", expected="the name of a camera", found=repr(name), remedy=_REMEDY
+            "garbled KRT",
+            file=path,
+            place=f"line {number}",
+            expected="the name of a camera",
+            found=repr(name),
+            remedy=_REMEDY,
         )
     rows = [
         _numbers(text, count, path, f"line {line} (camera {name})")
@@ -119,11 +128,11 @@ def krt_reference(
     so the one with the smaller median distance |c / size - 1/2| holds, if that is under 1/4.
 
     Args:
-        image: (width, height) of the images at hand.
+        image: (width, height) of most images at hand.
         given: `krt_size` of params.yaml, which overrides.
 
     Returns:
-        (width, height), and a note where it was found out and differs from neither hypothesis trivially.
+        (width, height), and a note on what was found out, None where there was nothing to find.
 
     Raises:
         UserError: if neither hypothesis fits.
@@ -140,7 +149,7 @@ def krt_reference(
         raise UserError(
             "cannot tell which image size KRT refers to",
             file=path,
-            expected=f"principal points near the middle of {image[0]} x {image[1]} or of {FULL_SIZE[0]} x {FULL_SIZE[1]}",
+            expected=f"principal points near the middle of {image[0]} x {image[1]} or {FULL_SIZE[0]} x {FULL_SIZE[1]}",
             found=words,
             remedy="set `krt_size: [width, height]` of this subject in params.yaml",
         )
@@ -149,7 +158,7 @@ def krt_reference(
     return best, note
 
 
-def pinhole_K(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
+def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
     """K of KRT -> K for the images at hand in continuous coordinates (docs/conventions.md).
 
     Args:

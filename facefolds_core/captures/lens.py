@@ -13,19 +13,19 @@ from facefolds_core.errors import UserError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lens:
     """The intrinsics of a photo with distortion, and of the pinhole image made from it.
 
     Attributes:
         K: (3, 3) of the photo; continuous pixel coordinates, as everywhere.
         coefficients: (5,) k1, k2, p1, p2, k3.
-        pinhole_K: (3, 3) of the undistorted image, which has the same size.
+        pinhole: (3, 3) of the undistorted image, which has the same size.
     """
 
     K: Array
     coefficients: Array
-    pinhole_K: Array
+    pinhole: Array
 
     def distort(self, points: Array) -> Array:
         """Ideal image-plane points (..., 2), X_c / Z_c, -> where the lens puts them, pixels (..., 2) of the photo."""
@@ -46,10 +46,10 @@ class Lens:
     def source_of(self, pixels: Array) -> Array:
         """Pixels (..., 2) of the undistorted image -> pixels (..., 2) of the photo."""
         homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
-        return self.distort((homogeneous @ np.linalg.inv(self.pinhole_K).T)[..., :2])
+        return self.distort((homogeneous @ np.linalg.inv(self.pinhole).T)[..., :2])
 
     def maps(self, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """For each pixel of the undistorted image, where to sample the photo: x and y (height, width), for `cv2.remap`."""
+        """Where each pixel of the undistorted image samples the photo: x and y (height, width), for `cv2.remap`."""
         x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
         # cv2.remap counts from the centre of the first pixel; our coordinates count from its corner.
         source = self.source_of(np.stack([x, y], -1)) - 0.5
@@ -58,8 +58,8 @@ class Lens:
 
 def undistort(image: NDArray[np.uint8], maps: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
     """(H, W, C) photo -> (H, W, C) pinhole image, sampled bicubically at `Lens.maps`."""
-    straight: NDArray[np.uint8] = cv2.remap(image, *maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    return straight.reshape(image.shape)
+    straight = cv2.remap(image, *maps, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(straight, np.uint8).reshape(image.shape)
 
 
 def make_lens(K: Array, coefficients: Array, width: int, height: int, file: object, place: str) -> Lens | None:
@@ -114,5 +114,7 @@ def _recentre(K: Array, factor: float) -> Array:
 def _border(width: int, height: int) -> Array:
     """(M, 2) centres of the outermost pixels."""
     x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
-    sides = [(x, np.full_like(x, v)) for v in (0.5, height - 0.5)] + [(np.full_like(y, v), y) for v in (0.5, width - 0.5)]
+    sides = [(x, np.full_like(x, v)) for v in (0.5, height - 0.5)] + [
+        (np.full_like(y, v), y) for v in (0.5, width - 0.5)
+    ]
     return np.concatenate([np.stack(side, -1) for side in sides])

@@ -10,13 +10,14 @@ Cameras, frames or images may be missing; what is not used is named in `Capture.
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
-from facefolds_core.captures.krt import Calibration, krt_reference, pinhole_K, read_krt
+from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
@@ -28,13 +29,13 @@ PIXEL_CENTRES = 0.0
 """OpenCV's calibration, from which Multiface's KRT comes, puts the centre of the first pixel at 0."""
 
 
-def read_multiface(root: Path, subject: Subject, fps: float = FPS, pixel_centres: float = PIXEL_CENTRES) -> Capture:
+def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     """Read everything but the pixels.
 
     Args:
         root: folder with KRT.
         subject: its `segment`, `frames`, `krt_size`, `pixel_centres` and `fps` are used.
-        fps, pixel_centres: where the subject leaves them null.
+        fps: where the subject leaves it null.
 
     Raises:
         UserError: for a file that is missing or damaged, and a segment or frame that does not exist.
@@ -49,7 +50,7 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS, pixel_centres
     frames = select_frames(names, subject.frames, root / "images" / segment, f"segment {segment}")
     tracking, frames, lines = read_tracking(root / "tracked_mesh" / segment, frames)
     left_out += lines
-    views, note = _views(used, photos, root, subject, pixel_centres)
+    views, note = _views(used, photos, root, subject)
     left_out += [note] if note else []
     images = {
         (c, f): photos[view.name][name]
@@ -81,7 +82,12 @@ def _segment(root: Path, wanted: str | None) -> str:
     else:
         problem, remedy = "no such segment", "correct `segment` of this subject in params.yaml"
     raise UserError(
-        problem, file=folder, place="segment", expected=f"one of {shorten(segments, 100)}" if segments else None, found=wanted, remedy=remedy
+        problem,
+        file=folder,
+        place="segment",
+        expected=f"one of {shorten(segments, 100)}" if segments else None,
+        found=wanted,
+        remedy=remedy,
     )
 
 
@@ -122,19 +128,19 @@ def _cameras(
 
 
 def _views(
-    used: list[Calibration], photos: dict[str, dict[str, Path]], root: Path, subject: Subject, pixel_centres: float
+    used: list[Calibration], photos: dict[str, dict[str, Path]], root: Path, subject: Subject
 ) -> tuple[tuple[View, ...], str | None]:
     """Cameras for the images at hand, and a note on the size that KRT refers to."""
     sizes = []
     for camera in used:
         frame, path = next(iter(photos[camera.name].items()))
         sizes.append(image_size(path, f"camera {camera.name}, frame {frame}"))
-    reference, note = krt_reference(used, sizes[0], subject.krt_size, root / "KRT")
-    centres = pixel_centres if subject.pixel_centres is None else subject.pixel_centres
+    reference, note = krt_reference(used, Counter(sizes).most_common(1)[0][0], subject.krt_size, root / "KRT")
+    centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
     views = []
     for calibration, size in zip(used, sizes, strict=True):
-        K = pinhole_K(calibration.K, reference, size, centres)
+        K = scaled_intrinsics(calibration.K, reference, size, centres)
         lens = make_lens(K, calibration.distortion, *size, root / "KRT", f"camera {calibration.name}")
-        pinhole = K if lens is None else lens.pinhole_K
+        pinhole = K if lens is None else lens.pinhole
         views.append(View(Camera(calibration.name, np.array(pinhole), closest_rotation(calibration.w2c), *size), lens))
     return tuple(views), note

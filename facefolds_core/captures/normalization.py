@@ -1,4 +1,4 @@
-"""From a capture's world to the normalised one: centre, orientation, scale; which cameras are used and which held out."""
+"""From a capture's world to the normalised one: centre, orientation, scale; cameras culled and held out."""
 
 from __future__ import annotations
 
@@ -74,7 +74,11 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
                 place="front",
                 remedy="set `front` of this subject in params.yaml to a camera that faces it, upright",
             )
-        return centre, orientation(facing, up), ["note: no `front` camera and no tracked mesh; +x is the cameras' mean direction"]
+        return (
+            centre,
+            orientation(facing, up),
+            ["note: no `front` camera and no tracked mesh; +x is the cameras' mean direction"],
+        )
     names = [camera.name for camera in cameras]
     if front not in names:
         raise UserError(
@@ -92,9 +96,9 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
 def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similarity, list[str]]:
     """Capture -> normalised coordinates, and notes.
 
-    Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh, centre
-    and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject faces
-    against the viewing direction of the camera `front`, whose image is upright.
+    Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh,
+    centre and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject
+    faces against the viewing direction of the camera `front`, whose image is upright.
 
     Raises:
         UserError: if the front camera does not exist, or all cameras stand in the centre.
@@ -119,7 +123,9 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
 def stabilizing_similarities(tracking: Tracking) -> list[Similarity]:
     """For each frame, world -> the world in which the head has its mean pose."""
     facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
-    still = Similarity(1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0))
+    still = Similarity(
+        1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0)
+    )
     return [still.after(Similarity(1.0, pose[:, :3], pose[:, 3]).inverse()) for pose in tracking.poses]
 
 
@@ -127,7 +133,7 @@ def view_angles(cameras: Sequence[Camera]) -> Array:
     """(C, 2) elevation and azimuth of normalised cameras as the subject sees them, degrees; azimuth in -180..180."""
     centres = np.array([camera.centre for camera in cameras])
     elevation = np.arcsin(np.clip(centres[:, 2] / np.linalg.norm(centres, axis=1), -1, 1))
-    return np.degrees(np.stack([elevation, np.arctan2(centres[:, 1], centres[:, 0])], -1))
+    return np.asarray(np.degrees(np.stack([elevation, np.arctan2(centres[:, 1], centres[:, 0])], -1)))
 
 
 @dataclass(frozen=True)
@@ -166,10 +172,8 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
     return Culling([int(i) for i in np.flatnonzero(inside)], lines)
 
 
-def split_cameras(
-    names: Sequence[str], subject: Subject, unused: Sequence[str], file: object
-) -> tuple[Split, ...]:
-    """"train" or "holdout" for each of the cameras that are used, in their order.
+def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[str], file: object) -> tuple[Split, ...]:
+    """ "train" or "holdout" for each of the cameras that are used, in their order.
 
     `every: n` holds out the cameras at positions p (from 0) with (p + 1) % n == 0.
 

@@ -1,11 +1,12 @@
 """Multiface's tracked mesh: FRAME.obj, FRAME.bin, FRAME_transform.txt.
 
-`.bin` holds float32 (V, 3) in the head frame (y up, face to +z), little-endian; `.obj` has the same vertices in text and
-the faces; the transform is 3 x 4, head -> world, X_w = R X + t.
+`.bin` holds float32 (V, 3) in the head frame (y up, face to +z), little-endian; `.obj` has the same vertices in text
+and the faces; the transform is 3 x 4, head -> world, X_w = R X + t.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,18 +29,19 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
     faces: list[list[int]] = []
     number = 0
     try:
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        for line in path.read_text(encoding="utf-8").splitlines():
+            number += 1
             words = line.split()
             if words and words[0] == "v":
                 vertices.append([float(word) for word in (words[1], words[2], words[3])])
             elif words and words[0] == "f":
                 corners = [int(word.split("/")[0]) - 1 for word in words[1:]]
-                faces += [[corners[0], b, c] for b, c in zip(corners[1:-1], corners[2:], strict=True)]
+                faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
     except (ValueError, IndexError) as error:
         raise UserError(
             "garbled mesh",
             file=path,
-            place=f"line {number + 1 if isinstance(error, UnicodeDecodeError) else number}",
+            place=None if isinstance(error, UnicodeDecodeError) else f"line {number}",
             expected="`v x y z` or `f a b c`",
             found=str(error),
             remedy=_REMEDY,
@@ -89,10 +91,16 @@ def read_pose(path: Path) -> Array:
     except (ValueError, UnicodeDecodeError):
         pose = np.zeros(0)
     if pose.shape != (3, 4):
-        raise UserError("garbled head pose", file=path, expected="3 rows of 4 numbers", found=_start(path), remedy=_REMEDY)
+        raise UserError(
+            "garbled head pose", file=path, expected="3 rows of 4 numbers", found=_start(path), remedy=_REMEDY
+        )
     if not np.isfinite(pose).all():
         raise UserError(
-            "the head pose has numbers that are not finite", file=path, expected="3 rows of 4 finite numbers", found=pose.tolist(), remedy=_REMEDY
+            "the head pose has numbers that are not finite",
+            file=path,
+            expected="3 rows of 4 finite numbers",
+            found=pose.tolist(),
+            remedy=_REMEDY,
         )
     R = pose[:, :3]
     if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
@@ -123,12 +131,17 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
     Raises:
         UserError: for a damaged file, or a mesh whose number of vertices changes.
     """
+
     def meshes(name: str) -> tuple[Path, Path, Path]:
         return folder / f"{name}.bin", folder / f"{name}.obj", folder / f"{name}_transform.txt"
 
     tracked = [n for n in frames if meshes(n)[2].exists() and (meshes(n)[0].exists() or meshes(n)[1].exists())]
     if not tracked:
-        return None, frames, [f"tracked mesh: none in {folder} with its _transform.txt; cameras give centre and orientation"]
+        return (
+            None,
+            frames,
+            [f"tracked mesh: none in {folder} with its _transform.txt; cameras give centre and orientation"],
+        )
     left_out = [f"frame {name}: no tracked mesh or no head pose" for name in frames if name not in tracked]
     topology = next((meshes(name)[1] for name in tracked if meshes(name)[1].exists()), None)
     faces, count = None, None

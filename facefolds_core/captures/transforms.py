@@ -1,8 +1,8 @@
 """transforms.json of nerfstudio and instant-ngp.
 
 Each entry of `frames` names an image and its camera -> world matrix with OpenGL axes (x right, y up, z backward).
-Intrinsics (fl_x, fl_y, cx, cy, w, h, or camera_angle_x / camera_angle_y) and distortion (k1, k2, k3, p1, p2) stand there
-or once at the top. Pixel coordinates are continuous (the first pixel's centre at 0.5), as instant-ngp reads them.
+Intrinsics (fl_x, fl_y, cx, cy, w, h, or camera_angle_x / camera_angle_y) and distortion (k1, k2, k3, p1, p2) stand
+there or once at the top. Pixel coordinates are continuous (the first pixel's centre at 0.5), as instant-ngp reads them.
 
 A static capture has one image a camera. A dynamic one shows each camera, that is each matrix, several times: entries
 differ by a `time` key, or by the folder or name of the image.
@@ -41,13 +41,14 @@ class Entry:
     """One entry of `frames`, with the global values filled in.
 
     Attributes:
-        place: where it stands, for messages.
+        file, place: where it stands, for messages.
         label: its file_path.
         image: the file, or None where it is missing.
         values: the entry's keys over the global ones.
         w2c: (3, 4) world -> camera, OpenCV axes.
     """
 
+    file: Path
     place: str
     label: str
     image: Path | None
@@ -66,7 +67,7 @@ def _fail(path: Path, place: str, message: str, expected: object, found: object,
 def _number(entry: Entry, key: str) -> float:
     value = entry.values[key]
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _fail(Path(entry.values["_file"]), f"{entry.place}, {key}", "not a number", "a finite number", repr(value))
+        raise _fail(entry.file, f"{entry.place}, {key}", "not a number", "a finite number", repr(value))
     return float(value)
 
 
@@ -84,13 +85,17 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     value = read_json(path, remedy="point `path` at the folder that holds transforms.json, or make the file again")
     if not isinstance(value, dict) or not isinstance(value.get("frames"), list) or not value["frames"]:
         raise _fail(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
-    common = {key: entry for key, entry in value.items() if key != "frames"} | {"_file": str(path)}
+    common = {key: entry for key, entry in value.items() if key != "frames"}
     entries = [_entry(e, common, path, f"frames[{i}]") for i, e in enumerate(value["frames"])]
     left_out = [f"{e.place}: no image {e.label}" for e in entries if e.image is None]
     present = [e for e in entries if e.image is not None]
     if not present:
         raise _fail(
-            path, "frames", "none of the images exists", f"{entries[0].label} beside transforms.json", "no such file",
+            path,
+            "frames",
+            "none of the images exists",
+            f"{entries[0].label} beside transforms.json",
+            "no such file",
             "copy the images there, or correct file_path",
         )
     groups, names, frame_of = _arrange(present, path)
@@ -105,7 +110,9 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
             name = frame_of[entry.place]
             if name in position and entry.image is not None:
                 if (c, position[name]) in images:
-                    raise _fail(path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label)
+                    raise _fail(
+                        path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label
+                    )
                 images[c, position[name]] = entry.image
     rate = frame_rate(subject, FPS, len(frames))
     return Capture(path.parent, views, tuple(frames), rate, images, {}, None, tuple(left_out))
@@ -113,18 +120,23 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
 
 def _entry(value: Any, common: dict[str, Any], path: Path, place: str) -> Entry:
     if not isinstance(value, dict):
-        raise _fail(path, place, "an entry that is no object", "{file_path, transform_matrix, ...}", type(value).__name__)
+        raise _fail(
+            path, place, "an entry that is no object", "{file_path, transform_matrix, ...}", type(value).__name__
+        )
     label = value.get("file_path")
     if not isinstance(label, str) or not label:
         raise _fail(path, f"{place}, file_path", "a key is missing", "the path of an image", repr(label))
     if "transform_matrix" not in value:
         raise _fail(path, f"{place} ({label}), transform_matrix", "a key is missing", "a 4 x 4 matrix", "nothing")
-    return Entry(f"{place} ({label})", label, _find(path.parent, label), common | value, _w2c(value, path, f"{place} ({label})"))
+    place = f"{place} ({label})"
+    return Entry(path, place, label, _find(path.parent, label), common | value, _w2c(value, path, place))
 
 
 def _find(folder: Path, label: str) -> Path | None:
     """The image's file; instant-ngp also writes paths without extension."""
-    candidates = [folder / label] + [folder / f"{label}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".JPG", ".PNG")]
+    candidates = [folder / label] + [
+        folder / f"{label}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".JPG", ".PNG")
+    ]
     return next((candidate for candidate in candidates if candidate.is_file()), None)
 
 
@@ -143,7 +155,10 @@ def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
     rotation = c2w[:3, :3] @ np.diag([1.0, -1.0, -1.0])
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
         raise _fail(
-            path, place, "a camera matrix is no rotation and translation", "orthonormal columns, determinant +1",
+            path,
+            place,
+            "a camera matrix is no rotation and translation",
+            "orthonormal columns, determinant +1",
             f"det = {np.linalg.det(c2w[:3, :3]):.6g}",
         )
     inverse = closest_rotation(np.concatenate([rotation.T, np.zeros((3, 1))], 1))
@@ -165,8 +180,11 @@ def _arrange(entries: list[Entry], path: Path) -> tuple[dict[str, list[Entry]], 
     if max(len(group) for group in groups) == 1:
         if len(times) > 1:
             raise _fail(
-                path, "time", "every camera is seen at one time only, as from a single moving camera",
-                "cameras that see every frame", f"{len(groups)} cameras, {len(times)} times",
+                path,
+                "time",
+                "every camera is seen at one time only, as from a single moving camera",
+                "cameras that see every frame",
+                f"{len(groups)} cameras, {len(times)} times",
                 "use a capture of several fixed cameras; for a static scene, take the `time` keys out",
             )
         names = _unique([_stem_and_folder(group[0]) for group in groups])
@@ -218,8 +236,12 @@ def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
     for key, size in (("w", width), ("h", height)):
         if key in entry.values and _number(entry, key) != size:
             raise _fail(
-                path, f"{entry.place}, {key}", "the image has another size than transforms.json says",
-                entry.values[key], f"{width} x {height} in {entry.image}", "use the images that the file was made for",
+                path,
+                f"{entry.place}, {key}",
+                "the image has another size than transforms.json says",
+                entry.values[key],
+                f"{width} x {height} in {entry.image}",
+                "use the images that the file was made for",
             )
     fx, fy = _focal(entry, width, height, path)
     shift = 0.5 - pixel_centres
@@ -229,7 +251,7 @@ def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
     check_camera(Camera(name, K, entry.w2c, width, height), path, entry.place)
     coefficients = np.array([_number(entry, key) if key in entry.values else 0.0 for key in _DISTORTION])
     lens = make_lens(K, coefficients, width, height, path, entry.place)
-    return View(Camera(name, K if lens is None else lens.pinhole_K, entry.w2c, width, height), lens)
+    return View(Camera(name, K if lens is None else lens.pinhole, entry.w2c, width, height), lens)
 
 
 def _check_model(entry: Entry, path: Path) -> None:
@@ -237,8 +259,12 @@ def _check_model(entry: Entry, path: Path) -> None:
     fisheye = bool(entry.values.get("is_fisheye")) or bool(entry.values.get("k4"))
     if str(model).upper() not in _PINHOLES or fisheye:
         raise _fail(
-            path, entry.place, "a camera model that is not read", f"{shorten(_PINHOLES)}, k1 k2 p1 p2 k3 at most",
-            "k4 or is_fisheye" if fisheye else model, "rectify the images first",
+            path,
+            entry.place,
+            "a camera model that is not read",
+            f"{shorten(_PINHOLES)}, k1 k2 p1 p2 k3 at most",
+            "k4 or is_fisheye" if fisheye else model,
+            "rectify the images first",
         )
 
 

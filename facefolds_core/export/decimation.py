@@ -16,15 +16,16 @@ import fast_simplification
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from tqdm import tqdm
 from trimesh import Trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.poisson import compact, largest_component
-from facefolds_core.export.stores import Grids, Surface, TexturedMesh
+from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, points_to_uv, texel_uv, uv_to_st
 from facefolds_core.params import DecimateParams
+from facefolds_core.progress import progress as progress_bar
 
 AGGRESSIVENESS = (3, 5, 7)
 """Tried in turn: the least that reaches the target is best. 3 does for all but a handful of vertices."""
@@ -69,7 +70,7 @@ def decimate_layers(
             remedy="run `dvc repro`, which makes both again",
         )
     meshes = []
-    for i, surface in enumerate(tqdm(surfaces, desc="decimation", unit="layer", disable=not progress)):
+    for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
         coarse = decimate(surface, params.resolution**2, centre)
         if len(coarse.faces) == 0:
             raise UserError(

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from tqdm import tqdm
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.sampling import row_strides
-from facefolds_core.export.stores import Grids, Surface
+from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.meshes import Surface
 from facefolds_core.params import ReconstructParams
+from facefolds_core.progress import progress as progress_bar
 
 MIN_SAMPLES = 16
 """Fewer valid samples than this make no surface."""
@@ -72,7 +73,7 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool =
     """
     jobs = [(gather_samples(grids, i, params.resolution), params, i) for i in range(grids.num_layers)]
     workers = min(len(jobs), os.cpu_count() or 1)
-    with tqdm(total=len(jobs), desc="surfaces", unit="layer", disable=not progress) as bar:
+    with progress_bar(total=len(jobs), desc="surfaces", unit="layer", disable=not progress) as bar:
         if workers == 1:
             return [_advance(bar, _reconstruct_job(job)) for job in jobs]
         # spawn: a fork of a process that has run torch or pymeshlab threads may hang.

@@ -12,13 +12,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from tqdm import tqdm
 
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.geometry.sphere_uv import Window, texel_uv
+from facefolds_core.progress import progress as progress_bar
 
 DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
@@ -43,7 +43,7 @@ def sample_grids(model: LayeredModel, resolution: int, window: Window, progress:
     points = np.zeros((model.num_layers, resolution, resolution, 3), np.float32)
     valid = np.zeros((model.num_layers, resolution, resolution), bool)
     flat_points, flat_valid = points.reshape(model.num_layers, -1, 3), valid.reshape(model.num_layers, -1)
-    with torch.no_grad(), tqdm(total=len(uv), desc="points", unit="direction", disable=not progress) as bar:
+    with torch.no_grad(), progress_bar(total=len(uv), desc="points", unit="direction", disable=not progress) as bar:
         for start in range(0, len(uv), DIRECTIONS_AT_ONCE):
             stop = start + DIRECTIONS_AT_ONCE
             found, hit = model.surface_points(uv[start:stop])
@@ -140,7 +140,9 @@ def texture_rows(
     for layer in range(grids.num_layers):
         uv = texel_uv(r, r, grids.window(layer))[grids.valid[layer]]
         lookups.append(torch.as_tensor(uv).to(centre))
-    with tqdm(total=model.num_frames * grids.num_layers, desc="textures", unit="image", disable=not progress) as bar:
+    with progress_bar(
+        total=model.num_frames * grids.num_layers, desc="textures", unit="image", disable=not progress
+    ) as bar:
         for frame in range(model.num_frames):
             for layer, uv in enumerate(lookups):
                 image = np.zeros((r, r, 4), np.uint8)

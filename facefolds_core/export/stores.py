@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from facefolds_core.geometry.sphere_uv import Window
 
 _REMEDY = "delete it and run `dvc repro`, which makes it again"
 
@@ -54,30 +56,6 @@ class Grids:
         return u0, u1, v0, v1
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A triangle mesh.
-
-    Attributes:
-        vertices: (V, 3) float32, normalised world.
-        faces: (F, 3) int32, counter-clockwise seen from outside.
-    """
-
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.int32]
-
-
-@dataclass(frozen=True)
-class TexturedMesh(Surface):
-    """A triangle mesh with texture coordinates.
-
-    Attributes:
-        st: (V, 2) float32 in [0, 1], layer-local: s right, t down from the texture's top left corner.
-    """
-
-    st: NDArray[np.float32]
-
-
 def write_grids(path: Path, grids: Grids) -> None:
     _write(path, {"points": grids.points, "normals": grids.normals, "valid": grids.valid, "windows": grids.windows})
 
@@ -92,11 +70,23 @@ def read_grids(path: Path) -> Grids:
         valid=_take(arrays, path, "valid", (n, r, r), np.bool_),
         windows=_take(arrays, path, "windows", (n, 4), np.float64),
     )
-    u0, u1, v0, v1 = grids.windows.T
-    if not ((u0 < u1).all() and (v0 < v1).all() and (np.abs(grids.windows) <= 1).all()):
-        expected = "(u0, u1, v0, v1) with -1 <= u0 < u1 <= 1 and likewise v"
-        raise _damaged(path, "windows", expected, grids.windows.tolist())
+    _check_windows(grids.windows, path)
     return grids
+
+
+def read_windows(path: Path) -> list[Window]:
+    """Only the windows (u0, u1, v0, v1) of the layers in a file of `write_grids`; raises as `read_grids` does."""
+    arrays = _read(path, {"windows"})
+    windows = _take(arrays, path, "windows", (len(arrays.get("windows", ())), 4), np.float64)
+    _check_windows(windows, path)
+    return [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
+
+
+def _check_windows(windows: NDArray[np.float64], path: Path) -> None:
+    u0, u1, v0, v1 = windows.T
+    if not ((u0 < u1).all() and (v0 < v1).all() and (np.abs(windows) <= 1).all()):
+        expected = "(u0, u1, v0, v1) with -1 <= u0 < u1 <= 1 and likewise v"
+        raise _damaged(path, "windows", expected, windows.tolist())
 
 
 def write_surfaces(path: Path, surfaces: Sequence[Surface]) -> None:
@@ -137,14 +127,15 @@ def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         np.savez(temporary, **arrays)  # type: ignore[arg-type]  # numpy's stub takes the ** for its own keyword
 
 
-def _read(path: Path) -> dict[str, NDArray[Any]]:
+def _read(path: Path, names: set[str] | None = None) -> dict[str, NDArray[Any]]:
+    """The archive's arrays by name; all, or those of `names` that are there."""
     try:
         with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+            return {name: archive[name] for name in archive.files if names is None or name in names}
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy="run `dvc repro`, which makes it") from None
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, AttributeError) as error:
-        # AttributeError: np.load of a lone array has no `files`.
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, TypeError, RuntimeError) as error:
+        # TypeError: a lone array is no archive. RuntimeError: flags that make zipfile look for a password.
         raise UserError("a damaged geometry file", file=path, found=str(error), remedy=_REMEDY) from None
 
 

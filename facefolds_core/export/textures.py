@@ -13,10 +13,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.errors import UserError
+from facefolds_core.progress import progress as progress_bar
 
 Float = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -75,7 +75,7 @@ def texture_rows(store: FrameStore, size: int, progress: bool = True) -> Iterato
         (layer, frame, (size, size, 4) uint8).
     """
     keys = sorted(store.keys(), key=lambda key: (key[1], key[0]))
-    for layer, frame in tqdm(keys, desc="textures", unit="image", disable=not progress):
+    for layer, frame in progress_bar(keys, desc="textures", unit="image", disable=not progress):
         yield layer, frame, resample(store.image(layer, frame), size)
 
 

@@ -49,7 +49,7 @@ class Camera:
     @property
     def forward(self) -> Array:
         """(3,) unit viewing direction in the world."""
-        return self.rotation[2]
+        return np.asarray(self.rotation[2])
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """World points (..., 3) -> pixels (..., 2) as (x, y), and depth along the optical axis (...)."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene
@@ -19,6 +18,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
+from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
 from facefolds_core.scoring.model_view import ModelView
@@ -86,7 +86,7 @@ def evaluate(
     caster = AssetCaster(asset)
     scores: list[ImageScore] = []
     panels: list[Panel] = []
-    with tqdm(total=len(held_out) * scene.num_frames, desc="evaluate", unit="image") as bar:
+    with progress(total=len(held_out) * scene.num_frames, desc="evaluate", unit="image") as bar:
         for index in held_out:
             camera = scene.cameras[index]
             for k, images in enumerate(_rendered(model, asset, caster, camera, params.background)):

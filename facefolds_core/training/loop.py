@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import resource
 import shutil
 import time
@@ -80,7 +81,7 @@ def pick_device(name: str) -> torch.device:
 
 
 def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
-    """lr_0 decay^(iteration / interval): the paper's "decay rates of 0.05 and 0.20 per 200 000 iterations" as factors."""
+    """lr_0 decay^(iteration / interval): the paper's decay "of 0.05 and 0.20 per 200 000 iterations" as factors."""
     time_constant = iteration / params.decay_interval
     return {
         "manifold": params.lr_manifold * params.decay_manifold**time_constant,
@@ -155,7 +156,9 @@ class _Progress:
         self.params = params
         self.every = max(1, min(100, params.iterations // LOG_POINTS))
         _trim_log(folder, iteration)
-        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else.
+        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else. A user's token for
+        # DVC Studio must not make dvclive send it anywhere.
+        os.environ["DVC_STUDIO_OFFLINE"] = "true"
         self.live = Live(dir=str(folder), resume=iteration > 0, save_dvc_exp=False, dvcyaml=None, report=None)
         self.bar = tqdm(total=params.iterations, initial=iteration, unit="it", desc="train", mininterval=1.0)
         self.sums: list[float] = []

@@ -55,15 +55,17 @@ class Start:
 def find_start(scene: Scene, layers: int, halfwidth: float) -> Start:
     """Levels within +-`halfwidth` of the face surface, and the ball in which crossings are searched.
 
-    With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of c, and the ball encloses
-    all of them. Without, see `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball
-    reaches `MARGIN` beyond the outermost layer if that lay `halfwidth` outside the surface's farthest point.
+    With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of the scene's centre
+    (x > 0: the face, not the sides of the head), and the ball encloses all outermost vertices. Without, see
+    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `MARGIN` beyond
+    the outermost layer if that lay `halfwidth` outside the surface's farthest point.
     """
     surface = scene.load_surface()
     outline = None
     if surface is not None:
         outline = find_outline(surface[0].astype(np.float64).mean(0))
-        r0, farthest = float(np.median(outline.radii)), float(outline.radii.max())
+        face = SPHERE_CENTRE[0] + outline.radii * outline.directions[:, 0] > 0
+        r0, farthest = float(np.median(outline.radii[face if face.any() else slice(None)])), float(outline.radii.max())
     else:
         r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")])
     offsets = np.linspace(halfwidth, -halfwidth, layers) if layers > 1 else np.zeros(1)

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.asset import LayerMesh, read_asset, write_asset
+from facefolds_core.asset import read_asset, write_asset
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import CENTRE, SOURCE, WINDOW, cap_mesh, cap_textures, make_asset, radius_of, write_store
 
@@ -105,10 +106,10 @@ def test_bad_meshes_are_refused(tmp_path: Path) -> None:
     nan = good.vertices.copy()
     nan[3, 1] = np.nan
     bad = {
-        "not finite": LayerMesh(nan, good.faces, good.st),
-        "outside": LayerMesh(good.vertices, good.faces, good.st + np.float32(0.1)),
-        "not there": LayerMesh(good.vertices, good.faces + 1, good.st),
-        "no faces": LayerMesh(good.vertices, good.faces[:0], good.st),
+        "not finite": TexturedMesh(nan, good.faces, good.st),
+        "outside": TexturedMesh(good.vertices, good.faces, good.st + np.float32(0.1)),
+        "not there": TexturedMesh(good.vertices, good.faces + 1, good.st),
+        "no faces": TexturedMesh(good.vertices, good.faces[:0], good.st),
     }
     for word, mesh in bad.items():
         with pytest.raises(UserError, match=word):

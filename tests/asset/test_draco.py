@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.asset.draco import DracoError, LayerMesh, decode_mesh, degenerate_faces, encode_mesh
+from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces, encode_mesh
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import MeshCodec
 from tests.assets import cap_mesh
 
 
-def shuffled_mesh() -> LayerMesh:
+def shuffled_mesh() -> TexturedMesh:
     """A cap with vertices and faces in random order, one vertex doubled and one unused."""
     rng = np.random.default_rng(0)
     mesh = cap_mesh(0.4, 15)
@@ -19,7 +20,7 @@ def shuffled_mesh() -> LayerMesh:
     faces = np.where(mesh.faces == 0, len(mesh.vertices), mesh.faces)
     order = rng.permutation(len(vertices))
     faces = rng.permutation(np.argsort(order)[faces])
-    return LayerMesh(vertices[order], faces.astype(np.int32), st[order])
+    return TexturedMesh(vertices[order], faces.astype(np.int32), st[order])
 
 
 @pytest.mark.parametrize("level", [0, 7])

@@ -186,6 +186,18 @@ def test_file_that_the_manifest_does_not_name(asset: Path) -> None:
     assert validate_asset(asset) == ["layer_02.drc: not named in the manifest"]
 
 
+def test_damaged_video_with_a_matching_checksum_is_no_traceback(asset: Path) -> None:
+    path, rng = asset / "texture.mp4", np.random.default_rng(0)
+    data, found = path.read_bytes(), 0
+    for place in rng.integers(0, 1200, 60):  # the container's header: the most that can be wrong
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(flipped)
+        edit(asset, lambda value: value["texture"].update(sha256=file_sha256(path)))
+        found += bool(validate_asset(asset))
+    assert found > 0
+
+
 def run_command(folder: Path) -> subprocess.CompletedProcess[str]:
     root = Path(__file__).parents[2]
     return subprocess.run(

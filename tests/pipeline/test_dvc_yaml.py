@@ -68,7 +68,9 @@ def test_a_change_of_texture_resolution_reruns_three_stages(pipeline: dict[str, 
     changed = {"data/${key}/config/texture.json"}
     rerun: list[str] = []
     for name, stage in pipeline.items():
-        if any(dep == c or c.startswith(dep + "/") or dep.startswith(c + "/") for dep in stage["deps"] for c in changed):
+        if any(
+            dep == c or c.startswith(dep + "/") or dep.startswith(c + "/") for dep in stage["deps"] for c in changed
+        ):
             rerun.append(name)
             changed |= set(stage["outs"]) | set(stage.get("metrics", []))
     assert rerun == ["texture", "compress", "evaluate"]

@@ -1,0 +1,28 @@
+"""The embedded actor: a procedural talking head with everything that a capture has, and the truth behind it.
+
+Its renderer is written from nothing (distance functions, sphere tracing, ray-marched hair) and shares no code with the
+product's rendering, so that one can judge the other. docs/actor.md describes it.
+"""
+
+from facefolds_core.captures.actor.capture import SEGMENT, frame_times, write_capture
+from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
+from facefolds_core.captures.actor.motion import PERIOD, head_pose, pose_at
+from facefolds_core.captures.actor.render import ActorOptions, Picture, render
+from facefolds_core.captures.actor.rig import ActorRig, camera_at, make_rig
+
+__all__ = [
+    "PERIOD",
+    "SEGMENT",
+    "ActorOptions",
+    "ActorRig",
+    "Picture",
+    "TrackedMesh",
+    "camera_at",
+    "frame_times",
+    "head_pose",
+    "make_rig",
+    "pose_at",
+    "render",
+    "tracked_mesh",
+    "write_capture",
+]

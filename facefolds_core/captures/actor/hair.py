@@ -1,8 +1,8 @@
 """Volumetric hair: a density around the skull, combed into strands, marched with absorption.
 
 The envelope is a signed distance; the density rises from its edge inwards, cut into locks and strands by noise that is
-drawn out along the strands, so that the outline is thin and semi-transparent. Strands run along the meridians of an axis
-through the crown, slightly twisted.
+drawn out along the strands, so that the outline is thin and semi-transparent. Strands run along the meridians of an
+axis through the crown, slightly twisted.
 """
 
 from __future__ import annotations
@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.jit import compiled
-from facefolds_core.captures.actor.noise import Vector, clamp, ellipsoid, smooth_max, smooth_min, smoothstep, value_noise
+from facefolds_core.captures.actor.noise import (
+    Vector,
+    clamp,
+    ellipsoid,
+    smooth_max,
+    smooth_min,
+    smoothstep,
+    value_noise,
+)
 
 _CENTRE_Y, _CENTRE_Z = 25.0, -12.0
 # Unit axis through the crown, and two unit vectors across it.
@@ -21,7 +29,7 @@ _AXIS: Vector = (0.20, 0.80, -0.5657)
 _ACROSS_1: Vector = (0.9701, -0.2425, 0.0)
 _ACROSS_2: Vector = (-0.1372, -0.5488, -0.8246)
 STEP = 2.5
-_FULL = 0.20
+_FULL = 0.17
 """Extinction of dense hair, per mm."""
 
 
@@ -34,10 +42,9 @@ def envelope(x: float, y: float, z: float) -> float:
     d = smooth_min(d, side, 22.0)
     d = smooth_min(d, ellipsoid(x, y + 40.0, z + 58.0, 84.0, 90.0, 48.0), 25.0)
     # The face stays free: an oval that leans back at the hairline, higher on the side of the parting.
-    part = x + 0.0
-    hairline = 54.0 + 9.0 * math.exp(-(((part - 18.0) / 26.0) ** 2))
+    hairline = 56.0 + 9.0 * math.exp(-(((x - 18.0) / 26.0) ** 2))
     face = ellipsoid(x, y + 22.0, z - 100.0, 66.0, 22.0 + hairline, 84.0)
-    return smooth_max(d, -face, 12.0)
+    return smooth_max(d, -face, 8.0)
 
 
 @compiled
@@ -54,10 +61,11 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
     a, b = (a * c - b * s) / rho, (a * s + b * c) / rho
     locks = value_noise(7.0 * a, 7.0 * b, 1.6 * along + 0.035 * r, seed + 11)
     # The meridians meet at the crown: no locks there.
-    away = smoothstep(0.15, 0.55, rho / r)
-    locks = 0.5 + (locks - 0.5) * away
+    away = smoothstep(0.30, 0.75, rho / r)
+    locks = 0.62 + (locks - 0.62) * away
     fine = value_noise(27.0 * a, 27.0 * b, 2.6 * along + 0.11 * r, seed + 12)
-    fine = 0.5 + (fine - 0.5) * away
+    finest = value_noise(68.0 * a, 68.0 * b, 3.4 * along + 0.25 * r, seed + 13)
+    fine = 0.5 + (0.75 * (fine - 0.5) + 0.55 * (finest - 0.5)) * away
     return locks, fine
 
 
@@ -65,11 +73,11 @@ def strands(x: float, y: float, z: float, seed: int) -> tuple[float, float]:
 def density(x: float, y: float, z: float, amount: float, seed: int) -> tuple[float, float, float, float]:
     """Extinction per mm at a point, with what shading needs: (extinction, depth below the outline, locks, strands)."""
     d = envelope(x, y, z)
-    if d > 7.0:
+    if d > 10.0:
         return 0.0, d, 0.5, 0.5
     locks, fine = strands(x, y, z, seed)
     inside = -(d + 9.0 * (locks - 0.45))
-    body = smoothstep(-3.0, 13.0, inside)
+    body = smoothstep(-6.0, 15.0, inside)
     if body <= 0.0:
         return 0.0, d, locks, fine
     # Near the outline only the thickest strands remain.
@@ -106,8 +114,8 @@ def hair_colour(
     length = max(math.sqrt(tx * tx + ty * ty + tz * tz), 1e-6)
     tx, ty, tz = tx / length, ty / length, tz / length
     shade = 0.25 + 0.75 * smoothstep(-26.0, 2.0, depth) * (0.55 + 0.75 * locks)
-    tone = 0.55 + 0.75 * fine
-    base_r, base_g, base_b = 0.30 * tone + 0.05 * locks, 0.165 * tone + 0.03 * locks, 0.085 * tone + 0.015 * locks
+    tone = 0.35 + 1.15 * fine
+    base_r, base_g, base_b = 0.34 * tone + 0.05 * locks, 0.19 * tone + 0.03 * locks, 0.095 * tone + 0.015 * locks
     red, green, blue = 0.30 * base_r, 0.30 * base_g, 0.30 * base_b
     for i in range(lights.shape[0]):
         lx, ly, lz = lights[i, 0], lights[i, 1], lights[i, 2]

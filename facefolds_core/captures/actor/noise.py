@@ -50,9 +50,7 @@ def ellipsoid(x: float, y: float, z: float, rx: float, ry: float, rz: float) -> 
 
 
 @compiled
-def cone(
-    x: float, y: float, z: float, ay: float, az: float, by: float, bz: float, ra: float, rb: float
-) -> float:
+def cone(x: float, y: float, z: float, ay: float, az: float, by: float, bz: float, ra: float, rb: float) -> float:
     """Approximate distance to a round cone in the plane x = 0, from (ay, az) with radius ra to (by, bz) with rb."""
     dy, dz = by - ay, bz - az
     t = min(max(((y - ay) * dy + (z - az) * dz) / (dy * dy + dz * dz), 0.0), 1.0)

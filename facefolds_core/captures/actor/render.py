@@ -1,7 +1,8 @@
 """Rays, hair, light: the actor's own renderer. It shares nothing with the product's rendering but the `Camera`.
 
-Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour, opacity or depth, the
-pixel becomes the mean of four more samples on a rotated grid. Nothing is random, so a picture depends on its arguments only.
+Every pixel is first sampled at its centre; where the sample differs from a neighbour's in colour or opacity, the
+pixel becomes the mean of that sample and three more around it. Nothing is random: a picture depends on its arguments
+only.
 """
 
 from __future__ import annotations
@@ -25,10 +26,8 @@ from facefolds_core.geometry.cameras import Camera
 
 Array = NDArray[np.float64]
 
-_DIFFERENT = 0.06
+_DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
-_DEPTH_JUMP = 4.0
-"""Likewise in depth, mm."""
 _BOUND = 480.0
 """Everything opaque lies within this distance of the head's origin, mm."""
 
@@ -94,8 +93,8 @@ def _hair(
     while t < stop:
         x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
         outside = envelope(x, y, z)
-        if outside > 8.0:
-            t += max(0.8 * (outside - 6.0), STEP)
+        if outside > 10.0:
+            t += max(0.8 * (outside - 8.0), STEP)
             continue
         step = min(STEP, stop - t)
         half = t + 0.5 * step
@@ -116,7 +115,15 @@ def _hair(
 
 @compiled
 def _sample(
-    u: float, v: float, to_world: Array, centre: Array, frame: Array, pose: Array, lights: Array, settings: Array, seed: int
+    u: float,
+    v: float,
+    to_world: Array,
+    centre: Array,
+    frame: Array,
+    pose: Array,
+    lights: Array,
+    settings: Array,
+    seed: int,
 ) -> tuple[float, float, float, float, float]:
     """One ray through continuous image coordinates (u, v): colour, opacity, distance along the ray (inf for none)."""
     wx = to_world[0, 0] * u + to_world[0, 1] * v + to_world[0, 2]
@@ -166,9 +173,6 @@ def _differs(image: Array, i: int, j: int) -> bool:
             for c in range(4):
                 if abs(image[a, b, c] - image[i, j, c]) > _DIFFERENT:
                     return True
-            one, other = image[a, b, 4], image[i, j, 4]
-            if (one < math.inf) != (other < math.inf) or (one < math.inf and abs(one - other) > _DEPTH_JUMP):
-                return True
     return False
 
 
@@ -200,16 +204,16 @@ def _build(digest: int) -> Callable[..., tuple[Array, Array]]:
             for j in range(width):
                 smooth[i, j] = first[i, j, :4]
                 if _differs(first, i, j):
-                    smooth[i, j] = 0.0
-                    for k in range(4):
-                        # A rotated grid: rows and columns of the four samples are all different.
-                        u = j + 0.125 + 0.25 * ((2 * k + 1) % 5 if k != 2 else 0)
-                        v = i + 0.125 + 0.25 * k
+                    for k in range(3):
+                        # A triangle about the centre, turned so that no two samples share a row or a column.
+                        angle = 2.0 * math.pi * (k / 3.0 + 0.04)
+                        u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
                         r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
-                        smooth[i, j, 0] += 0.25 * min(r, 1.0)
-                        smooth[i, j, 1] += 0.25 * min(g, 1.0)
-                        smooth[i, j, 2] += 0.25 * min(b, 1.0)
-                        smooth[i, j, 3] += 0.25 * a
+                        smooth[i, j, 0] += min(r, 1.0)
+                        smooth[i, j, 1] += min(g, 1.0)
+                        smooth[i, j, 2] += min(b, 1.0)
+                        smooth[i, j, 3] += a
+                    smooth[i, j] *= 0.25
         return first, smooth
 
     return render_samples

@@ -21,6 +21,7 @@ _FIRST_VIEW = (3.0, 2.0)
 # (azimuth, elevation) at every twelfth place, the ones that `holdout: {every: 12}` takes: inside the rig.
 _INNER_VIEWS = ((-17.0, 6.0), (40.0, 9.0), (-42.0, 4.0), (18.0, 14.0))
 _INNER_EVERY = 12
+_GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True)
@@ -60,24 +61,18 @@ def camera_at(name: str, azimuth: float, elevation: float, width: int, height: i
 def make_rig(params: CaptureParams) -> ActorRig:
     """The rig of a capture: a nearly frontal camera, inner views at every twelfth place, the rest spread evenly.
 
-    The spread is the plane's two-dimensional golden-ratio sequence (Roberts, 2018): any number of cameras covers the
-    window of directions without clusters.
+    The rest walks from the head's right to its left in equal steps of azimuth, with elevations by the golden ratio:
+    any number of cameras covers the window of directions without clusters.
     """
-    plastic = 1.324717957244746
-    views = [_FIRST_VIEW]
-    inner = 0
-    for place in range(1, params.cameras):
-        if (place + 1) % _INNER_EVERY == 0:
-            views.append(_INNER_VIEWS[inner % len(_INNER_VIEWS)])
-            inner += 1
-            continue
-        a, b = (0.5 + place / plastic) % 1.0, (0.5 + place / plastic**2) % 1.0
-        low, high = _ELEVATIONS
-        views.append((_MAX_AZIMUTH * (2 * a - 1), low + (high - low) * b))
+    inner = [place for place in range(1, params.cameras) if (place + 1) % _INNER_EVERY == 0]
+    outer = [place for place in range(1, params.cameras) if place not in inner]
+    views = {0: _FIRST_VIEW}
+    views |= {place: _INNER_VIEWS[k % len(_INNER_VIEWS)] for k, place in enumerate(inner)}
+    low, high = _ELEVATIONS
+    for k, place in enumerate(outer):
+        azimuth = _MAX_AZIMUTH * (2 * (k + 0.5) / len(outer) - 1)
+        views[place] = (azimuth, low + (high - low) * ((0.5 + k * _GOLDEN) % 1.0))
     names = [f"A{place:03d}" for place in range(params.cameras)]
     return ActorRig(
-        tuple(
-            camera_at(name, azimuth, elevation, params.width, params.height)
-            for name, (azimuth, elevation) in zip(names, views, strict=True)
-        )
+        tuple(camera_at(name, *views[place], params.width, params.height) for place, name in enumerate(names))
     )

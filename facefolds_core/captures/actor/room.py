@@ -61,17 +61,16 @@ def _left_wall(u: float, v: float) -> Vector:
 @compiled
 def _right_wall(u: float, v: float) -> Vector:
     """A bookcase; u runs along z."""
-    row = math.floor((v + 1250.0) / 330.0)
-    height = (v + 1250.0) - 330.0 * row
+    j = math.floor((v + 1250.0) / 330.0)
+    height = (v + 1250.0) - 330.0 * j
     if height < 28.0:
         return (0.45, 0.31, 0.20)
-    book = math.floor(u / 58.0 + 0.4 * row)
-    k = int(book)
-    j = int(row)
+    along = u / 58.0 + 0.4 * j
+    k = math.floor(along)
     top = 60.0 + 95.0 * hash3(k, j, 1, 7)
     if height < top:
         return (0.20, 0.15, 0.12)
-    spine = abs((u / 58.0 + 0.4 * row) - book - 0.5) * 2.0
+    spine = abs(along - k - 0.5) * 2.0
     shade = 1.0 - 0.45 * spine**6
     hue = hash3(k, j, 2, 7)
     if hue < 0.25:
@@ -91,7 +90,7 @@ def _right_wall(u: float, v: float) -> Vector:
 @compiled
 def _floor(u: float, v: float) -> Vector:
     """Planks along z."""
-    plank = int(math.floor(u / 150.0))
+    plank = math.floor(u / 150.0)
     tone = 0.8 + 0.3 * hash3(plank, 0, 0, 9) + 0.12 * (value_noise(u / 18.0, v / 240.0, 0.5, 9) - 0.5)
     if (u / 150.0) % 1.0 < 0.035:
         tone *= 0.6
@@ -105,9 +104,7 @@ def _ceiling(u: float, v: float) -> Vector:
 
 
 @compiled
-def room_colour(
-    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, colourfulness: float
-) -> Vector:
+def room_colour(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, colourfulness: float) -> Vector:
     """Colour of the wall that a ray meets from inside the room.
 
     Args:

@@ -33,7 +33,7 @@ from facefolds_core.captures.actor.shape import (
 def _freckles(x: float, y: float, z: float, seed: int) -> float:
     """Darkness of freckles in [0, 1]: at most one dot a cell of 4.5 mm."""
     cell = 4.5
-    i, j, k = int(math.floor(x / cell)), int(math.floor(y / cell)), int(math.floor(z / cell))
+    i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
     if hash3(i, j, k, seed + 21) > 0.34:
         return 0.0
     dx = x / cell - i - 0.3 - 0.4 * hash3(i, j, k, seed + 22)
@@ -102,7 +102,7 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
         wrinkle = value_noise(xr / 1.3, yr / 7.0, 0.5, seed + 3)
         colour = mix(colour, (0.70 + 0.06 * wrinkle, 0.33, 0.30), 0.80 * lip)
         gloss += 0.55 * lip * (0.5 + wrinkle)
-        height, edge = mouth_gap(x, pose)
+        height, edge, _ = mouth_gap(x, pose)
         if abs(x) < MOUTH_HALFWIDTH + 3.0:
             line = abs(y - edge) if height < 1.0 else 99.0
             colour = mix(colour, (0.22, 0.07, 0.06), 0.85 * smoothstep(1.5, 0.3, line) * smoothstep(27.0, 23.0, abs(x)))
@@ -116,7 +116,7 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     nostril = math.exp(-(((ax - 6.2) / 3.0) ** 2) - ((yr + 45.5) / 1.8) ** 2) * smoothstep(85.0, 88.0, zr)
     nostril *= smoothstep(98.0, 95.0, zr)
     colour = mix(colour, (0.20, 0.07, 0.05), 0.9 * clamp(1.4 * nostril, 0.0, 1.0))
-    scalp = smoothstep(1.0, -7.0, envelope(x, y, z))
+    scalp = smoothstep(-1.0, -7.0, envelope(x, y, z))
     return mix(colour, (0.17, 0.10, 0.06), 0.9 * scalp), gloss * (1.0 - scalp)
 
 
@@ -224,7 +224,7 @@ def surface_colour(
     gloss: float,
     seed: int,
 ) -> Vector:
-    """Colour of an opaque point towards the eye: wrapped diffuse, Blinn-Phong gloss, occlusion, shadow of the key light.
+    """Colour of an opaque point towards the eye: wrapped diffuse, Blinn-Phong gloss, occlusion, the key light's shadow.
 
     Args:
         p: point, head mm.
@@ -235,7 +235,7 @@ def surface_colour(
     """
     albedo, shine, exponent = paint(p[0], p[1], p[2], material, pose, seed)
     open_sky = occlusion(p[0], p[1], p[2], n, pose)
-    under_hair = 0.45 + 0.55 * smoothstep(-2.0, 11.0, envelope(p[0], p[1], p[2]))
+    under_hair = 0.50 + 0.50 * smoothstep(-3.0, 9.0, envelope(p[0], p[1], p[2]))
     # Light scattered in skin reddens where it grazes.
     wrap = 0.30 if material == SKIN else 0.1
     up = 0.5 + 0.5 * n[1]
@@ -247,7 +247,7 @@ def surface_colour(
         cosine = n[0] * lx + n[1] * ly + n[2] * lz
         lit = 0.4 + 0.6 * open_sky
         if i == 0 and cosine > -wrap:
-            lit *= 0.25 + 0.75 * shadow(p[0], p[1], p[2], lx, ly, lz, pose)
+            lit *= 0.40 + 0.60 * shadow(p[0], p[1], p[2], lx, ly, lz, pose)
         soft = clamp((cosine + wrap) / (1.0 + wrap), 0.0, 1.0)
         hard = clamp((cosine + 0.1) / 1.1, 0.0, 1.0)
         hx, hy, hz = lx + view[0], ly + view[1], lz + view[2]

@@ -4,8 +4,8 @@ The eyes lie at y = 0, the mouth at y = -67, the chin at y = -114, the top of th
 approximate (blended ellipsoids), right to first order at the surface and never much too long, so that sphere tracing
 with a shortened step finds the first crossing.
 
-The jaw and the smile move the face by a warp: a point is carried back to the rest pose and measured there. The mouth and
-the eyes open as slots cut into the skin.
+The jaw and the smile move the face by a warp: a point is carried back to the rest pose and measured there. The mouth
+and the eyes open as slots cut into the skin.
 """
 
 from __future__ import annotations
@@ -28,8 +28,6 @@ _EYE_HALFWIDTH = 14.8
 MOUTH_Y = -67.0
 MOUTH_HALFWIDTH = 25.0
 _JAW_DROP = 21.0
-BOUND = 190.0
-"""No part of head and hair lies farther from the origin in x or z; shoulders do, and are bounded by `BOUND_BODY`."""
 
 
 @compiled
@@ -55,23 +53,24 @@ def eye_slot(ex: float, ey: float, blink: float) -> float:
     """Signed distance, in the plane of the face, to the opening between the lids: negative inside, mm."""
     lower, upper = lid_edges(ex, blink)
     slope = math.sqrt(1.0 + (0.75 * ex / _EYE_HALFWIDTH) ** 2)
-    return max(ey - upper, lower - ey) / slope
+    # Beyond the corners there is no slot, even where the lids' edges would meet.
+    return max(max(ey - upper, lower - ey) / slope, 0.8 * (abs(ex) - _EYE_HALFWIDTH))
 
 
 @compiled
-def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float]:
-    """The opening of the mouth at x: (height in mm, y of its upper edge)."""
+def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float, float]:
+    """The opening of the mouth at x: (height in mm, y of its upper edge, half its width)."""
     half = MOUTH_HALFWIDTH - 3.0 * pose[JAW] + 3.5 * pose[SMILE]
     s = x / half
     height = _JAW_DROP * pose[JAW] * max(1.0 - s * s, 0.0) ** 0.75
-    return height, MOUTH_Y + 1.5 * pose[JAW] * max(1.0 - s * s, 0.0) + 4.0 * pose[SMILE] * s * s
+    return height, MOUTH_Y + 1.5 * pose[JAW] * max(1.0 - s * s, 0.0) + 4.0 * pose[SMILE] * s * s, half
 
 
 @compiled
 def to_rest(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
     """Carry a point of the moving face back to the rest pose."""
     if z > -20.0 and y < MOUTH_Y + 5.0 and pose[JAW] > 0.0:
-        height, edge = mouth_gap(x, pose)
+        height, edge, _ = mouth_gap(x, pose)
         if y < edge - 0.5 * height:
             drop = _JAW_DROP * pose[JAW]
             below = edge - height - y
@@ -146,10 +145,10 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
     neck = cone(x, y, z, -60.0, -24.0, -230.0, -40.0, 44.0, 52.0)
     d = smooth_min(d, neck, 18.0)
     d = smooth_min(d, _jaw(ax, y, z), 22.0)
-    if d > 40.0:
+    if d > 65.0:
         # The features stand out from this by less than 25 mm.
-        return d - 25.0
-    if z < 5.0:
+        return d - (25.0 if z > 5.0 else 5.0)
+    if z < -12.0:
         return d
     # Each feature is measured only where it can change the blend.
     if y < 30.0:
@@ -163,8 +162,9 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
             d = smooth_min(d, ellipsoid(x, y + 101.0, z - 64.0, 19.0, 13.0, 18.0), 16.0)
     if y > -32.0 and y < 55.0:
         d = _eye_region(ax, y, z, brow, d)
-    if y < 45.0 and y > -75.0 and z > 50.0 and ax < 45.0:
-        d = _nose(ax, y, z, d)
+    # Away from the nose a bound will do: it lies within |x| < 20, -55 < y < 20, z > 80.
+    aside = max(ax - 20.0, y - 20.0, -55.0 - y, 80.0 - z)
+    d = _nose(ax, y, z, d) if aside < 25.0 else min(d, aside)
     if y < -45.0 and z > 60.0:
         d = _lips(ax, y, z, d)
         # Philtrum.
@@ -190,8 +190,9 @@ def shirt(x: float, y: float, z: float) -> float:
     d = ellipsoid(ax - 62.0, y + 262.0, z + 38.0, 135.0, 84.0, 74.0)
     d = smooth_min(d, ellipsoid(x, y + 300.0, z + 25.0, 130.0, 130.0, 95.0), 25.0)
     tilt = y + 172.0 + 0.22 * (z + 36.0)
-    ring = math.sqrt((math.sqrt(x * x + (z + 36.0) ** 2) - 58.0) ** 2 + tilt * tilt) - 7.0
-    return smooth_min(d, ring, 12.0)
+    # A rounded disc that the neck pierces, so that nothing shows between them.
+    beyond = max(math.sqrt(x * x + (z + 36.0) ** 2) - 56.0, 0.0)
+    return smooth_min(d, math.sqrt(beyond * beyond + tilt * tilt) - 7.0, 12.0)
 
 
 @compiled
@@ -209,11 +210,11 @@ def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[fl
             if ball < d:
                 d, material = ball, EYE
         elif pose[JAW] > 0.01 and y < -40.0:
-            height, edge = mouth_gap(x, pose)
+            height, edge, half = mouth_gap(x, pose)
             slot = (abs(y - edge + 0.5 * height) - 0.5 * height) * 0.8
-            slot = max(slot, 46.0 - z, abs(x) - MOUTH_HALFWIDTH - 4.0)
+            slot = max(slot, 46.0 - z, abs(x) - half + 1.0)
             d = smooth_max(skin, -slot, 3.0 * clamp(height / 6.0, 0.05, 1.0))
-            middle, _ = mouth_gap(0.0, pose)
+            middle, _, _ = mouth_gap(0.0, pose)
             upper = _teeth(x, y, z, MOUTH_Y + 2.0, 7.5)
             lower = _teeth(x, y, z + 4.0 + 0.22 * middle, MOUTH_Y - middle - 2.5, 5.0)
             row = min(upper, lower)
@@ -258,7 +259,7 @@ def trace(
         d = distance(ox + t * dx, oy + t * dy, oz + t * dz, pose)
         if d < 0.03:
             return t
-        t += 0.8 * d
+        t += d * (0.97 if d > 12.0 else 0.8)
         if t > far:
             break
     return math.inf

@@ -35,7 +35,7 @@ class Ellipsoids:
 
     Attributes:
         axes: (N, 3) semi-axes, units.
-        patch: alpha is 0 outside max(|u|, |v|) < patch, and smooth inside.
+        patch: alpha fades to 0 at this distance of (u, v) from (0, 0).
         hole: no surface within this distance of (u, v) = (0.2, 0.2); 0 for none.
         num_frames: K.
     """
@@ -73,7 +73,7 @@ class Ellipsoids:
         u, v = uv[:, 0] * math.pi * (3 + layer), uv[:, 1] * math.pi * (3 + layer)
         rgb = 0.5 + 0.4 * torch.stack([torch.sin(v + time), torch.sin(u - v + 1), torch.sin(u + 2 + time)], -1)
         alpha = torch.full_like(u, 1.0) if layer == self.num_layers - 1 else 0.5 + 0.3 * torch.sin(u + v)
-        return rgb, alpha * (uv.abs().amax(-1) < self.patch)
+        return rgb, alpha * ((self.patch**2 - (uv**2).sum(-1)) / (0.5 * self.patch**2)).clamp(0, 1)
 
     def render(self, origins: Tensor, directions: Tensor, time: float, view_effects: bool) -> Composited:
         crossed = self.crossings(origins, directions)

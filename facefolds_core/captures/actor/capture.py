@@ -1,0 +1,96 @@
+"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity for every camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
+from facefolds_core.captures.actor.motion import PERIOD, head_pose
+from facefolds_core.captures.actor.render import ActorOptions, Picture, render
+from facefolds_core.captures.actor.rig import make_rig
+from facefolds_core.files import atomic_folder
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import CaptureParams
+
+SEGMENT = "PERFORMANCE"
+Progress = Callable[[], None]
+"""Called once after each picture."""
+
+
+def frame_times(params: CaptureParams) -> NDArray[np.float64]:
+    """(frames,) seconds within the performance: one full cycle, so that the clip loops (of 12 frames: k / 30)."""
+    return np.arange(params.frames) / params.frames * PERIOD
+
+
+def frame_name(position: int) -> str:
+    return f"{position + 1:06d}"
+
+
+def krt_block(camera: Camera) -> str:
+    """One camera of a Multiface `KRT` file: name, K (3 rows), 5 distortion values, [R | t] (3 rows), blank line.
+
+    Multiface counts pixels from their centres: the first pixel's centre is (0, 0), half a pixel from our convention.
+    """
+    K = camera.K.copy()
+    K[:2, 2] -= 0.5
+    rows = [*K.tolist(), [0.0] * 5, *camera.w2c.tolist()]
+    return "\n".join([camera.name, *(" ".join(f"{x:.10g}" for x in row) for row in rows), "", ""])
+
+
+def _write_png(path: Path, image: NDArray[np.uint8]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    encoded, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not encoded:
+        raise OSError(f"cannot encode {path}")
+    path.write_bytes(data.tobytes())
+
+
+def _write_picture(folder: Path, camera: str, frame: str, picture: Picture) -> None:
+    _write_png(folder / "images" / SEGMENT / camera / f"{frame}.png", picture.rgb[..., ::-1])
+    mask = np.rint(255 * picture.opacity).astype(np.uint8)
+    _write_png(folder / "masks" / SEGMENT / camera / f"{frame}.png", mask)
+
+
+def _write_mesh(folder: Path, frame: str, mesh: TrackedMesh, head_to_world: NDArray[np.float64]) -> None:
+    """`.obj` (vertices, texture coordinates, triangles), `.bin` (float32 vertices), `_transform.txt` (3 x 4)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"vt {u:.6f} {v:.6f}" for u, v in mesh.uv.tolist()]
+    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in (mesh.faces + 1).tolist()]
+    (folder / f"{frame}.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (folder / f"{frame}.bin").write_bytes(mesh.vertices.astype("<f4").tobytes())
+    rows = "\n".join(" ".join(f"{x:.10g}" for x in row) for row in head_to_world.tolist())
+    (folder / f"{frame}_transform.txt").write_text(rows + "\n", encoding="utf-8")
+
+
+def write_capture(
+    folder: str | Path, params: CaptureParams, progress: Progress | None = None, options: ActorOptions | None = None
+) -> None:
+    """Render and write a capture; `folder` appears whole or not at all.
+
+    Args:
+        folder: replaced if it exists.
+        params: cameras, frames, size, seed.
+        progress: called after each of the cameras x frames pictures.
+        options: see `ActorOptions`.
+    """
+    options = options or ActorOptions()
+    rig = make_rig(params)
+    with atomic_folder(folder) as temporary:
+        (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")
+        frames = [(frame_name(k), float(time)) for k, time in enumerate(frame_times(params))]
+        listing = "".join(f"{SEGMENT} {name}\n" for name, _ in frames)
+        (temporary / "frame_list.txt").write_text(listing, encoding="utf-8")
+        for name, time in frames:
+            rotation, translation = head_pose(time, options.head_motion)
+            head_to_world = np.concatenate([rotation, translation[:, None]], 1)
+            _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time), head_to_world)
+            for camera in rig.cameras:
+                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed))
+                if progress:
+                    progress()

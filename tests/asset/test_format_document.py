@@ -1,0 +1,91 @@
+"""docs/asset-format.md: its example is right, it names every key, and a player written from it sees the asset."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
+from facefolds_core.asset.packing import AtlasLayout
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
+from tests.assets import make_asset
+
+TEXT = (Path(__file__).parents[2] / "docs" / "asset-format.md").read_text(encoding="utf-8")
+
+
+def test_example_rectangles() -> None:
+    layout = AtlasLayout.grid(12, 512)
+    assert (layout.width, layout.height) == (2112, 3168)
+    assert (layout.colour_rect, layout.alpha_rect) == ((0, 0, 2112, 1584), (0, 1584, 2112, 1584))
+    assert layout.rects[5] == (530, 530, 512, 512)
+    place = np.array([530 + 0.3 * 512, 530 + 0.7 * 512])
+    np.testing.assert_allclose(place, [683.6, 888.4])
+    np.testing.assert_allclose(place / [2112, 3168], [0.323674, 0.280429], atol=5e-7)
+    assert (place[1] + 1584) / 3168 == pytest.approx(0.780429, abs=5e-7)
+
+
+def test_example_colour() -> None:
+    planes = [np.full(shape, code, np.uint8) for shape, code in (((2, 2), 120), ((1, 1), 110), ((1, 1), 151))]
+    assert yuv420_to_rgb(*planes)[0, 0].tolist() == [162, 113, 83]
+    assert luma_to_alpha(np.array([[150]], np.uint8)).item() == 156
+
+
+def test_example_point() -> None:
+    uv = st_to_uv(np.array([0.3, 0.7]), (-0.5, 0.5, -0.4, 0.4))
+    np.testing.assert_allclose(uv, [-0.2, -0.16])
+    n = uv_to_directions(uv)
+    np.testing.assert_allclose(n, [0.921177, -0.236518, -0.309017], atol=5e-7)
+    point = np.array([-0.25, 0, 0]) + 0.25 * n
+    np.testing.assert_allclose(point, [-0.019706, -0.059130, -0.077254], atol=6e-7)
+    to_capture = Similarity(2.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(to_capture.apply(point), [0.218259, 0.160589, 0.145492], atol=6e-7)
+
+
+def keys_of(value: Any) -> set[str]:
+    if isinstance(value, dict):
+        return set(value) | {key for inner in value.values() for key in keys_of(inner)}
+    return {key for inner in value for key in keys_of(inner)} if isinstance(value, list) else set()
+
+
+def test_a_player_written_from_the_document(tmp_path: Path) -> None:
+    """Nearest texels by the document's formulas only, against the reader's frames."""
+    folder = tmp_path / "asset"
+    make_asset(folder, layers=3, frames=3)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert [key for key in sorted(keys_of(manifest)) if not re.search(rf"[`.]{key}\b", TEXT)] == []
+    texture, R = manifest["texture"], manifest["texture"]["layer_resolution"]
+    with av.open(str(folder / texture["video"])) as container:
+        frames = [frame.to_ndarray() for frame in container.decode(video=0)]
+    height, width = texture["height"], texture["width"]
+    Y = frames[2][:height].astype(float)
+    Cb, Cr = frames[2][height:].reshape(2, height // 2, width // 2).astype(float)
+    truth = read_asset(folder).frame(2)
+    for layer, entry in enumerate(manifest["layers"]):
+        for s, t in np.random.default_rng(layer).uniform(0, 1, (50, 2)):
+            x, y = (int(entry["texture_rect"][axis] + (s, t)[axis] * R) for axis in (0, 1))
+            column, row = texture["colour_rect"][0] + x, texture["colour_rect"][1] + y
+            # chroma at an even column lies on luma's column, at an odd one between two; rows at +-0.25 of its own
+            i, di = divmod(row - 0.5, 2)
+            i, fi = int(i), di / 2
+            j, fj = column // 2, (column % 2) / 2
+            weights = [
+                ((1 - fi) * (1 - fj), i, j),
+                ((1 - fi) * fj, i, j + 1),
+                (fi * (1 - fj), i + 1, j),
+                (fi * fj, i + 1, j + 1),
+            ]
+            cb, cr = (sum(w * plane[a, b] for w, a, b in weights if w) for plane in (Cb, Cr))
+            luma, b, r = (Y[row, column] - 16) / 219, (cb - 128) / 224, (cr - 128) / 224
+            red, blue = luma + 1.5748 * r, luma + 1.8556 * b
+            green = (luma - 0.2126 * red - 0.0722 * blue) / 0.7152
+            alpha = (Y[texture["alpha_rect"][1] + y, texture["alpha_rect"][0] + x] - 16) / 219
+            seen = np.clip([red, green, blue, alpha], 0, 1) * 255
+            assert np.abs(seen - truth[layer, int(t * R), int(s * R)]).max() < 0.51

@@ -1,0 +1,191 @@
+"""The actor as a capture on disk: layout, calibration, tracked mesh, stage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from facefolds_core.captures.actor import PERIOD, SEGMENT, make_rig, render, tracked_mesh, write_capture
+from facefolds_core.captures.actor.jit import source_digest
+from facefolds_core.captures.actor.motion import pose_at
+from facefolds_core.captures.actor.shape import distance
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json, write_json
+from facefolds_core.params import CaptureParams
+from facefolds_core.paths import SubjectFolders
+from stages.capture import capture
+
+PARAMS = CaptureParams(cameras=3, frames=2, height=48, width=32)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("actor") / "capture"
+    write_capture(folder, PARAMS)
+    return folder
+
+
+def parse_krt(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """An independent reader: name -> K (3, 3), distortion (5,), [R | t] (3, 4)."""
+    cameras = {}
+    for block in path.read_text().strip().split("\n\n"):
+        name, *rows = block.split("\n")
+        numbers = [np.array(row.split(), float) for row in rows]
+        cameras[name] = (np.stack(numbers[:3]), numbers[3], np.stack(numbers[4:]))
+    return cameras
+
+
+def read_mesh(folder: Path, frame: str) -> np.ndarray:
+    """(V, 3) vertices in the world."""
+    vertices = np.frombuffer((folder / f"{frame}.bin").read_bytes(), "<f4").reshape(-1, 3)
+    transform = np.loadtxt(folder / f"{frame}_transform.txt")
+    return vertices @ transform[:, :3].T + transform[:, 3]
+
+
+def test_all_files_are_there(written: Path) -> None:
+    files = {str(p.relative_to(written)) for p in written.rglob("*") if p.is_file()}
+    expected = {"KRT", "frame_list.txt"}
+    for frame in ("000001", "000002"):
+        expected |= {f"tracked_mesh/{SEGMENT}/{frame}{end}" for end in (".obj", ".bin", "_transform.txt")}
+        for camera in ("A000", "A001", "A002"):
+            expected |= {f"{kind}/{SEGMENT}/{camera}/{frame}.png" for kind in ("images", "masks")}
+    assert files == expected
+
+
+def test_frame_list_names_segment_and_frame(written: Path) -> None:
+    assert (written / "frame_list.txt").read_text().split("\n") == [f"{SEGMENT} 000001", f"{SEGMENT} 000002", ""]
+
+
+def test_stored_images_are_the_rendered_ones(written: Path) -> None:
+    picture = render(make_rig(PARAMS).cameras[1], 0.5 * PERIOD)
+    image = cv2.imread(str(written / f"images/{SEGMENT}/A001/000002.png"))
+    mask = cv2.imread(str(written / f"masks/{SEGMENT}/A001/000002.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(image[..., ::-1], picture.rgb)
+    assert np.array_equal(mask, np.rint(255 * picture.opacity).astype(np.uint8))
+
+
+def test_krt_counts_pixels_from_their_centres(written: Path) -> None:
+    K, distortion, world_to_camera = parse_krt(written / "KRT")["A002"]
+    camera = make_rig(PARAMS).cameras[2]
+    assert np.allclose(K[:2, 2], camera.K[:2, 2] - 0.5)
+    assert np.allclose(np.diag(K), np.diag(camera.K))
+    assert np.array_equal(distortion, np.zeros(5))
+    assert np.allclose(world_to_camera, camera.w2c, atol=1e-6)
+
+
+def test_krt_projects_the_mesh_into_the_mask(written: Path) -> None:
+    vertices = read_mesh(written / "tracked_mesh" / SEGMENT, "000001")
+    for name, (K, _, world_to_camera) in parse_krt(written / "KRT").items():
+        image = (vertices @ world_to_camera[:, :3].T + world_to_camera[:, 3]) @ K.T
+        column, row = np.rint(image[:, :2] / image[:, 2:]).astype(int).T
+        inside = (column >= 0) & (column < PARAMS.width) & (row >= 0) & (row < PARAMS.height)
+        mask = cv2.imread(str(written / f"masks/{SEGMENT}/{name}/000001.png"), cv2.IMREAD_UNCHANGED)
+        assert inside.mean() > 0.9
+        assert np.mean(mask[row[inside], column[inside]] > 128) > 0.98
+
+
+def test_obj_and_bin_hold_the_same_vertices(written: Path) -> None:
+    folder = written / "tracked_mesh" / SEGMENT
+    lines = (folder / "000002.obj").read_text().splitlines()
+    vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
+    coordinates = [line for line in lines if line.startswith("vt ")]
+    stored = np.frombuffer((folder / "000002.bin").read_bytes(), "<f4").reshape(-1, 3)
+    assert np.abs(vertices - stored).max() < 1e-4
+    assert len(coordinates) == len(vertices)
+
+
+def test_an_interrupted_capture_leaves_nothing(tmp_path: Path) -> None:
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_capture(tmp_path / "capture", PARAMS, stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_mesh_lies_on_the_surface() -> None:
+    time = 0.3 * PERIOD
+    pose = pose_at(time)
+    distances = [distance(*map(float, vertex), pose) for vertex in tracked_mesh(time).vertices[::7]]
+    assert np.abs(distances).max() < 0.1
+
+
+def test_mesh_keeps_its_topology_and_moves() -> None:
+    a, b = tracked_mesh(0.0), tracked_mesh(PERIOD / 3)
+    assert np.array_equal(a.faces, b.faces)
+    assert np.array_equal(a.uv, b.uv)
+    moved = np.linalg.norm(a.vertices - b.vertices, axis=1)
+    chin = (np.abs(a.vertices[:, 0]) < 15) & (a.vertices[:, 1] < -95) & (a.vertices[:, 2] > 60)
+    skull = a.vertices[:, 1] > 60
+    assert moved[chin].max() > 3
+    assert moved[skull].max() < 1e-3
+
+
+def test_mesh_faces_outwards() -> None:
+    mesh = tracked_mesh(0.0)
+    corners = mesh.vertices[mesh.faces].astype(float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = corners.mean(1) - [0.0, -20.0, -15.0]
+    assert np.mean((normals * outward).sum(1) > 0) > 0.98
+
+
+def view(camera_index: int, cameras: int = 24) -> tuple[float, float, float]:
+    """Azimuth and elevation in degrees, and distance in mm, of a rig's camera as seen from the head."""
+    camera = make_rig(CaptureParams(cameras=cameras)).cameras[camera_index]
+    x, y, z = np.diag([1.0, -1.0, -1.0]) @ (camera.centre - [0, 0, 1000])
+    return np.degrees(np.arctan2(x, z)), np.degrees(np.arctan2(y, np.hypot(x, z))), float(np.linalg.norm([x, y, z]))
+
+
+def test_held_out_places_are_inner_views() -> None:
+    assert 15 <= abs(view(11)[0]) <= 20
+    assert 35 <= abs(view(23)[0]) <= 45
+    assert all(0 < view(k)[1] < 15 for k in (11, 23))
+
+
+@pytest.mark.parametrize("cameras", [3, 24, 60])
+def test_rig_covers_the_front(cameras: int) -> None:
+    views = np.array([view(k, cameras) for k in range(cameras)])
+    assert np.abs(views[:, 0]).max() <= 76
+    assert views[:, 1].min() >= -27
+    assert views[:, 1].max() <= 37
+    assert np.all(np.abs(views[:, 2] - 1000) < 20)
+
+
+def test_names_are_in_order() -> None:
+    names = [camera.name for camera in make_rig(CaptureParams()).cameras]
+    assert names == sorted(names)
+
+
+def test_digest_is_stable() -> None:
+    assert source_digest() == source_digest() > 0
+
+
+def _configure(folders: SubjectFolders, source: str, path: Path) -> None:
+    write_json(folders.config / "subject.json", {"source": source, "path": str(path)})
+    write_json(folders.config / "capture.json", PARAMS.model_dump(mode="json"))
+
+
+def test_stage_generates_the_actor(tmp_path: Path) -> None:
+    folders = SubjectFolders(tmp_path / "data" / "actor")
+    _configure(folders, "actor", tmp_path)
+    assert "6 pictures" in capture(folders)
+    assert read_json(folders.capture / "source.json") == {"source": "actor", "path": str(tmp_path)}
+    assert (folders.capture / "KRT").is_file()
+
+
+def test_stage_notes_where_another_capture_is(tmp_path: Path) -> None:
+    folders = SubjectFolders(tmp_path / "data" / "other")
+    _configure(folders, "multiface", tmp_path)
+    capture(folders)
+    assert [p.name for p in folders.capture.iterdir()] == ["source.json"]
+
+
+def test_stage_refuses_a_capture_that_is_not_there(tmp_path: Path) -> None:
+    folders = SubjectFolders(tmp_path / "data" / "other")
+    _configure(folders, "multiface", tmp_path / "nowhere")
+    with pytest.raises(UserError, match="nowhere"):
+        capture(folders)
+    assert not folders.capture.exists()

@@ -1,0 +1,269 @@
+"""The normalised scene: coordinates, culling, split, images, stabilisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
+from facefolds_core.captures.capture import complete_subset
+from facefolds_core.captures.images import decode_image, display_colour, downsample, fit_box
+from facefolds_core.captures.multiface import read_multiface
+from facefolds_core.captures.normalization import nearest_to_axes, split_cameras, view_angles
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
+from tests.captures.fixtures import (
+    FACES,
+    HEAD,
+    RING,
+    SEGMENT,
+    VERTICES,
+    edit_transforms,
+    head_pose,
+    opengl_matrix,
+    save,
+    world_camera,
+    write_multiface,
+    write_transforms,
+)
+
+POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
+
+
+def plan_multiface(root: Path, params: NormalizeParams | None = None, **keys: Any) -> Plan:
+    subject = Subject(source="multiface", path=str(root), **{"holdout": ("400003",), **keys})
+    return plan_scene(
+        read_multiface(root, subject), "head", subject, params or NormalizeParams(), root.parent / "scene"
+    )
+
+
+def plan_transforms(root: Path, params: NormalizeParams | None = None, **keys: Any) -> Plan:
+    subject = Subject(source="transforms", path=str(root), **{"holdout": ("400003",), "front": "400003", **keys})
+    return plan_scene(
+        read_transforms(root, subject), "head", subject, params or NormalizeParams(), root.parent / "scene"
+    )
+
+
+def test_projection_agrees_before_and_after_normalisation_and_downsampling(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    scene = plan_multiface(tmp_path / "c", NormalizeParams(long_side=32, short_side=32)).scene
+    assert (scene.width, scene.height) == (20, 32)
+    for before, after in zip(made.cameras, scene.cameras, strict=True):
+        pixels, _ = after.project(scene.from_capture.apply(POINTS))
+        assert np.abs(2 * pixels - before.project(POINTS)[0]).max() < 1e-3
+
+
+def test_projection_agrees_for_a_distorted_transforms_capture(tmp_path: Path) -> None:
+    write_transforms(tmp_path / "c", k1=0.2, k2=-0.03, p1=0.002, p2=0.001)
+    plan = plan_transforms(tmp_path / "c", NormalizeParams(long_side=32, short_side=32))
+    for camera, view in zip(plan.scene.cameras, plan.capture.views, strict=True):
+        assert view.lens is not None
+        in_camera = POINTS @ view.camera.rotation.T + view.camera.w2c[:, 3]
+        photo = view.lens.distort(in_camera[:, :2] / in_camera[:, 2:])
+        straight = 2 * camera.project(plan.scene.from_capture.apply(POINTS))[0]
+        assert np.abs(view.lens.source_of(straight) - photo).max() < 1e-3
+
+
+def test_a_tracked_head_is_at_the_origin_and_faces_x(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    move = plan_multiface(tmp_path / "c").scene.from_capture
+    rotation, translation = head_pose(1)  # the middle one of three
+    head = np.stack([translation, translation + 100 * rotation[:, 2], translation + 100 * rotation[:, 1]])
+    origin, face, top = move.apply(head)
+    assert origin == pytest.approx([0, 0, 0], abs=1e-9)
+    assert (face / np.linalg.norm(face), top / np.linalg.norm(top)) == (
+        pytest.approx([1, 0, 0], abs=1e-9),
+        pytest.approx([0, 0, 1], abs=1e-9),
+    )
+
+
+# Without `front` the mean of the five directions and that of their image tops, a little askew, take its place.
+@pytest.mark.parametrize(("front", "degrees"), [("400003", 1e-6), (None, 1.5)])
+def test_without_a_tracked_head_the_cameras_say_where_it_is(tmp_path: Path, front: str | None, degrees: float) -> None:
+    write_transforms(tmp_path / "c")
+    plan = plan_transforms(tmp_path / "c", front=front)
+    assert plan.scene.from_capture.apply(HEAD) == pytest.approx([0, 0, 0], abs=1e-6)
+    angles = view_angles(plan.scene.cameras)
+    assert angles[:, 1] == pytest.approx([azimuth for _, azimuth, _ in RING], abs=degrees)
+    assert angles[:, 0] == pytest.approx([elevation for _, _, elevation in RING], abs=degrees)
+
+
+def test_median_camera_distance_is_one(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    distances = [np.linalg.norm(camera.centre) for camera in plan_multiface(tmp_path / "c").scene.cameras]
+    assert np.median(distances) == pytest.approx(1)
+
+
+def test_the_point_nearest_to_the_axes_ignores_a_camera_that_looks_elsewhere() -> None:
+    good = [world_camera(str(a), a, 10 * (a % 3)) for a in range(-80, 81, 20)]
+    away = world_camera("away", 33, 0)
+    away = replace(away, w2c=np.concatenate([away.rotation, away.w2c[:, 3:] + [[150.0], [0], [0]]], 1))
+    assert np.linalg.norm(nearest_to_axes(good) - HEAD) < 1e-6
+    assert np.linalg.norm(nearest_to_axes([*good, away]) - HEAD) < 1.0  # millimetres; plain least squares: 14
+
+
+def test_cameras_beyond_the_angles_are_culled_and_named(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    params = NormalizeParams(max_elevation=9, max_azimuth=90)
+    scene = plan_multiface(tmp_path / "c", params).scene
+    assert [camera.name for camera in scene.cameras] == ["400001", "400003", "400005"]
+    assert [line.split(",")[0] for line in scene.left_out[1:]] == ["camera 400002: culled", "camera 400004: culled"]
+
+
+@pytest.mark.parametrize(("every", "held"), [(2, ["b", "d"]), (3, ["c"]), (5, ["e"]), (9, [])])
+def test_every_nth_camera_is_held_out(every: int, held: list[str]) -> None:
+    subject = Subject(source="transforms", path=".", holdout=HoldoutEvery(every=every))
+    splits = split_cameras("abcde", subject, [], "capture")
+    assert [name for name, split in zip("abcde", splits, strict=True) if split == "holdout"] == held
+
+
+@pytest.mark.parametrize(
+    ("size", "box", "expected"),
+    [
+        ((1334, 2048), (768, 500), (500, 768)),  # the paper's
+        ((2048, 1334), (768, 500), (768, 500)),
+        ((1368, 770), (768, 500), (768, 432)),
+        ((250, 384), (768, 500), (250, 384)),  # never enlarged
+    ],
+)
+def test_images_fit_the_box(size: tuple[int, int], box: tuple[int, int], expected: tuple[int, int]) -> None:
+    assert fit_box(*size, *box) == expected
+
+
+def test_downsampling_by_a_whole_factor_is_the_mean_of_blocks() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (12, 8, 3), dtype=np.uint8)
+    expected = image.reshape(4, 3, 4, 2, 3).mean((1, 3))
+    assert np.abs(downsample(image, 4, 4) - expected).max() < 1e-3
+
+
+def test_display_colour_of_black_and_of_full_grey() -> None:
+    values = display_colour(np.array([[[0, 0, 0], [255, 255, 255]]], np.float32))
+    # Green: (1 - 3/255) * 0.95 / (1 - 3/255) = 0.95, root 0.9747, minus 15/255; red and blue are clipped.
+    assert values[0, 0].tolist() == [0, 0, 0]
+    assert values[0, 1, 1] == pytest.approx(255 * (0.95**0.5 - 15 / 255), abs=1e-2)
+    assert values[0, 1].max() <= 255
+
+
+@pytest.mark.parametrize(
+    ("stored", "expected"),
+    [
+        (np.full((2, 3), 77, np.uint8), [77, 77, 77]),
+        (np.full((2, 3), 77 * 257, np.uint16), [77, 77, 77]),
+        (np.full((2, 3, 3), (10, 20, 30), np.uint8), [10, 20, 30]),
+        (np.full((2, 3, 4), (200, 100, 50, 51), np.uint8), [40, 20, 10]),
+    ],
+)
+def test_grey_16_bit_and_transparent_images_become_rgb(tmp_path: Path, stored: np.ndarray, expected: list[int]) -> None:
+    save(tmp_path / "a.png", stored)
+    image = decode_image(tmp_path / "a.png", "here")
+    assert (image.shape, image.dtype, image[1, 2].tolist()) == ((2, 3, 3), np.uint8, expected)
+
+
+def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    plan = plan_multiface(tmp_path / "c")
+    write_plan(plan, NormalizeParams())
+    scene = read_scene(tmp_path / "scene")
+    store = scene.open_frames()
+    assert store.keys() == [(c, f) for c in range(5) for f in range(3)]
+    expected = decode_image(made.image("400004", "000006"), "")
+    assert np.array_equal(store.image(3, 1), expected)
+
+
+def test_masks_are_kept_for_held_out_cameras_only(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    for camera in ("400003", "400004"):
+        save(tmp_path / "c" / "masks" / SEGMENT / camera / "000006.png", np.full((64, 40), 200, np.uint8))
+    write_plan(plan_multiface(tmp_path / "c"), NormalizeParams())
+    masks = read_scene(tmp_path / "scene").open_masks()
+    assert masks is not None
+    assert masks.keys() == [(2, 1)]
+    assert int(masks.image(2, 1)[5, 5, 0]) == 200
+
+
+def test_the_surface_projects_where_the_tracked_mesh_does(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c", turn=10)
+    write_plan(plan_multiface(tmp_path / "c"), NormalizeParams())
+    scene = read_scene(tmp_path / "scene")
+    surface = scene.load_surface()
+    assert surface is not None
+    rotation, translation = head_pose(2, 10)
+    before = made.cameras[1].project(VERTICES @ rotation.T + translation)[0]
+    # The file holds float32: 1e-5 px seen.
+    assert np.abs(scene.cameras[1].project(surface[0][2].astype(float))[0] - before).max() < 1e-3
+    assert np.array_equal(surface[1], FACES)
+
+
+def test_a_frame_that_one_camera_lacks_is_left_out_of_everything(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    made.image("400002", "000006").unlink()
+    plan = plan_multiface(tmp_path / "c")
+    assert plan.scene.frame_ids == ("000003", "000009")
+    assert plan.vertices is not None
+    assert len(plan.vertices) == 2
+    assert "frame 000006: no image from 400002" in plan.scene.left_out
+
+
+def test_a_frame_that_only_a_culled_camera_lacks_stays(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    made.image("400001", "000006").unlink()
+    assert plan_multiface(tmp_path / "c", NormalizeParams(max_azimuth=45)).scene.num_frames == 3
+
+
+def test_a_camera_that_lacks_most_frames_is_left_out_instead(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    for frame in ("000006", "000009"):
+        made.image("400002", frame).unlink()
+    subject = Subject(source="multiface", path=str(tmp_path / "c"))
+    cameras, frames, lines = complete_subset(read_multiface(tmp_path / "c", subject), range(5))
+    assert (cameras, frames, len(lines)) == ([0, 2, 3, 4], [0, 1, 2], 1)
+
+
+def test_a_stabilised_head_stands_still(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c", turn=10)
+    plan = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=True))
+    assert plan.vertices is not None
+    assert np.abs(plan.vertices - plan.vertices[:1]).max() < 1e-6
+
+
+def test_a_stabilised_scene_has_a_camera_for_every_image(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c", turn=10)
+    plan = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=True))
+    assert len(plan.scene.cameras) == len(plan.rows) == 15
+    assert len(plan.scene.indices("holdout")) == 3
+    rotation, translation = head_pose(2, 10)
+    before = made.cameras[1].project(VERTICES @ rotation.T + translation)[0]
+    assert plan.vertices is not None
+    camera = next(camera for camera in plan.scene.cameras if camera.name == "400002@000009")
+    assert np.abs(camera.project(plan.vertices[2].astype(float))[0] - before).max() < 1e-3
+
+
+def test_times_follow_the_rate(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    scene = plan_multiface(tmp_path / "c", frames=FrameRange(step=2), fps=20.0).scene
+    assert (scene.fps, scene.times.tolist()) == (10.0, [0.0, 0.1])
+
+
+def test_entries_turned_by_90_degrees_do_not_matter_when_there_is_a_front_camera(tmp_path: Path) -> None:
+    path, cameras = write_transforms(tmp_path / "c")
+    turned = replace(cameras[1], w2c=np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) @ cameras[1].w2c)
+    edit_transforms(path, 1, transform_matrix=opengl_matrix(turned))
+    scene = plan_transforms(tmp_path / "c").scene
+    assert view_angles(scene.cameras)[1] == pytest.approx([10, -20], abs=1e-6)
+
+
+@pytest.mark.captures
+def test_the_shared_face_keeps_32_cameras(captures_folder: Path) -> None:
+    scene = plan_multiface(captures_folder / "mugsy", holdout=("400013", "400060"), pixel_centres=0.5).scene
+    assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (30, 2)
+
+
+@pytest.mark.captures
+def test_the_shared_statue_keeps_21_cameras(captures_folder: Path) -> None:
+    scene = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
+    assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (19, 2)

@@ -1,0 +1,183 @@
+"""The reader of transforms.json: intrinsics, axes, frames, names, distortion."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from facefolds_core.captures.lens import Lens, make_lens, undistort
+from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.params import Subject
+from tests.captures.fixtures import (
+    HEAD,
+    RING,
+    edit_transforms,
+    intrinsics,
+    opengl_matrix,
+    pattern,
+    save,
+    world_camera,
+    write_transforms,
+)
+
+POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
+
+
+def subject(path: Path, **keys: Any) -> Subject:
+    return Subject(source="transforms", path=str(path), **keys)
+
+
+def names(root: Path) -> list[str]:
+    return [view.name for view in read_transforms(root, subject(root)).views]
+
+
+def test_projection_with_opengl_axes_and_intrinsics_of_each_entry(tmp_path: Path) -> None:
+    _, cameras = write_transforms(tmp_path)
+    views = read_transforms(tmp_path, subject(tmp_path)).views
+    worst = max(
+        np.abs(view.camera.project(POINTS)[0] - camera.project(POINTS)[0]).max()
+        for view, camera in zip(views, cameras, strict=True)
+    )
+    assert worst < 1e-9
+
+
+def test_global_intrinsics(tmp_path: Path) -> None:
+    path, cameras = write_transforms(tmp_path, **intrinsics(world_camera(*RING[0])))
+    for entry in range(5):
+        edit_transforms(path, entry, fl_x=None, fl_y=None, cx=None, cy=None, w=None, h=None)
+    view = read_transforms(tmp_path, subject(tmp_path)).views[3]
+    assert pytest.approx(cameras[3].K) == view.camera.K
+
+
+def test_angles_of_view_and_centred_principal_point(tmp_path: Path) -> None:
+    path, _ = write_transforms(tmp_path, camera_angle_x=math.radians(60))
+    for entry in range(5):
+        edit_transforms(path, entry, fl_x=None, fl_y=None, cx=None, cy=None, w=None, h=None)
+    K = read_transforms(tmp_path, subject(tmp_path)).views[0].camera.K
+    f = 20 / math.tan(math.radians(30))
+    assert pytest.approx(np.array([[f, 0, 20], [0, f, 32], [0, 0, 1]])) == K
+
+
+def test_pixel_centres_at_whole_numbers_shift_the_principal_point(tmp_path: Path) -> None:
+    _, cameras = write_transforms(tmp_path)
+    view = read_transforms(tmp_path, subject(tmp_path, pixel_centres=0.0)).views[0]
+    assert view.camera.K[:2, 2] == pytest.approx(cameras[0].K[:2, 2] + 0.5)
+
+
+def test_entries_without_image_are_left_out_and_reported(tmp_path: Path) -> None:
+    write_transforms(tmp_path)
+    (tmp_path / "images" / "400002.png").unlink()
+    capture = read_transforms(tmp_path, subject(tmp_path))
+    assert [view.name for view in capture.views] == ["400001", "400003", "400004", "400005"]
+    assert capture.left_out == ("frames[1] (images/400002.png): no image images/400002.png",)
+
+
+def test_paths_without_extension(tmp_path: Path) -> None:
+    path, _ = write_transforms(tmp_path)
+    edit_transforms(path, 0, file_path="./images/400001")
+    assert names(tmp_path)[0] == "400001"
+
+
+def test_a_static_capture_has_one_frame_and_no_rate(tmp_path: Path) -> None:
+    write_transforms(tmp_path)
+    capture = read_transforms(tmp_path, subject(tmp_path))
+    assert (capture.frame_ids, capture.fps, len(capture.images)) == (("0",), 0.0, 5)
+
+
+def write_dynamic(root: Path, label: str, times: bool = False) -> None:
+    """Five cameras, two frames; `label` is formatted with camera and frame."""
+    entries: list[dict[str, Any]] = []
+    for view in RING:
+        camera = world_camera(*view)
+        for k in (1, 0):
+            file = label.format(camera=camera.name, frame=f"f{k}")
+            save(root / file, pattern(40, 64, k))
+            entry = {"file_path": file, "transform_matrix": opengl_matrix(camera), **intrinsics(camera)}
+            entries.append(entry | ({"time": 0.25 * k} if times else {}))
+    (root / "transforms.json").write_text(json.dumps({"frames": entries}))
+
+
+@pytest.mark.parametrize("label", ["{camera}/{frame}.png", "images/{frame}/{camera}.png"])
+def test_folders_of_cameras_or_of_frames(tmp_path: Path, label: str) -> None:
+    write_dynamic(tmp_path, label)
+    capture = read_transforms(tmp_path, subject(tmp_path, fps=25.0))
+    assert [view.name for view in capture.views] == [name for name, _, _ in RING]
+    assert (capture.frame_ids, capture.fps) == (("f0", "f1"), 25.0)
+    assert capture.images[1, 0] == tmp_path / label.format(camera="400002", frame="f0")
+
+
+def test_times_order_the_frames(tmp_path: Path) -> None:
+    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
+    capture = read_transforms(tmp_path, subject(tmp_path))
+    assert capture.frame_ids == ("0", "0.25")
+    assert capture.images[4, 1] == tmp_path / "400005" / "f1.png"
+
+
+def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: Path) -> None:
+    path, _ = write_transforms(tmp_path)
+    for c, (name, _, _) in enumerate(RING):
+        save(tmp_path / name / "photo.png", pattern(40, 64, c))
+        edit_transforms(path, c, file_path=f"{name}/photo.png")
+    assert names(tmp_path) == [name for name, _, _ in RING]
+
+
+@pytest.mark.parametrize("coefficients", [(-0.2, 0.05, 0.003, -0.002, 0.0), (0.15, 0.02, -0.001, 0.002, 0.01)])
+def test_distortion_formula_agrees_with_opencv(coefficients: tuple[float, ...]) -> None:
+    K, points = (
+        np.array([[150.0, 0, 22], [0, 151, 31], [0, 0, 1]]),
+        np.random.default_rng(1).uniform(-0.2, 0.2, (30, 2)),
+    )
+    homogeneous = np.concatenate([points, np.ones((30, 1))], 1)
+    expected, _ = cv2.projectPoints(homogeneous, np.zeros(3), np.zeros(3), K, np.array(coefficients))
+    assert Lens(K, np.array(coefficients), K).distort(points) == pytest.approx(expected[:, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_projection_agrees_before_and_after_undistortion(tmp_path: Path, k1: float) -> None:
+    write_transforms(tmp_path, k1=k1, k2=0.01, p1=0.002, p2=-0.001)
+    for view in read_transforms(tmp_path, subject(tmp_path)).views:
+        assert view.lens is not None
+        in_camera = POINTS @ view.camera.rotation.T + view.camera.w2c[:, 3]
+        photo = view.lens.distort(in_camera[:, :2] / in_camera[:, 2:])
+        assert np.abs(view.lens.source_of(view.camera.project(POINTS)[0]) - photo).max() < 1e-3
+
+
+def smooth(pixels: np.ndarray) -> np.ndarray:
+    """A smooth picture as a function of continuous pixel coordinates (..., 2)."""
+    x, y = pixels[..., 0], pixels[..., 1]
+    return 128 + 60 * np.sin(x / 9) + 50 * np.cos(y / 11 + x / 23)
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_undistorted_pixels_show_what_the_photo_shows_there(k1: float) -> None:
+    width, height, K = 160, 120, np.array([[150.0, 0, 83], [0, 151, 57], [0, 0, 1]])
+    lens = make_lens(K, np.array([k1, 0.02, 0.001, -0.002, 0]), width, height, "file", "camera")
+    assert lens is not None
+    centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), -1)
+    photo = np.round(smooth(centres)).astype(np.uint8)[..., None].repeat(3, 2)
+    straight = undistort(photo, lens.maps(width, height))
+    # Rounding to 8 bits twice, and cv2.remap's 1/32 px: 1.4 seen. Half a pixel off would be 5.
+    assert np.abs(straight[..., 0] - smooth(lens.source_of(centres))).max() < 2
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_the_undistorted_image_shows_nothing_from_outside_the_photo(k1: float) -> None:
+    K = np.array([[150.0, 0, 83], [0, 151, 57], [0, 0, 1]])
+    lens = make_lens(K, np.array([k1, 0, 0, 0, 0]), 160, 120, "file", "camera")
+    assert lens is not None
+    x, y = lens.maps(160, 120)
+    assert (x.min(), y.min()) >= (-1e-4, -1e-4)
+    assert x.max() <= 159 + 1e-4
+    assert y.max() <= 119 + 1e-4
+
+
+@pytest.mark.captures
+def test_the_shared_statue(captures_folder: Path) -> None:
+    capture = read_transforms(captures_folder / "buddha", subject(captures_folder / "buddha"))
+    assert (len(capture.views), capture.frame_ids, capture.left_out) == (67, ("0",), ())

@@ -1,0 +1,111 @@
+"""Decimation keeps its bound and the shape; texture coordinates; order of the layers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from facefolds_core.errors import UserError
+from facefolds_core.export.decimation import (
+    decimate,
+    decimate_layers,
+    exact_st,
+    layer_order,
+    nearest_st,
+    upright_faces,
+)
+from facefolds_core.export.poisson import boundary_loops, gather_samples, reconstruct
+from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.meshes import Surface
+from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.params import DecimateParams, ReconstructParams
+from tests.ellipsoids import Ellipsoids
+
+WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
+CENTRE = Ellipsoids().centre.numpy()
+
+
+@pytest.fixture(scope="module")
+def grids() -> Grids:
+    return sample_grids(Ellipsoids(), 96, WINDOW, progress=False)
+
+
+@pytest.fixture(scope="module")
+def surfaces(grids: Grids) -> list[Surface]:
+    params = ReconstructParams(depth=6)
+    return [reconstruct(gather_samples(grids, i, None), params, i).surface for i in range(grids.num_layers)]
+
+
+@pytest.mark.parametrize("resolution", [8, 16, 32])
+def test_the_bound_holds_and_is_used(surfaces: list[Surface], resolution: int) -> None:
+    count = len(decimate(surfaces[0], resolution**2, CENTRE).vertices)
+    assert 0.9 * resolution**2 < count <= resolution**2
+
+
+def test_a_surface_below_the_bound_stays_as_it_is(surfaces: list[Surface]) -> None:
+    coarse = decimate(surfaces[0], len(surfaces[0].vertices), CENTRE)
+    assert np.array_equal(coarse.vertices, surfaces[0].vertices)
+
+
+def test_the_shape_stays(surfaces: list[Surface]) -> None:
+    coarse = decimate(surfaces[0], 32**2, CENTRE)
+    scaled = (coarse.vertices - CENTRE) / np.array(Ellipsoids().axes[0])
+    assert np.abs(np.linalg.norm(scaled, axis=-1) - 1).mean() < 1e-3
+
+
+def test_the_sheet_keeps_one_boundary(surfaces: list[Surface]) -> None:
+    assert boundary_loops(decimate(surfaces[0], 32**2, CENTRE).faces) == 1
+
+
+def test_every_vertex_is_used(surfaces: list[Surface]) -> None:
+    coarse = decimate(surfaces[0], 16**2, CENTRE)
+    assert np.array_equal(np.unique(coarse.faces), np.arange(len(coarse.vertices)))
+
+
+def test_faces_that_turn_over_or_have_no_area_are_found() -> None:
+    vertices = np.array([[0.1, 0, 0], [0.1, 0.1, 0], [0.1, 0, 0.1], [0.1, 0.05, 0]], np.float32)
+    faces = np.array([[0, 1, 2], [0, 2, 1], [0, 1, 1], [0, 3, 1]], np.int32)
+    assert upright_faces(vertices, faces, CENTRE).tolist() == [True, False, False, False]
+
+
+def test_nearest_texture_coordinates_are_a_texel_centre_half_a_texel_away_at_most(grids: Grids) -> None:
+    vertices = grids.points[0].reshape(-1, 3)[::7] + np.float32(1e-4)
+    st = nearest_st(vertices, grids.points[0], grids.valid[0])
+    texel = st * 96 - 0.5
+    assert np.abs(texel - np.rint(texel)).max() < 1e-3
+    assert np.abs(st - exact_st(vertices, WINDOW, CENTRE)).max() < 0.75 / 96
+
+
+def test_nearest_texture_coordinates_skip_invalid_samples(grids: Grids) -> None:
+    valid = np.zeros((96, 96), bool)
+    valid[10, 20] = True
+    st = nearest_st(grids.points[0].reshape(-1, 3)[:5], grids.points[0], valid)
+    assert np.allclose(st, [20.5 / 96, 10.5 / 96])
+
+
+def test_exact_texture_coordinates_are_the_direction(grids: Grids) -> None:
+    uv = np.array([[0.1, -0.2], [-0.4, 0.3], [0.9, 0.0]])
+    angles = uv * np.pi / 2
+    flat = np.cos(angles[:, 0])
+    n = np.stack([flat * np.cos(angles[:, 1]), flat * np.sin(angles[:, 1]), np.sin(angles[:, 0])], -1)
+    st = exact_st((CENTRE + 0.3 * n).astype(np.float32), WINDOW, CENTRE)
+    assert np.allclose(st[:2], uv_to_st(uv[:2], WINDOW), atol=1e-6)
+    assert st[2, 1] == 0  # beyond the window's top: its edge
+
+
+def test_layers_in_order_do_not_cross(grids: Grids, surfaces: list[Surface]) -> None:
+    order = layer_order(decimate_layers(surfaces, grids, CENTRE, DecimateParams(resolution=16), progress=False), CENTRE)
+    assert order.compared > 200
+    assert order.crossed == 0
+
+
+def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
+    order = layer_order([surfaces[1], surfaces[0]], CENTRE)
+    assert order.crossed == order.compared
+    assert order.deepest == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
+    with pytest.raises(UserError, match="do not belong together"):
+        decimate_layers(surfaces * 2, grids, CENTRE, DecimateParams(), progress=False)

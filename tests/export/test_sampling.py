@@ -1,0 +1,132 @@
+"""Grids of samples, their normals, and texture frames, against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from facefolds_core.captures.frames import FrameStore
+from facefolds_core.errors import UserError
+from facefolds_core.export.sampling import grid_normals, row_strides, sample_grids, texture_rows, write_textures
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, texel_uv
+from tests.ellipsoids import Ellipsoids
+
+SPHERES = ((0.35, 0.35, 0.35), (0.30, 0.30, 0.30))
+WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
+
+
+@pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
+def test_points_lie_on_the_layers(window: Window) -> None:
+    model = Ellipsoids(axes=SPHERES)
+    grids = sample_grids(model, 24, window, progress=False)
+    radius = np.linalg.norm(grids.points - model.centre.numpy(), axis=-1)
+    assert np.abs(radius - np.array([0.35, 0.30])[:, None, None]).max() < 1e-6
+
+
+@pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
+def test_uv_of_the_points_is_the_grids(window: Window) -> None:
+    model = Ellipsoids()
+    grids = sample_grids(model, 24, window, progress=False)
+    uv, _ = points_to_uv(grids.points.astype(np.float64), model.centre.numpy())
+    assert np.abs(uv - texel_uv(24, 24, window)).max() < 1e-5
+
+
+@pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
+def test_normals_of_an_ellipsoid(window: Window) -> None:
+    model = Ellipsoids()
+    grids = sample_grids(model, 96, window, progress=False)
+    for points, normals, axes in zip(grids.points, grids.normals, model.axes, strict=True):
+        true = (points - model.centre.numpy()) / np.array(axes) ** 2
+        true /= np.linalg.norm(true, axis=-1, keepdims=True)
+        cosine = (true * normals).sum(-1)
+        assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 2.0  # seen: 1.3, one-sided at the poles
+
+
+def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
+    model = Ellipsoids(axes=SPHERES)
+    grids = sample_grids(model, 128, FULL_WINDOW, progress=False)
+    outward = grids.points[0] - model.centre.numpy()
+    outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
+    noisy = grids.points[0] * (1 + 1e-5 * np.random.default_rng(0).standard_normal((128, 128, 1)))
+    normals = grid_normals(noisy.astype(np.float32), grids.valid[0], model.centre.numpy(), FULL_WINDOW)
+    assert (normals * outward).sum(-1).min() > 0.98
+
+
+def test_invalid_neighbours_do_not_bend_the_normals() -> None:
+    model = Ellipsoids(hole=0.15)
+    grids = sample_grids(model, 64, WINDOW, progress=False)
+    whole = sample_grids(Ellipsoids(), 64, WINDOW, progress=False)
+    assert not grids.valid.all()
+    cosine = (grids.normals * whole.normals).sum(-1)[grids.valid]
+    assert cosine.min() > 0.999
+
+
+def test_a_lone_sample_gets_the_direction_from_the_centre() -> None:
+    points = np.zeros((8, 8, 3), np.float32)
+    points[3, 4] = (0.1, 0.0, 0.0)
+    valid = np.zeros((8, 8), bool)
+    valid[3, 4] = True
+    normals = grid_normals(points, valid, np.array([-0.25, 0, 0]), FULL_WINDOW)
+    assert np.allclose(normals[3, 4], (1, 0, 0))
+    assert np.isfinite(normals).all()
+
+
+def test_rows_near_the_poles_span_more_columns() -> None:
+    strides = row_strides(64, FULL_WINDOW)
+    assert strides[32] == 1
+    assert strides[0] == round(1 / np.cos((1 - 1 / 64) * np.pi / 2))
+
+
+def test_textures_are_the_models(tmp_path: Path) -> None:
+    model = Ellipsoids()
+    grids = sample_grids(model, 16, WINDOW, progress=False)
+    write_textures(tmp_path / "textures.arrow", model, grids, progress=False)
+    store = FrameStore(tmp_path / "textures.arrow")
+    rgb, alpha = model.texture(torch.as_tensor(texel_uv(16, 16, WINDOW).reshape(-1, 2)), 0, 1.0)
+    expected = torch.cat([rgb, alpha[:, None]], 1).reshape(16, 16, 4).numpy()
+    assert store.keys() == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    assert np.abs(store.image(0, 1) / 255 - expected).max() <= 0.5 / 255 + 1e-9
+
+
+def test_textures_are_transparent_where_the_layer_is_missing() -> None:
+    model = Ellipsoids(hole=0.15)
+    grids = sample_grids(model, 32, WINDOW, progress=False)
+    _, _, image = next(texture_rows(model, grids, progress=False))
+    assert (image[~grids.valid[0]] == 0).all()
+    assert (image[grids.valid[0], 3] > 0).all()
+
+
+def test_a_layer_without_any_point_is_named() -> None:
+    with pytest.raises(UserError, match="layer 0"):
+        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW, progress=False)
+
+
+@dataclass(frozen=True)
+class Broken(Ellipsoids):
+    """NaN in one point, NaN in one texel."""
+
+    def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        points, valid = super().surface_points(uv)
+        points[1, 3] = torch.nan
+        return points, valid
+
+    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
+        rgb, alpha = super().texture(uv, layer, time)
+        rgb[5] = torch.nan
+        return rgb, alpha
+
+
+def test_nan_in_the_surface_is_caught() -> None:
+    with pytest.raises(UserError, match=r"not finite[\s\S]*layer 1"):
+        sample_grids(Broken(), 16, WINDOW, progress=False)
+
+
+def test_nan_in_a_texture_is_caught() -> None:
+    grids = sample_grids(Ellipsoids(), 16, WINDOW, progress=False)
+    with pytest.raises(UserError, match=r"not finite[\s\S]*layer 0, frame 0"):
+        next(texture_rows(Broken(), grids, progress=False))

@@ -1,0 +1,129 @@
+"""Geometry files: round trips, and what damaged ones say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from facefolds_core.errors import UserError
+from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.stores import (
+    Grids,
+    read_grids,
+    read_meshes,
+    read_surfaces,
+    write_grids,
+    write_meshes,
+    write_surfaces,
+)
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from tests.ellipsoids import Ellipsoids
+
+TRIANGLE = TexturedMesh(
+    np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.array([[0, 0], [0.5, 1], [1, 0]], np.float32)
+)
+
+
+@pytest.fixture(scope="module")
+def grids() -> Grids:
+    return sample_grids(Ellipsoids(), 8, (-0.5, 0.5, -0.5, 0.5), progress=False)
+
+
+def test_grids_round_trip(tmp_path: Path, grids: Grids) -> None:
+    write_grids(tmp_path / "grids.npz", grids)
+    back = read_grids(tmp_path / "grids.npz")
+    for name in ("points", "normals", "valid", "windows"):
+        assert np.array_equal(getattr(back, name), getattr(grids, name))
+
+
+def test_meshes_round_trip(tmp_path: Path) -> None:
+    write_meshes(tmp_path / "meshes.npz", [TRIANGLE, TRIANGLE])
+    first, second = read_meshes(tmp_path / "meshes.npz")
+    assert np.array_equal(second.st, TRIANGLE.st)
+    assert np.array_equal(first.faces, TRIANGLE.faces)
+
+
+def test_surfaces_round_trip(tmp_path: Path) -> None:
+    write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
+    (back,) = read_surfaces(tmp_path / "surfaces.npz")
+    assert np.array_equal(back.vertices, TRIANGLE.vertices)
+
+
+def test_the_same_meshes_make_the_same_file(tmp_path: Path) -> None:
+    write_meshes(tmp_path / "a.npz", [TRIANGLE])
+    write_meshes(tmp_path / "b.npz", [TRIANGLE])
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+@pytest.mark.parametrize("length", [0, 10, 500, 2000])
+def test_a_truncated_file_is_an_error(tmp_path: Path, grids: Grids, length: int) -> None:
+    path = tmp_path / "grids.npz"
+    write_grids(path, grids)
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(UserError, match=r"grids\.npz"):
+        read_grids(path)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_flipped_byte_is_an_error_or_harmless(tmp_path: Path, seed: int) -> None:
+    path = tmp_path / "meshes.npz"
+    write_meshes(path, [TRIANGLE])
+    raw = bytearray(path.read_bytes())
+    raw[int(np.random.default_rng(seed).integers(len(raw)))] ^= 0xFF
+    path.write_bytes(raw)
+    try:
+        (mesh,) = read_meshes(path)
+    except UserError:
+        return
+    assert np.array_equal(mesh.vertices, TRIANGLE.vertices)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"surfaces\.npz"):
+        read_surfaces(tmp_path / "surfaces.npz")
+
+
+def test_a_lone_array_is_an_error(tmp_path: Path) -> None:
+    with (tmp_path / "grids.npz").open("wb") as file:
+        np.save(file, np.zeros(3))
+    with pytest.raises(UserError, match="damaged"):
+        read_grids(tmp_path / "grids.npz")
+
+
+def test_pickled_objects_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "meshes.npz", vertices_00=np.array([{}], object))
+    with pytest.raises(UserError, match="damaged"):
+        read_meshes(tmp_path / "meshes.npz")
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"points": np.zeros((2, 8, 8, 2), np.float32)}, "points"),
+        ({"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
+        ({"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
+        ({"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
+    ],
+)
+def test_wrong_grids_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
+    write_grids(tmp_path / "grids.npz", replace(grids, **change))
+    with pytest.raises(UserError, match=place):
+        read_grids(tmp_path / "grids.npz")
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"faces": np.array([[0, 1, 3]], np.int32)}, "faces_00"),
+        ({"st": np.array([[0, 0], [0.5, 1], [1.5, 0]], np.float32)}, "st_00"),
+        ({"st": np.zeros((2, 2), np.float32)}, "st_00"),
+    ],
+)
+def test_wrong_meshes_are_errors(tmp_path: Path, change: dict[str, Any], place: str) -> None:
+    write_meshes(tmp_path / "meshes.npz", [replace(TRIANGLE, **change)])
+    with pytest.raises(UserError, match=place):
+        read_meshes(tmp_path / "meshes.npz")

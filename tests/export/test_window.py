@@ -1,0 +1,32 @@
+"""The automatic window keeps all that a training ray can see, and no more than a margin beside."""
+
+from __future__ import annotations
+
+import pytest
+
+from facefolds_core.export.window import EPSILON, removed_weight, visible_window
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW
+from tests.ellipsoids import Ellipsoids
+from tests.scenes import look_at_origin
+
+RIG = [look_at_origin(f"cam{i}", azimuth, 10 * (-1) ** i, 120) for i, azimuth in enumerate((-40, -15, 15, 40))]
+
+
+@pytest.mark.parametrize("patch", [0.3, 0.6])
+def test_no_ray_loses_more_than_the_bound(patch: float) -> None:
+    model = Ellipsoids(patch=patch)
+    window = visible_window(model, RIG, rays_per_camera=900)
+    # Every pixel, not only the lattice that the window was made from.
+    assert max(removed_weight(model, camera, 1, 1, window).max() for camera in RIG) <= EPSILON
+
+
+def test_the_window_fits_the_scene() -> None:
+    u0, u1, v0, v1 = visible_window(Ellipsoids(patch=0.3), RIG)
+    assert -0.4 < u0 < -0.29
+    assert -0.4 < v0 < -0.29
+    assert 0.29 < u1 < 0.4
+    assert 0.29 < v1 < 0.4
+
+
+def test_an_invisible_model_keeps_the_whole_hemisphere() -> None:
+    assert visible_window(Ellipsoids(patch=1e-6), RIG[:1]) == FULL_WINDOW

@@ -1,0 +1,151 @@
+"""Scores of a model and an asset on a scene where they are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.asset import read_asset
+from facefolds_core.errors import UserError
+from facefolds_core.params import EvaluateParams
+from facefolds_core.scoring.evaluation import (
+    MASK_MARGIN,
+    METRICS,
+    SUBJECT_METRICS,
+    VARIANTS,
+    Evaluation,
+    evaluate,
+    score_images,
+    sheet_frames,
+    subject_box,
+)
+from facefolds_core.scoring.metrics import MAX_PSNR
+from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
+from tests.assets import make_asset
+from tests.scenes import look_at_origin
+from tests.scoring.fakes import FRAMES, SIZE, flat_asset, flat_scene, half_mask, pictures, tiny_model
+
+NO_PERCEPTUAL = Perceptual(None, None, ())
+
+
+def run(folder: Path, params: EvaluateParams | None = None, **masks: object) -> Evaluation:
+    scene = flat_scene(folder, **masks)  # type: ignore[arg-type]
+    return evaluate(scene, tiny_model(), flat_asset(), params or EvaluateParams(), NO_PERCEPTUAL)
+
+
+def test_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
+    found = [s.values for s in run(tmp_path).scores if s.variant == "asset"]
+    assert [v["psnr"] for v in found] == [MAX_PSNR] * FRAMES
+    np.testing.assert_allclose([v["ssim"] for v in found], 1)  # type: ignore[arg-type]
+
+
+def test_every_image_is_scored_for_every_variant(tmp_path: Path) -> None:
+    scores = run(tmp_path).scores
+    keys = [(s.camera, s.frame, s.variant) for s in scores]
+    assert keys == [("front", f"{k:06d}", v) for k in range(FRAMES) for v in VARIANTS]
+    assert all(list(s.values) == [*METRICS, *SUBJECT_METRICS] for s in scores)
+
+
+def test_without_masks_the_subject_has_no_scores(tmp_path: Path) -> None:
+    assert all(s.values[name] is None for s in run(tmp_path).scores for name in SUBJECT_METRICS)
+
+
+def test_an_image_without_a_mask_and_one_with_an_empty_mask_are_not_counted(tmp_path: Path) -> None:
+    scores = run(tmp_path, masks={0: half_mask(), 2: np.zeros_like(half_mask())}).scores
+    assert [s.values["psnr_subject"] is not None for s in scores if s.variant == "asset"] == [True, False, False]
+
+
+def test_without_weights_perceptual_scores_are_none(tmp_path: Path) -> None:
+    assert all(s.values[n] is None for s in run(tmp_path).scores for n in METRICS if "lpips" in n)
+
+
+def test_an_error_outside_the_mask_spares_the_subject() -> None:
+    truth = pictures()[0] / 255
+    mask = half_mask()[..., 0] / 255
+    image = truth.copy()
+    image[:, SIZE // 2 :] = 1 - image[:, SIZE // 2 :]
+    values = score_images({"asset": image}, truth, mask, find_perceptual())["asset"]
+    assert values["psnr_subject"] == MAX_PSNR
+    assert values["ssim_subject"] == pytest.approx(1)
+    assert values["st_lpips_subject"] in (None, 0)
+    assert values["psnr"] is not None
+    assert values["psnr"] < 20
+
+
+def test_the_background_shows_where_the_model_is_transparent(tmp_path: Path) -> None:
+    scene = flat_scene(tmp_path)
+    panels = [
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(background=b), NO_PERCEPTUAL).panels[0].model
+        for b in ((0.0, 0.0, 0.0), (0.2, 0.4, 0.6))
+    ]
+    corner = [panel[0, 0] for panel in panels]
+    np.testing.assert_allclose(corner, [[0, 0, 0], [0.2, 0.4, 0.6]], atol=1e-12)
+
+
+def test_the_view_branch_tells_model_from_diffuse() -> None:
+    view = ModelView(tiny_model(view_bias=0.25), look_at_origin("front", 0, 0, SIZE))
+    on, off, alpha = view.render(0)
+    # The grey term 0.25 is weighted as the colours are, so it adds 0.25 of the opacity.
+    np.testing.assert_allclose(on - off, np.broadcast_to(0.25 * alpha[..., None], on.shape), atol=1e-5)
+
+
+@pytest.mark.parametrize("view_effects", [True, False])
+def test_a_view_of_the_model_is_what_the_model_renders(view_effects: bool) -> None:
+    model, camera = tiny_model(view_bias=0.1), look_at_origin("side", 30, 10, SIZE)
+    origins, directions = (torch.tensor(np.reshape(x, (-1, 3)), dtype=torch.float32) for x in camera.rays())
+    expected = model.render(origins, directions, 1.5, view_effects)
+    on, off, alpha = ModelView(model, camera).render(1.5)
+    found = (on if view_effects else off).reshape(-1, 3)
+    np.testing.assert_allclose(found, expected.rgb, atol=2e-6)
+    np.testing.assert_allclose(alpha.ravel(), expected.alpha, atol=2e-6)
+
+
+def test_the_shipped_files_are_what_is_scored(tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset", layers=2, frames=FRAMES, resolution=32)
+    scene = flat_scene(tmp_path / "scene")
+    found = evaluate(scene, tiny_model(), read_asset(tmp_path / "asset"), EvaluateParams(), NO_PERCEPTUAL)
+    assert len(found.scores) == FRAMES * len(VARIANTS)
+    assert found.panels[0].asset.std() > 0.05
+
+
+def test_no_held_out_camera_is_refused(tmp_path: Path) -> None:
+    scene = flat_scene(tmp_path)
+    scene = replace(scene, splits=("train",) * 3)
+    with pytest.raises(UserError, match="no held-out camera") as error:
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    assert error.value.remedy is not None
+    assert "holdout" in error.value.remedy
+
+
+def test_an_asset_with_another_number_of_frames_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="asset and the scene have different numbers of frames"):
+        evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), NO_PERCEPTUAL)
+
+
+def test_nan_in_a_rendering_is_caught(tmp_path: Path) -> None:
+    model = tiny_model(view_bias=float("nan"))
+    with pytest.raises(UserError, match="not finite") as error:
+        evaluate(flat_scene(tmp_path), model, flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    assert error.value.place == "camera front, frame 000000"
+
+
+def test_the_subjects_box_has_a_margin_within_the_frame() -> None:
+    mask = np.zeros((60, 40))
+    mask[20:30, 2:5] = 1
+    assert subject_box(mask) == (slice(20 - MASK_MARGIN, 30 + MASK_MARGIN), slice(0, 5 + MASK_MARGIN))
+
+
+def test_a_faint_mask_is_empty() -> None:
+    assert subject_box(np.full((9, 9), 0.05)) is None
+
+
+@pytest.mark.parametrize(
+    ("frames", "wanted", "chosen"), [(12, 3, [0, 6, 11]), (1, 3, [0]), (2, 5, [0, 1]), (9, 1, [0])]
+)
+def test_the_sheets_frames_are_evenly_spaced(frames: int, wanted: int, chosen: list[int]) -> None:
+    assert sheet_frames(frames, wanted) == chosen

@@ -1,0 +1,111 @@
+"""PSNR and SSIM against closed forms and torchmetrics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from torchmetrics.functional.image import peak_signal_noise_ratio, structural_similarity_index_measure
+
+from facefolds_core.scoring.metrics import MAX_PSNR, psnr, shown, ssim, ssim_map
+
+
+def pair(height: int = 24, width: int = 31, noise: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """A smooth picture and a noisy copy, (H, W, 3) in [0, 1]."""
+    rng = np.random.default_rng(0)
+    y, x = np.meshgrid(np.arange(height), np.arange(width), indexing="ij")
+    truth = 0.5 + 0.4 * np.sin(np.stack([x / 3, y / 4, (x + y) / 5], -1))
+    return np.clip(truth + rng.normal(0, noise, truth.shape), 0, 1), truth
+
+
+def channels_first(image: np.ndarray) -> torch.Tensor:
+    return torch.tensor(image).permute(2, 0, 1)[None]
+
+
+def test_psnr_of_a_constant_offset() -> None:
+    truth = np.full((8, 9, 3), 0.5)
+    assert psnr(truth + 0.1, truth) == pytest.approx(20)
+
+
+def test_psnr_agrees_with_torchmetrics() -> None:
+    image, truth = pair()
+    expected = peak_signal_noise_ratio(channels_first(image), channels_first(truth), data_range=1.0)
+    assert psnr(image, truth) == pytest.approx(float(expected), abs=1e-5)  # theirs is float32: 1e-6 apart
+
+
+def test_psnr_of_identical_images_is_capped() -> None:
+    _, truth = pair()
+    assert psnr(truth, truth) == MAX_PSNR
+
+
+def test_psnr_with_a_mask_of_ones_is_psnr() -> None:
+    image, truth = pair()
+    assert psnr(image, truth, np.ones(truth.shape[:2])) == pytest.approx(psnr(image, truth), abs=1e-12)
+
+
+def test_psnr_counts_masked_pixels_by_their_weight() -> None:
+    truth = np.zeros((2, 1, 3))
+    image = truth + np.array([0.1, 0.3])[:, None, None]
+    mask = np.array([[1.0], [0.25]])
+    expected = -10 * math.log10((0.01 + 0.25 * 0.09) / 1.25)
+    assert psnr(image, truth, mask) == pytest.approx(expected)
+
+
+def test_psnr_ignores_what_the_mask_hides() -> None:
+    image, truth = pair()
+    mask = np.zeros(truth.shape[:2])
+    mask[:10] = 1
+    changed = image.copy()
+    changed[10:] = 1 - changed[10:]
+    assert psnr(changed, truth, mask) == psnr(image, truth, mask)
+
+
+def test_empty_masks_have_no_scores() -> None:
+    image, truth = pair()
+    empty = np.zeros(truth.shape[:2])
+    assert psnr(image, truth, empty) is None
+    assert ssim(image, truth, empty) is None
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.1, 0.5])
+def test_ssim_agrees_with_torchmetrics(noise: float) -> None:
+    image, truth = pair(noise=noise)
+    expected = structural_similarity_index_measure(channels_first(image), channels_first(truth), data_range=1.0)
+    assert ssim(image, truth) == pytest.approx(float(expected), abs=1e-7)
+
+
+def test_ssim_of_identical_images_is_one() -> None:
+    _, truth = pair()
+    assert ssim(truth, truth) == pytest.approx(1, abs=1e-12)
+
+
+def test_ssim_of_two_flat_images_is_their_luminance_term() -> None:
+    a, b = 0.3, 0.7
+    expected = (2 * a * b + 1e-4) / (a**2 + b**2 + 1e-4)
+    assert ssim(np.full((16, 16, 3), a), np.full((16, 16, 3), b)) == pytest.approx(expected, abs=1e-9)
+
+
+def test_ssim_with_a_mask_of_ones_is_ssim() -> None:
+    image, truth = pair()
+    assert ssim(image, truth, np.ones(truth.shape[:2])) == pytest.approx(ssim(image, truth), abs=1e-12)
+
+
+def test_ssim_ignores_what_the_mask_hides() -> None:
+    image, truth = pair()
+    mask = np.zeros(truth.shape[:2])
+    mask[:15] = 1
+    changed = image.copy()
+    changed[15:] = 1 - changed[15:]
+    assert ssim(changed, truth, mask) == ssim(image, truth, mask)
+
+
+def test_ssim_of_an_image_smaller_than_its_window_is_finite() -> None:
+    image, truth = pair(3, 2)
+    assert ssim_map(image, truth).shape == (3, 2)
+    assert np.isfinite(ssim_map(image, truth)).all()
+
+
+def test_shown_clips_and_rounds_to_eight_bits() -> None:
+    np.testing.assert_array_equal(shown(np.array([-0.2, 1.3, 100.4 / 255, 100.6 / 255])) * 255, [0, 255, 100, 101])

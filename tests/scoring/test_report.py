@@ -1,0 +1,120 @@
+"""metrics.json and per_image.parquet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from facefolds_core.asset import read_asset
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_json
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
+from facefolds_core.scoring.report import (
+    EXPORT_STAGES,
+    METRICS_VERSION,
+    averages,
+    metrics_json,
+    read_cost,
+    text_table,
+    write_per_image,
+)
+from tests.assets import make_asset
+
+COST_KEYS = [
+    "train_seconds",
+    "iterations",
+    "device",
+    "export_seconds",
+    "vertices",
+    "triangles",
+    "mesh_bytes",
+    "texture_bytes",
+    "gpu_bytes",
+]
+TRAINING = {"seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "preset": "quick"}
+
+
+def score(variant: str, frame: str, psnr: float, subject: float | None = None) -> ImageScore:
+    values: dict[str, float | None] = dict.fromkeys((*METRICS, *SUBJECT_METRICS))
+    return ImageScore("cam", frame, variant, values | {"psnr": psnr, "psnr_subject": subject})
+
+
+SCORES = [score(v, f, p, s) for v in VARIANTS for f, p, s in (("0", 20.0, 10.0), ("1", 30.0, None), ("2", 25.0, 14.0))]
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> SubjectFolders:
+    folders = SubjectFolders(tmp_path / "somebody")
+    make_asset(folders.asset, layers=2, frames=2, resolution=32)
+    write_json(folders.model / "training.json", TRAINING)
+    for i, stage in enumerate(EXPORT_STAGES):
+        write_json(folders.timing(stage), {"stage": stage, "seconds": 10.0**i})
+    return folders
+
+
+def test_psnr_is_the_mean_over_images() -> None:
+    assert averages(SCORES, "asset")["psnr"] == 25
+
+
+def test_images_without_a_value_are_not_counted() -> None:
+    assert averages(SCORES, "asset")["psnr_subject"] == 12
+
+
+def test_a_metric_that_no_image_has_is_null() -> None:
+    assert averages(SCORES, "asset")["lpips"] is None
+
+
+def test_metrics_json_has_all_its_keys_and_no_nan(folders: SubjectFolders) -> None:
+    cost = read_cost(folders, read_asset(folders.asset).manifest)
+    write_json(folders.metrics, metrics_json("somebody", SCORES, cost))
+    metrics = json.loads(folders.metrics.read_text(), parse_constant=pytest.fail)
+    assert list(metrics) == ["version", "subject", "images", "images_with_mask", *VARIANTS, "cost"]
+    assert (metrics["version"], metrics["images"], metrics["images_with_mask"]) == (METRICS_VERSION, 3, 2)
+    assert all(list(metrics[v]) == [*METRICS, *SUBJECT_METRICS] for v in VARIANTS)
+    assert list(metrics["cost"]) == COST_KEYS
+
+
+def test_the_cost_adds_up(folders: SubjectFolders) -> None:
+    manifest = read_asset(folders.asset).manifest
+    cost = read_cost(folders, manifest)
+    assert (cost["train_seconds"], cost["iterations"], cost["device"]) == (12.5, 300, "cpu (2 threads)")
+    assert cost["export_seconds"] == 11111
+    assert cost["vertices"] == 2 * 12**2
+    assert cost["triangles"] == 2 * 2 * 11**2
+    assert cost["mesh_bytes"] == sum(path.stat().st_size for path in folders.asset.glob("*.drc"))
+    assert cost["texture_bytes"] == (folders.asset / "texture.mp4").stat().st_size
+    picture = manifest.texture.width * manifest.texture.height
+    assert cost["gpu_bytes"] == 20 * cost["vertices"] + 12 * cost["triangles"] + 4 * picture
+
+
+def test_per_image_scores_come_back_from_parquet(tmp_path: Path) -> None:
+    write_per_image(SCORES, tmp_path / "scores.parquet")
+    rows = pq.read_table(tmp_path / "scores.parquet").to_pylist()
+    expected = [{"camera": s.camera, "frame": s.frame, "variant": s.variant, **s.values} for s in SCORES]
+    assert rows == expected
+
+
+@pytest.mark.parametrize("text", ["{", '{"seconds": 1}', '{"seconds": "x", "iterations": 1, "device": "cpu"}', "[]"])
+def test_a_garbled_record_is_named(folders: SubjectFolders, text: str) -> None:
+    (folders.model / "training.json").write_text(text)
+    with pytest.raises(UserError) as error:
+        read_cost(folders, read_asset(folders.asset).manifest)
+    assert error.value.file == folders.model / "training.json"
+
+
+def test_a_missing_timing_is_named(folders: SubjectFolders) -> None:
+    folders.timing("decimate").unlink()
+    with pytest.raises(UserError, match="file not found") as error:
+        read_cost(folders, read_asset(folders.asset).manifest)
+    assert error.value.file == folders.timing("decimate")
+
+
+def test_the_table_leaves_out_what_nothing_has() -> None:
+    table = text_table(metrics_json("somebody", SCORES, {}))
+    assert "psnr" in table
+    assert "lpips" not in table
+    assert len(table.splitlines()) == 1 + len(VARIANTS)

@@ -1,0 +1,261 @@
+"""Training: rays, losses, recovery of a known radius, interruption, divergence, foreign checkpoints."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
+from facefolds_core.errors import UserError
+from facefolds_core.model import load_model
+from facefolds_core.params import TrainParams
+from facefolds_core.training import loop
+from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
+from facefolds_core.training.losses import batch_losses
+from facefolds_core.training.rays import RaySampler
+from facefolds_core.training.start import Start, find_start
+from tests.scenes import OPAQUE, make_scene, render
+
+CPU = torch.device("cpu")
+TINY = {
+    "preset": "quick",
+    "layers": 3,
+    "manifold_start": "sphere",
+    "manifold_layers": 2,
+    "manifold_width": 16,
+    "texture_layers": 2,
+    "texture_width": 16,
+    "latent_dim": 4,
+    "uv_frequencies": 3,
+    "search_samples": 32,
+    "rays": 128,
+    "iterations": 12,
+}
+
+
+def params(**values: object) -> TrainParams:
+    return TrainParams.model_validate({**TINY, **values})
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return make_scene(tmp_path_factory.mktemp("scene"), OPAQUE, size=24, surface_radius=0.33)
+
+
+def run(scene: Scene, settings: TrainParams, folder: Path) -> dict[str, torch.Tensor]:
+    loop.train(scene, settings, folder / "model", folder / "checkpoints", folder / "log")
+    return load_file(folder / "model" / "model.safetensors")
+
+
+def state_for(scene: Scene, settings: TrainParams, start: Start | None = None) -> tuple[loop.TrainingState, RaySampler]:
+    start = start or find_start(scene, settings.layers, settings.level_halfwidth)
+    state = loop.new_state(settings, loop.model_spec(settings, start, scene.num_frames, ""), CPU)
+    return state, RaySampler(scene, state.model.centre, start.radius, CPU)
+
+
+def test_rays_have_the_colours_of_their_pixels(scene: Scene) -> None:
+    _, sampler = state_for(scene, params())
+    rays = sampler.draw(300, torch.Generator().manual_seed(0))
+    images = {(c, k): render(scene.cameras[c], OPAQUE, k)[0] for c in scene.indices("train") for k in range(2)}
+    centres = np.array([camera.centre for camera in scene.cameras])
+    for o, d, t, rgb in zip(rays.origins, rays.directions, rays.time, rays.rgb, strict=True):
+        c = int(np.abs(centres - o.numpy()).sum(1).argmin())
+        (x, y), _ = scene.cameras[c].project((o + d).numpy().astype(float))
+        assert scene.splits[c] == "train"
+        assert x % 1 == pytest.approx(0.5, abs=1e-3) and y % 1 == pytest.approx(0.5, abs=1e-3)
+        assert rgb.numpy() == pytest.approx(images[c, int(t)][int(y), int(x)], abs=0.51 / 255)
+
+
+def test_rays_that_miss_the_search_ball_are_not_drawn(scene: Scene) -> None:
+    sampler = RaySampler(scene, torch.tensor(SPHERE_CENTRE), 0.3, CPU)
+    rays = sampler.draw(500, torch.Generator().manual_seed(0))
+    offset = rays.origins - torch.tensor(SPHERE_CENTRE)
+    nearest = torch.linalg.cross(offset, rays.directions).norm(dim=-1)
+    assert len(sampler.pixels) < 6 * 24 * 24
+    assert (nearest < 0.3 + 1e-5).all()
+
+
+def test_every_camera_and_frame_is_drawn(scene: Scene) -> None:
+    _, sampler = state_for(scene, params())
+    rays = sampler.draw(2000, torch.Generator().manual_seed(0))
+    assert set(rays.time.tolist()) == {0.0, 1.0}
+    assert len({tuple(o.tolist()) for o in rays.origins}) == len(scene.indices("train"))
+
+
+def test_loss_is_the_weighted_sum_of_its_parts(scene: Scene) -> None:
+    state, sampler = state_for(scene, params())
+    torch.nn.init.normal_(state.model.textures.view.weight, std=0.1)
+    rays = sampler.draw(100, torch.Generator().manual_seed(0))
+    losses = batch_losses(state.model, rays, lambda_view=3.0, lambda_reg=0.5)
+    traced = state.model.trace(rays.origins, rays.directions, rays.time, view_effects=True)
+    weights = [layer.weight for layer in state.model.manifolds.hidden]
+    expected = (
+        (traced.rgb - rays.rgb).abs().mean() + 3 * (traced.view**2).mean() + 0.5 * sum((w**2).sum() for w in weights)
+    )
+    torch.testing.assert_close(losses.total, expected)
+
+
+def test_learning_rates_decay_exponentially() -> None:
+    settings = TrainParams.model_validate({"preset": "paper"})
+    rates = loop.learning_rates(settings, 400_000)
+    assert rates == pytest.approx({"manifold": 7e-4 * 0.05**2, "texture": 1e-3 * 0.2**2})
+
+
+def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
+    # One textured opaque sphere of radius 0.33; the single layer starts 0.02 too far out and must move in.
+    scene = make_scene(tmp_path, OPAQUE, size=48, frames=1)
+    settings = params(
+        layers=1, rays=512, iterations=250, decay_interval=250, lr_manifold=1e-3, lr_texture=1e-2, texture_width=48,
+        uv_frequencies=4, lambda_view=10.0, lambda_reg=0.0,
+    )  # fmt: skip
+    state, sampler = state_for(scene, settings, Start((0.35,), 0.42, None))
+    while state.iteration < settings.iterations:
+        loop.train_step(state, sampler, settings)
+    grid = torch.linspace(-0.25, 0.25, 9)
+    points, valid = state.model.surface_points(torch.cartesian_prod(grid, grid))
+    radii = (points[0] - state.model.centre).norm(dim=-1)
+    assert valid.all()
+    assert float((radii - 0.33).abs().mean()) < 0.004
+
+
+class Killed(BaseException):
+    """Stands for a signal that ends the process."""
+
+
+@pytest.mark.parametrize("log_lost", [False, True])
+def test_an_interrupted_run_ends_at_the_same_result(
+    scene: Scene, tmp_path: Path, log_lost: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = params(manifold_start="surface", checkpoint_seconds=1e-9)
+    monkeypatch.setattr(loop, "START_ITERATIONS", 5)
+    whole = run(scene, settings, tmp_path / "whole")
+    step = loop.train_step
+
+    def interrupted(state: loop.TrainingState, *rest: object) -> object:
+        if state.iteration == 7:
+            raise Killed
+        return step(state, *rest)
+
+    monkeypatch.setattr(loop, "train_step", interrupted)
+    with pytest.raises(Killed):
+        run(scene, settings, tmp_path / "parts")
+    assert not (tmp_path / "parts" / "model").exists()
+    monkeypatch.setattr(loop, "train_step", step)
+    if log_lost:  # `dvc repro` deletes a stage's outputs before it runs the stage again
+        shutil.rmtree(tmp_path / "parts" / "log")
+    resumed = run(scene, settings, tmp_path / "parts")
+    assert "continuing from iteration 7" in capsys.readouterr().out
+    assert whole.keys() == resumed.keys()
+    assert all(torch.equal(whole[name], resumed[name]) for name in whole)
+
+
+def test_the_checkpoint_is_removed_and_the_report_written(scene: Scene, tmp_path: Path) -> None:
+    settings = params(checkpoint_seconds=1e-9)
+    run(scene, settings, tmp_path)
+    report = json.loads((tmp_path / "model" / "training.json").read_text())
+    assert not list((tmp_path / "checkpoints").rglob("*.safetensors"))
+    assert report["iterations"] == 12 and report["device"].startswith("cpu") and report["preset"] == "quick"
+    assert load_model(tmp_path / "model").num_layers == 3
+
+
+def test_the_log_holds_losses_rates_and_speed(scene: Scene, tmp_path: Path) -> None:
+    run(scene, params(), tmp_path)
+    names = {str(p.relative_to(tmp_path / "log" / "plots" / "metrics")) for p in (tmp_path / "log").rglob("*.tsv")}
+    losses = {f"loss/{name}.tsv" for name in ("total", "reconstruction", "view", "regularisation")}
+    assert names == {*losses, "psnr.tsv", "lr/manifold.tsv", "lr/texture.tsv", "rays_per_second.tsv"}
+
+
+def test_nothing_is_sent_to_dvc_studio(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DVC_STUDIO_TOKEN", "token")
+    monkeypatch.setenv("DVC_STUDIO_REPO_URL", "git@example.invalid:a/b.git")
+    monkeypatch.delenv("DVC_STUDIO_OFFLINE", raising=False)
+    sent: list[object] = []
+    monkeypatch.setattr("dvclive.studio.post_live_metrics", lambda *a, **k: sent.append(a))
+    run(scene, params(), tmp_path)
+    assert not sent
+
+
+def test_divergence_is_caught_and_the_last_checkpoint_kept(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = params(checkpoint_seconds=1e-9)
+    step = loop.train_step
+
+    def poisoned(state: loop.TrainingState, *rest: object) -> object:
+        if state.iteration == 5:
+            with torch.no_grad():
+                state.model.textures.base.bias[0] = float("nan")
+        return step(state, *rest)
+
+    monkeypatch.setattr(loop, "train_step", poisoned)
+    with pytest.raises(UserError, match="not finite") as caught:
+        run(scene, settings, tmp_path)
+    assert "iteration 5" in str(caught.value) and "lr_manifold" in str(caught.value.remedy)
+    kept = load_file(tmp_path / "checkpoints" / fingerprint(settings, scene) / CHECKPOINT)
+    assert all(t.isfinite().all() for t in kept.values())
+    assert not (tmp_path / "model").exists()
+
+
+def test_parameters_are_untouched_by_a_step_that_diverges(scene: Scene) -> None:
+    settings = params()
+    state, sampler = state_for(scene, settings)
+    with torch.no_grad():
+        state.model.manifolds.hidden[0].weight[0, 0] = float("inf")
+    before = {name: tensor.clone() for name, tensor in state.model.state_dict().items()}
+    with pytest.raises(UserError):
+        loop.train_step(state, sampler, settings)
+    assert all(torch.equal(before[name], tensor) for name, tensor in state.model.state_dict().items())
+
+
+def test_checkpoint_of_another_configuration(scene: Scene, tmp_path: Path) -> None:
+    state, sampler = state_for(scene, params())
+    loop.train_step(state, sampler, params())
+    save_checkpoint(state, "aaaa", tmp_path)
+    with pytest.raises(UserError, match="another configuration") as caught:
+        load_checkpoint(state, "bbbb", tmp_path)
+    assert "bbbb" in str(caught.value.expected) and "aaaa" in str(caught.value.found)
+
+
+def test_checkpoint_of_another_architecture(scene: Scene, tmp_path: Path) -> None:
+    state, sampler = state_for(scene, params())
+    loop.train_step(state, sampler, params())
+    save_checkpoint(state, "aaaa", tmp_path)
+    other, _ = state_for(scene, params(texture_width=20))
+    with pytest.raises(UserError, match="does not belong") as caught:
+        load_checkpoint(other, "aaaa", tmp_path)
+    assert "shape" in str(caught.value.expected)
+
+
+def test_truncated_checkpoint(scene: Scene, tmp_path: Path) -> None:
+    state, sampler = state_for(scene, params())
+    loop.train_step(state, sampler, params())
+    path = save_checkpoint(state, "aaaa", tmp_path)
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(UserError, match="damaged") as caught:
+        load_checkpoint(state, "aaaa", tmp_path)
+    assert caught.value.file == path and "delete" in str(caught.value.remedy)
+
+
+def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_path: Path) -> None:
+    other = make_scene(tmp_path, OPAQUE, size=20)
+    marks = {fingerprint(params(), scene), fingerprint(params(seed=1), scene), fingerprint(params(), other)}
+    assert len(marks) == 3
+    assert fingerprint(params(device="cpu", checkpoint_seconds=5.0), scene) == fingerprint(params(), scene)
+
+
+def test_missing_training_image(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, OPAQUE, size=8, frames=1)
+    more_frames = Scene(**{**vars(scene), "frame_ids": ("000000", "000001"), "times": np.arange(2.0)})
+    with pytest.raises(UserError, match="missing") as caught:
+        state_for(more_frames, params())
+    assert "frame 000001" in str(caught.value.place)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="only where there is no CUDA device")
+def test_cuda_where_there_is_none() -> None:
+    with pytest.raises(UserError, match="no CUDA device"):
+        loop.pick_device("cuda")
