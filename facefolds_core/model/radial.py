@@ -50,7 +50,7 @@ class RadialManifolds(nn.Module):
 
     @property
     def radius(self) -> float:
-        return float((self.middle + self.halfwidth).max()) + MARGIN
+        return float((self.middle + self.halfwidth).detach().max()) + MARGIN
 
     def radii(self) -> Tensor:
         """[rows, columns, N], outermost first."""

@@ -207,6 +207,7 @@ class _Trainer:
                 self.images.frame(frame),
                 frame,
                 self.params.lambda_veil,
+                self.params.lambda_solid,
                 BACKGROUND_RATE,
                 FAINT if number >= len(self.fit.halfwidths) else 0.0,
                 rates,

@@ -39,6 +39,7 @@ def shade(
     background: Tensor,  # [R, 3]
     texture: Tensor,  # [H, W, N, 4]
     veil: float,
+    solid: float,
     rate: float,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
@@ -48,7 +49,8 @@ def shade(
         weights, through = compositing_weights(rgba[..., 3])
         colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * background
         squares = (colour - target).square().sum()
-        (gradient,) = torch.autograd.grad(0.5 * squares + veil * (1 - through).sum(), texture)
+        loss = 0.5 * squares + (veil * (1 - through) + solid * through * (1 - through)).sum()
+        (gradient,) = torch.autograd.grad(loss, texture)
     moved = background - rate * (through**3)[:, None] * (colour - target)
     return gradient, moved.detach().clamp(0, 1), squares.detach()
 

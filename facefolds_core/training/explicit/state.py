@@ -85,6 +85,7 @@ class TextureState:
         images: NDArray[np.uint8],
         frame: int,
         veil: float,
+        solid: float,
         background_rate: float,
         faint: float,
         rates: NDArray[np.float32],
@@ -107,6 +108,7 @@ class TextureState:
                 texture.numpy().reshape(h, w, n, 4),
                 self.gradient.numpy().reshape(-1, h, w, n, 4),
                 veil,
+                solid,
                 background_rate,
                 faint,
             )
@@ -123,7 +125,7 @@ class TextureState:
             )
         else:
             squares = self._reference_step(
-                views, rays, images, frame, texture, veil, background_rate, rates, keep, correct
+                views, rays, images, frame, texture, veil, solid, background_rate, rates, keep, correct
             )
         return float(squares) / (3 * len(rays))
 
@@ -135,6 +137,7 @@ class TextureState:
         frame: int,
         texture: Tensor,
         veil: float,
+        solid: float,
         background_rate: float,
         rates: NDArray[np.float32],
         keep: NDArray[np.float32],
@@ -150,7 +153,7 @@ class TextureState:
         )
         n = texture.shape[1]
         gradient, moved, squares = reference.shade(
-            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, background_rate
+            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, solid, background_rate
         )
         self.background[at] = moved
         reference.adam_step(
