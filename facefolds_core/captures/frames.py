@@ -7,7 +7,7 @@ and need not be complete (masks exist for some images only).
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +77,10 @@ class FrameStore:
 
     def __contains__(self, key: tuple[int, int]) -> bool:
         return key in self._images
+
+    def __iter__(self) -> Iterator[tuple[int, int]]:
+        """All (camera index, frame index) that the file holds, sorted."""
+        return iter(self.keys())
 
     def keys(self) -> list[tuple[int, int]]:
         """All (camera index, frame index) that the file holds, sorted."""

@@ -86,10 +86,12 @@ def evaluate(
     caster = AssetCaster(asset)
     scores: list[ImageScore] = []
     panels: list[Panel] = []
-    with progress(total=len(held_out) * scene.num_frames, desc="evaluate", unit="image") as bar:
+    count = sum(camera in held_out for camera, _ in truths)
+    with progress(total=count, desc="evaluate", unit="image") as bar:
         for index in held_out:
             camera = scene.cameras[index]
-            for k, images in enumerate(_rendered(model, asset, caster, camera, params.background)):
+            frames = [k for k in range(scene.num_frames) if (index, k) in truths]
+            for k, images in _rendered(model, asset, caster, camera, frames, params.background):
                 frame = scene.frame_ids[k]
                 _check_finite(images, camera.name, frame)
                 pictures = {variant: shown(image) for variant, image in images.items()}
@@ -152,15 +154,21 @@ def subject_box(mask: Array) -> tuple[slice, slice] | None:
 
 
 def _rendered(
-    model: RadianceManifolds, asset: Asset, caster: AssetCaster, camera: Camera, background: tuple[float, float, float]
-) -> Iterator[dict[str, NDArray[np.float32]]]:
+    model: RadianceManifolds,
+    asset: Asset,
+    caster: AssetCaster,
+    camera: Camera,
+    frames: list[int],
+    background: tuple[float, float, float],
+) -> Iterator[tuple[int, dict[str, NDArray[np.float32]]]]:
     """The variants' images (H, W, 3) over `background`, frame by frame."""
     view, hits = ModelView(model, camera), caster.cast(camera)
-    for k, textures in enumerate(asset.frames()):
+    whole = len(frames) == asset.num_frames
+    for k, textures in enumerate(asset.frames()) if whole else ((k, asset.frame(k)) for k in frames):
         with_view, without_view, alpha = view.render(float(k))
         behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
         shipped, _ = composite(hits, textures, background)
-        yield {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
+        yield k, {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
 
 
 def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:

@@ -204,7 +204,7 @@ def _begin(state: TrainingState, params: TrainParams, start: Start) -> None:
         began = time.perf_counter()
         error = fit_outline(manifolds, start.outline, START_ITERATIONS, state.generator)
         state.seconds += time.perf_counter() - began
-        print(f"train: manifolds start at the tracked mesh, root mean square error {error:.4f} units")
+        print(f"train: manifolds start at the tracked mesh, mean error {error:.4f} units")
 
 
 def _run(

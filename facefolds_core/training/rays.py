@@ -41,24 +41,16 @@ class RaySampler:
         device: where batches go. Drawing itself is on the CPU, so that it repeats on any device.
 
     Raises:
-        UserError: if a training image is missing from the store, or no pixel of any camera meets the ball.
+        UserError: if the training cameras do not all have as many images (each camera has every frame, or, in a
+            stabilised scene, one), or no pixel of any camera meets the ball.
     """
 
     def __init__(self, scene: Scene, centre: Tensor, radius: float, device: torch.device) -> None:
         self.store = scene.open_frames()
         self.cameras = scene.indices("train")
-        self.num_frames = scene.num_frames
         self.width = scene.width
         self.device = device
-        for camera in self.cameras:
-            for frame in range(self.num_frames):
-                if (camera, frame) not in self.store:
-                    raise UserError(
-                        "a training image is missing",
-                        file=self.store.path,
-                        place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                        remedy="run `dvc repro` to make the normalised scene again",
-                    )
+        self.frames = torch.from_numpy(self._frames_of_cameras(scene))
         pixels = []
         for camera in self.cameras:
             origins, directions = (torch.from_numpy(a.reshape(-1, 3).copy()) for a in scene.cameras[camera].rays())
@@ -82,8 +74,9 @@ class RaySampler:
     def draw(self, count: int, generator: torch.Generator) -> Rays:
         """`count` rays, drawn with replacement."""
         index = torch.randint(len(self.pixels), (count,), generator=generator)
-        frame = torch.randint(self.num_frames, (count,), generator=generator)
         camera = torch.searchsorted(self.ends, index, right=True)
+        turn = torch.randint(self.frames.shape[1], (count,), generator=generator)
+        frame = self.frames[camera, turn]
         pixel = self.pixels[index].long()
         colours = self._colours(camera.numpy(), frame.numpy(), pixel.numpy())
         xy1 = torch.stack([pixel % self.width + 0.5, pixel // self.width + 0.5, torch.ones(count)], -1)
@@ -96,13 +89,34 @@ class RaySampler:
             rgb=torch.from_numpy(colours).to(self.device).float() / 255,
         )
 
+    def _frames_of_cameras(self, scene: Scene) -> np.ndarray:
+        """(cameras, M) int64: the frames that each training camera has, M of them."""
+        frames: dict[int, list[int]] = {camera: [] for camera in self.cameras}
+        for camera, frame in self.store:
+            if camera in frames:
+                frames[camera].append(frame)
+        most = max(map(len, frames.values()), default=0)
+        short = [f"camera {scene.cameras[c].name}" for c, found in frames.items() if len(found) < max(most, 1)]
+        unseen = set(range(scene.num_frames)) - {frame for found in frames.values() for frame in found}
+        missing = short + [f"frame {scene.frame_ids[frame]}" for frame in sorted(unseen)]
+        if missing:
+            raise UserError(
+                "training images are missing",
+                file=self.store.path,
+                place=", ".join(missing),
+                expected="as many images of every training camera, and every frame seen by one",
+                remedy="run `dvc repro` to make the normalised scene again",
+            )
+        return np.array([frames[camera] for camera in self.cameras], np.int64)
+
     def _colours(self, camera: np.ndarray, frame: np.ndarray, pixel: np.ndarray) -> np.ndarray:
         """(R, 3) uint8; one look-up an image, because each is its own view of the mapped file."""
-        key = camera * self.num_frames + frame
+        frames = int(frame.max()) + 1
+        key = camera * frames + frame
         order = np.argsort(key, kind="stable")
         images, starts = np.unique(key[order], return_index=True)
         colours = np.empty((len(key), 3), np.uint8)
         for image, rows in zip(images, np.split(order, starts[1:]), strict=True):
-            view = self.store.image(self.cameras[image // self.num_frames], int(image % self.num_frames))
+            view = self.store.image(self.cameras[image // frames], int(image % frames))
             colours[rows] = view.reshape(-1, 3)[pixel[rows]]
         return colours

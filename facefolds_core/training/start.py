@@ -109,33 +109,36 @@ def fit_outline(
 ) -> float:
     """Regress G(x) = |x - c| + r0 - rho(n), rho the outline's radius in direction n: the middle level on the surface.
 
-    rho is interpolated from the three nearest vertices in direction, so beyond the mesh it continues as its border.
-    Points are drawn at random over the hemisphere (uniform in u, v) and within 0.1 of the surface. Adam, learning
-    rate 5e-3 falling to 1e-4 (cosine).
+    Three quarters of the points lie in directions of the outline's vertices; the others at random over the hemisphere
+    (uniform in u, v), where rho is interpolated from the three nearest vertices, so that beyond the mesh it continues
+    as its border. Points lie within 0.1 of the surface. The mean absolute error is minimised (borders and folds are
+    outliers), by Adam, learning rate 5e-3 falling to 1e-4 (cosine).
 
     Returns:
-        the root mean square error of the last tenth of the iterations, units.
+        the mean absolute error of the last tenth of the iterations, units.
     """
     device = manifolds.centre.device
     tree = cKDTree(outline.directions)
+    nearest_count = min(3, len(outline.radii))
     middle = 0.5 * float(manifolds.levels[0] + manifolds.levels[-1])
+    on_mesh = points * 3 // 4
     optimiser = torch.optim.Adam(manifolds.parameters(), lr=5e-3)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, iterations, eta_min=1e-4)
     errors = []
     for _ in range(iterations):
-        draws = torch.rand(points, 3, generator=generator) * 2 - 1
-        directions = uv_to_directions(draws[:, :2])
-        distance, nearest = tree.query(directions.numpy(), k=min(3, len(outline.radii)))
-        distance, nearest = distance.reshape(points, -1), nearest.reshape(points, -1)
+        anywhere = uv_to_directions(torch.rand(points - on_mesh, 2, generator=generator) * 2 - 1).double().numpy()
+        distance, nearest = (a.reshape(len(anywhere), -1) for a in tree.query(anywhere, k=nearest_count))
         weights = 1 / (distance + 1e-4)
-        rho = (outline.radii[nearest] * weights).sum(1) / weights.sum(1)
-        rho = torch.from_numpy(rho.astype(np.float32)).to(device)
-        radius = rho + 0.1 * draws[:, 2].to(device)
-        x = manifolds.centre + radius[:, None] * directions.to(device)
-        loss = (manifolds.value(x) - (radius + middle - rho)).square().mean()
+        interpolated = (outline.radii[nearest] * weights).sum(1) / weights.sum(1)
+        vertex = torch.randint(len(outline.radii), (on_mesh,), generator=generator).numpy()
+        directions = np.concatenate([anywhere, outline.directions[vertex]]).astype(np.float32)
+        rho = torch.from_numpy(np.concatenate([interpolated, outline.radii[vertex]]).astype(np.float32)).to(device)
+        radius = rho + 0.1 * (torch.rand(points, generator=generator) * 2 - 1).to(device)
+        x = manifolds.centre + radius[:, None] * torch.from_numpy(directions).to(device)
+        loss = (manifolds.value(x) - (radius + middle - rho)).abs().mean()
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
         schedule.step()
         errors.append(float(loss.detach()))
-    return math.sqrt(float(np.mean(errors[-max(1, iterations // 10) :])))
+    return float(np.mean(errors[-max(1, iterations // 10) :]))

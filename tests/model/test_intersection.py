@@ -34,10 +34,10 @@ def spheres(levels: tuple[float, ...] = LEVELS, samples: int = 64) -> MlpManifol
 
 
 def bumpy(samples: int = 64) -> MlpManifolds:
-    """A field with a last layer that is not zero: surfaces 0.02 away from spheres."""
+    """A field with a last layer that is not zero: surfaces about 0.01 away from spheres."""
     manifolds = spheres(samples=samples)
     with torch.no_grad():
-        manifolds.last.weight.normal_(std=0.01)
+        manifolds.last.weight.normal_(std=0.001)
     return manifolds
 
 

@@ -87,6 +87,15 @@ def test_a_killed_training_resumes(project_root: Path, tmp_path: Path, project: 
     assert (tiny.root / "data" / "actor" / "model" / "model.safetensors").exists()
 
 
+def test_a_stabilised_capture_runs_to_the_end(project_root: Path, tmp_path: Path) -> None:
+    params = PARAMS.replace("iterations: 60", "iterations: 10") + "normalize: {stabilize: true}\n"
+    tiny = TinyProject(project_root, tmp_path / "stabilised", params)
+    status, output = tiny.repro()
+    assert status == 0, output
+    metrics = json.loads((tiny.root / "data" / "actor" / "metrics.json").read_text())
+    assert metrics["images"] == 4  # two held-out cameras, two frames, one camera an image
+
+
 @pytest.mark.parametrize(
     ("params", "says"),
     [
