@@ -91,6 +91,7 @@ class TrainParams(Section):
 
     Attributes:
         preset: a name from facefolds_core/presets.py; its values fill the keys that are not given.
+        model: "mlp", the paper's, or "explicit": radius maps and texel grids; see docs/method.md.
         device: "auto" takes CUDA where there is one.
         seed: of initialisation and ray sampling.
         layers: N, number of manifolds.
@@ -107,10 +108,13 @@ class TrainParams(Section):
         lr_manifold, lr_texture: initial learning rates.
         decay_manifold, decay_texture: factors by which the rates fall each `decay_interval` iterations, exponentially.
         lambda_view, lambda_reg: weights of |view term|^2 and of |manifold weights|^2.
+        lambda_veil: explicit model: weight of the opacity of a ray, so that what the background explains stays clear.
+        lambda_solid: explicit model: weight of T (1 - T), T a ray's transmittance: what is not clear is to be solid.
         checkpoint_seconds: a checkpoint is written this often.
     """
 
     preset: str = "quick"
+    model: Literal["mlp", "explicit"] = "mlp"
     device: Literal["auto", "cpu", "cuda"] = "auto"
     seed: int = 0
     layers: Annotated[int, Field(ge=1, le=64)]
@@ -134,6 +138,8 @@ class TrainParams(Section):
     decay_interval: Positive
     lambda_view: Annotated[float, Field(ge=0)]
     lambda_reg: Annotated[float, Field(ge=0)]
+    lambda_veil: Annotated[float, Field(ge=0)] = 0.001
+    lambda_solid: Annotated[float, Field(ge=0)] = 0.01
     checkpoint_seconds: Annotated[float, Field(gt=0)] = 60.0
 
     @model_validator(mode="before")

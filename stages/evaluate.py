@@ -15,7 +15,7 @@ from facefolds_core.scoring.evaluation import evaluate
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
-from facefolds_core.training.loop import pick_device
+from facefolds_core.training.report import pick_device
 from stages.common import run_stage
 
 

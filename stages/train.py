@@ -6,13 +6,18 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.params import TrainParams
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.loop import train
 from stages.common import run_stage
 
 
 def train_stage(folders: SubjectFolders) -> str:
     params = read_stage(TrainParams, folders.config)
-    report = train(read_scene(folders.scene), params, folders.model, folders.checkpoints, folders.training_log)
+    scene = read_scene(folders.scene)
+    if params.model == "explicit":
+        report = train_explicit(scene, params, folders.model, folders.training_log)
+    else:
+        report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)
     return (
         f"{report.iterations} iterations on {report.device}, {report.rays_per_second:.0f} rays/s, "
         f"PSNR {report.final_psnr:.2f} dB on training rays, model in {folders.model}"

@@ -6,18 +6,23 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
+from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.textures import MlpTextures
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
+
+
+Count = Annotated[int, Field(ge=2)]
 
 
 class ModelSpec(BaseModel):
@@ -53,8 +58,44 @@ class ModelSpec(BaseModel):
     fingerprint: str = ""
 
 
-def build_model(spec: ModelSpec) -> RadianceManifolds:
+class ExplicitSpec(BaseModel):
+    """The same for the explicit model (`radial`, `grids`).
+
+    Attributes:
+        centre: c, units.
+        window: (u0, u1, v0, v1).
+        nodes: rows and columns of the radius maps.
+        texels: H and W of the textures.
+        num_layers, num_frames: N and K.
+        fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    format: Literal["facefolds-model"] = "facefolds-model"
+    version: Literal[1] = 1
+    kind: Literal["explicit"] = "explicit"
+    centre: tuple[float, float, float]
+    window: tuple[float, float, float, float]
+    nodes: tuple[Count, Count]
+    texels: tuple[Count, Count]
+    num_layers: Annotated[int, Field(ge=1)]
+    num_frames: Annotated[int, Field(ge=1)]
+    fingerprint: str = ""
+
+
+Spec = Annotated[ModelSpec | ExplicitSpec, Field(discriminator="kind")]
+_SPEC: TypeAdapter[ModelSpec | ExplicitSpec] = TypeAdapter(Spec)
+
+
+def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
     """An untrained model; its random numbers come from torch's global generator."""
+    if isinstance(spec, ExplicitSpec):
+        blank = torch.ones(spec.nodes)
+        return RadianceManifolds(
+            RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
+            GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames),
+        )
     manifolds = MlpManifolds(
         spec.centre, spec.levels, spec.radius, spec.manifold_layers, spec.manifold_width, spec.search_samples
     )
@@ -117,14 +158,14 @@ def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: P
             raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
 
 
-def save_model(model: RadianceManifolds, spec: ModelSpec, folder: Path) -> None:
+def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:
     """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
     save_file(tensors, str(folder / "model.safetensors"), metadata={"spec": spec.model_dump_json()})
     write_json(folder / "model.json", spec.model_dump(mode="json"))
 
 
-def read_spec(folder: Path) -> ModelSpec:
+def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
     """`model.json`.
 
     Raises:
@@ -133,7 +174,7 @@ def read_spec(folder: Path) -> ModelSpec:
     path = folder / "model.json"
     value: Any = read_json(path, remedy=_REMEDY)
     try:
-        return ModelSpec.model_validate(value)
+        return _SPEC.validate_python(value)
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(

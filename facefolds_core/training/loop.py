@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import resource
 import shutil
 import time
 from dataclasses import asdict, dataclass
@@ -29,6 +28,7 @@ from facefolds_core.training.checkpoints import (
 )
 from facefolds_core.training.losses import Losses, batch_losses
 from facefolds_core.training.rays import RaySampler
+from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.start import Start, find_start, fit_outline
 
 LOG_POINTS = 500
@@ -36,48 +36,6 @@ LOG_POINTS = 500
 
 START_ITERATIONS = 600
 """Of the regression onto the tracked mesh (`manifold_start: surface`)."""
-
-
-@dataclass(frozen=True)
-class TrainingReport:
-    """`training.json`.
-
-    Attributes:
-        seconds: of training (start included, over all runs that it took).
-        iterations: Adam steps.
-        device: "cpu (2 threads)" or the GPU's name.
-        preset: name in params.yaml.
-        rays_per_second: mean over `seconds`.
-        peak_memory_bytes: resident (CPU) or allocated (CUDA) at most, in the last run.
-        final_psnr: of the training rays over the last log interval, dB.
-    """
-
-    seconds: float
-    iterations: int
-    device: str
-    preset: str
-    rays_per_second: float
-    peak_memory_bytes: int
-    final_psnr: float
-
-
-def pick_device(name: str) -> torch.device:
-    """ "auto", "cpu" or "cuda" -> device.
-
-    Raises:
-        UserError: if CUDA is asked for and there is none.
-    """
-    if name == "cuda" and not torch.cuda.is_available():
-        raise UserError(
-            "no CUDA device",
-            place="train.device",
-            expected="a CUDA GPU that this build of torch can use",
-            found="none",
-            remedy="set `device: auto` or `device: cpu` in params.yaml, or install a CUDA build of torch",
-        )
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    return torch.device(name)
 
 
 def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
@@ -231,7 +189,8 @@ def train(scene: Scene, params: TrainParams, model_folder: Path, checkpoints: Pa
     else:
         _begin(state, params, start)
     psnr = _run(state, sampler, params, mark, own_checkpoints, log)
-    report = _report(state, params, device, psnr)
+    rays = state.iteration * params.rays
+    report = make_report(state.seconds, state.iteration, device, params.preset, rays, psnr)
     with atomic_folder(model_folder) as temporary:
         save_model(state.model, spec, temporary)
         write_json(temporary / "training.json", asdict(report))
@@ -266,20 +225,3 @@ def _run(
     finally:
         progress.close()
     return progress.psnr
-
-
-def _report(state: TrainingState, params: TrainParams, device: torch.device, psnr: float) -> TrainingReport:
-    if device.type == "cuda":
-        name, peak = torch.cuda.get_device_name(device), torch.cuda.max_memory_allocated(device)
-    else:
-        name = f"cpu ({torch.get_num_threads()} threads)"
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return TrainingReport(
-        seconds=round(state.seconds, 1),
-        iterations=state.iteration,
-        device=name,
-        preset=params.preset,
-        rays_per_second=round(state.iteration * params.rays / max(state.seconds, 1e-9), 1),
-        peak_memory_bytes=peak,
-        final_psnr=round(psnr, 3),
-    )

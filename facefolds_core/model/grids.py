@@ -1,0 +1,73 @@
+"""Explicit textures: colour and opacity on texel grids over the window of the radius maps."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.model.textures import Shaded
+
+
+class GridTextures(nn.Module):
+    """RGBA of N layers and K frames on H x W texels; texel centres as in `geometry.sphere_uv`.
+
+    At a texel, colour of layer n at frame k = clamp(colour + layers[n, :3] + frame_colour[k], 0, 1) and
+    alpha = sigmoid(layers[n, 3] + frame_alpha[k, n]). Between texels the results are interpolated (as a GPU samples
+    the exported texture); between frames the sums are, before clamp and sigmoid. Nearly all colour is shared by the
+    layers, which therefore cannot paint a different picture each for the cameras that see them at different angles.
+
+    Attributes:
+        colour: [H, W, 3].
+        layers: [H, W, N, 4]: colour added by a layer, logit of its alpha.
+        frame_colour: [K, H, W, 3].
+        frame_alpha: [K, H, W, N], added to the logit.
+
+    Args:
+        window: (u0, u1, v0, v1).
+        shape: (H, W).
+        num_layers, num_frames: N and K.
+    """
+
+    def __init__(self, window: Window, shape: tuple[int, int], num_layers: int, num_frames: int) -> None:
+        super().__init__()
+        self.window = window
+        h, w = shape
+        self.colour = nn.Parameter(torch.zeros(h, w, 3))
+        self.layers = nn.Parameter(torch.zeros(h, w, num_layers, 4))
+        self.frame_colour = nn.Parameter(torch.zeros(num_frames, h, w, 3))
+        self.frame_alpha = nn.Parameter(torch.zeros(num_frames, h, w, num_layers))
+
+    @property
+    def num_frames(self) -> int:
+        return len(self.frame_alpha)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.colour.shape[0], self.colour.shape[1]
+
+    def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
+        """Points at uv [P, 2] of layers [P] at frame times [P]. There is no view-dependent term."""
+        height, width = self.shape
+        st = uv_to_st(uv, self.window)
+        x = (st[:, 0] * width - 0.5).clamp(0, width - 1)
+        y = (st[:, 1] * height - 0.5).clamp(0, height - 1)
+        j, i = x.floor().clamp(max=max(width - 2, 0)).long(), y.floor().clamp(max=max(height - 2, 0)).long()
+        b, a = (x - j)[:, None], (y - i)[:, None]
+        time = time.clamp(0, self.num_frames - 1)
+        before = time.floor().long()
+        after = (before + 1).clamp(max=self.num_frames - 1)
+        fraction = (time - before)[:, None]
+        rgba = torch.zeros_like(b)
+        for di, wi in ((0, 1 - a), (1, a)):
+            for dj, wj in ((0, 1 - b), (1, b)):
+                ii, jj = (i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1)
+                own = self.layers[ii, jj, layer]
+                moving = torch.lerp(self.frame_colour[before, ii, jj], self.frame_colour[after, ii, jj], fraction)
+                fading = torch.lerp(
+                    self.frame_alpha[before, ii, jj, layer], self.frame_alpha[after, ii, jj, layer], fraction[:, 0]
+                )
+                rgb = (self.colour[ii, jj] + own[:, :3] + moving).clamp(0, 1)
+                alpha = torch.sigmoid(own[:, 3] + fading)
+                rgba = rgba + wi * wj * torch.cat([rgb, alpha[:, None]], 1)
+        return Shaded(rgba[:, :3], rgba[:, 3], None)

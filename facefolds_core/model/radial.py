@@ -1,0 +1,151 @@
+"""Explicit surfaces: N nested radius maps over a window of (u, v). Layer i is {x : |x - c| = rho_i(u(x), v(x))}."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from facefolds_core.geometry.sphere_uv import Window, points_to_uv
+from facefolds_core.model.intersection import Crossings, search_interval
+from facefolds_core.model.radial_kernel import ceiling, crossing_distances
+
+MIN_SLOPE = 0.1
+"""|d(|x - c| - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
+
+STEP = 0.005
+"""Distance between samples of the search, units: a twentieth of a nose."""
+
+MARGIN = 0.01
+"""The search ball reaches this far beyond the largest radius, units."""
+
+
+class RadialManifolds(nn.Module):
+    """rho_i = middle + halfwidth * o_i, with o_1..o_N falling evenly from 1 to -1 (0 if N = 1): nested by construction.
+
+    Both maps are grids over the window whose nodes include its borders: node (0, 0) is at (u1, v0), the top left corner
+    as seen from the front, and values between nodes are bilinear. Outside the window there is no surface. Unlike the
+    MLP's level sets a layer is met from either side: a ray may pass the window's edge and see it from behind, as it
+    would see the exported mesh.
+
+    Args:
+        centre: c.
+        window: (u0, u1, v0, v1).
+        middle: [rows, columns] radii, units.
+        halfwidth: [rows, columns], positive, units.
+        num_layers: N.
+    """
+
+    centre: Tensor
+
+    def __init__(
+        self, centre: tuple[float, ...], window: Window, middle: Tensor, halfwidth: Tensor, num_layers: int
+    ) -> None:
+        super().__init__()
+        self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
+        self.window = window
+        self.num_layers = num_layers
+        self.middle = nn.Parameter(middle.clone())
+        self.halfwidth = nn.Parameter(halfwidth.clone())
+
+    @property
+    def radius(self) -> float:
+        return float((self.middle + self.halfwidth).detach().max()) + MARGIN
+
+    def radii(self) -> Tensor:
+        """[rows, columns, N], outermost first."""
+        n = self.num_layers
+        offsets = torch.linspace(1, -1, n) if n > 1 else torch.zeros(1)
+        return self.middle[..., None] + self.halfwidth[..., None] * offsets.to(self.middle)
+
+    def regularisation(self) -> Tensor:
+        return self.middle.new_zeros(())
+
+    def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+        """Nearest crossing with each layer. The compiled search where no gradient is asked for on a CPU."""
+        if torch.is_grad_enabled() or origins.device.type != "cpu":
+            return self.reference_crossings(origins, directions)
+        offsets = (origins - self.centre).double().numpy()
+        distance = torch.from_numpy(self.compiled_distances(offsets, directions.double().numpy()))
+        points = origins[:, None] + distance[..., None] * directions[:, None]
+        return Crossings(points, distance, distance > 0)
+
+    def compiled_distances(self, offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
+        rho = self.radii().detach().cpu().numpy()
+        window = np.array(self.window)
+        found: np.ndarray = crossing_distances(
+            np.ascontiguousarray(offsets),
+            np.ascontiguousarray(directions),
+            rho,
+            window,
+            ceiling(rho, window),
+            self.radius,
+            STEP,
+        )
+        return found
+
+    def reference_crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
+        """The same in torch, differentiable in `middle` and `halfwidth`.
+
+        At the crossing found, d distance / d rho = 1 / (d(|x - c| - rho) / d distance), the slope without gradient and
+        bounded away from 0.
+        """
+        rho = self.radii()
+        with torch.no_grad():
+            distance, hit = self._search(rho, origins, directions)
+        points = origins[:, None] + distance[..., None] * directions[:, None]
+        height, _ = self._heights(rho, points)
+        if torch.is_grad_enabled():
+            with torch.no_grad():
+                delta = 1e-4
+                ahead, _ = self._heights(rho, points + delta * directions[:, None])
+                behind, _ = self._heights(rho, points - delta * directions[:, None])
+                slope = (ahead - behind) / (2 * delta)
+                slope = torch.where(slope < 0, slope.clamp(max=-MIN_SLOPE), slope.clamp(min=MIN_SLOPE))
+            distance = torch.where(hit, distance - (height - height.detach()) / slope, distance)
+            points = origins[:, None] + distance[..., None] * directions[:, None]
+        return Crossings(points, distance, hit)
+
+    def _search(self, rho: Tensor, origins: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
+        """First sign change between samples `STEP` apart at most, then 25 bisections. [R, N] distance and hit."""
+        near, far, valid = search_interval(origins, directions, self.centre, self.radius)
+        samples = max(2, int(float((far - near).max()) / STEP) + 2)
+        fraction = torch.linspace(0, 1, samples, dtype=near.dtype, device=near.device)
+        s = near[:, None] + (far - near)[:, None] * fraction
+        height, inside = self._heights(rho, origins[:, None] + s[..., None] * directions[:, None], all_layers=True)
+        above = height >= 0
+        both = (inside[:, 1:] & inside[:, :-1] & valid[:, None])[..., None]
+        hit, first = ((above[:, 1:] != above[:, :-1]) & both).max(1)
+        a, b = s.gather(1, first), s.gather(1, first + 1)
+        start = above.gather(1, first[:, None]).squeeze(1)
+        for _ in range(25):
+            m = 0.5 * (a + b)
+            height, _ = self._heights(rho, origins[:, None] + m[..., None] * directions[:, None])
+            same = (height >= 0) == start
+            a, b = torch.where(same, m, a), torch.where(same, b, m)
+        return torch.where(hit, 0.5 * (a + b), 0.0), hit
+
+    def _heights(self, rho: Tensor, points: Tensor, all_layers: bool = False) -> tuple[Tensor, Tensor]:
+        """|x - c| - rho_i at points [R, S, 3], and whether they lie inside the window [R, S].
+
+        With all_layers: [R, S, N]. Without: S = N, point (r, i) is compared with layer i, [R, N].
+        """
+        uv, r = points_to_uv(points, self.centre)
+        u0, u1, v0, v1 = self.window
+        rows, columns = self.middle.shape
+        y = (u1 - uv[..., 0]) / (u1 - u0) * (rows - 1)
+        x = (uv[..., 1] - v0) / (v1 - v0) * (columns - 1)
+        inside = (y >= 0) & (x >= 0) & (y <= rows - 1) & (x <= columns - 1)
+        i = y.floor().clamp(0, rows - 2).long()
+        j = x.floor().clamp(0, columns - 2).long()
+        a, b = (y - i).clamp(0, 1), (x - j).clamp(0, 1)
+        n = torch.arange(self.num_layers, device=points.device)
+
+        def node(di: int, dj: int) -> Tensor:
+            return rho[i + di, j + dj] if all_layers else rho[i + di, j + dj, n]
+
+        if all_layers:
+            a, b, r = a[..., None], b[..., None], r[..., None]
+        found = (node(0, 0) * (1 - b) + node(0, 1) * b) * (1 - a) + (node(1, 0) * (1 - b) + node(1, 1) * b) * a
+        return r - found, inside

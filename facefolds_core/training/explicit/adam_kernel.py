@@ -1,0 +1,91 @@
+"""Activation of the texture grids and their Adam step, compiled for CPUs. Reference: `reference.py`."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from facefolds_core.training.explicit.shading_kernel import FASTMATH
+
+BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def activate(colour, layers, frame_colour, frame_alpha, out):  # type: ignore[no-untyped-def]
+    """(M, 3), (M, N, 4), (M, 3), (M, N) -> out (M, N, 4): rgb and alpha in [0, 1], see `GridTextures`."""
+    for k in numba.prange(layers.shape[0]):
+        for n in range(layers.shape[1]):
+            for q in range(3):
+                value = colour[k, q] + frame_colour[k, q] + layers[k, n, q]
+                out[k, n, q] = min(max(value, np.float32(0.0)), np.float32(1.0))
+            out[k, n, 3] = 1 / (1 + np.exp(-(layers[k, n, 3] + frame_alpha[k, n])))
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def _adam(values, first, second, index, g, rate, correct1, correct2, keep):  # type: ignore[no-untyped-def]
+    """One Adam step on values[index], then shrinking by `keep`."""
+    first[index] = np.float32(BETA1) * first[index] + np.float32(1 - BETA1) * g
+    second[index] = np.float32(BETA2) * second[index] + np.float32(1 - BETA2) * g * g
+    step = rate * (first[index] * correct1) / (np.sqrt(second[index] * correct2) + np.float32(EPSILON))
+    values[index] = (values[index] - step) * keep
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def adam_step(  # type: ignore[no-untyped-def]
+    colour,  # (3, M, 3): values, first and second moments
+    layers,  # (3, M, N, 4)
+    frame_colour,  # (3, M, 3)
+    frame_alpha,  # (3, M, N)
+    texture,  # (M, N, 4) as activated
+    gradient,  # (PARTS, M, N, 4) with respect to `texture`; zero afterwards
+    rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
+    keep,  # (2,) factors by which layer colour and the frames' parts shrink each step
+    correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
+):
+    """Adam on the texels that the rays have met; the others stay as they are, moments included."""
+    count, layers_n = layers.shape[1], layers.shape[2]
+    parts = gradient.shape[0]
+    colour0, colour1, colour2 = colour[0], colour[1], colour[2]
+    layers0, layers1, layers2 = layers[0], layers[1], layers[2]
+    frame0, frame1, frame2 = frame_colour[0], frame_colour[1], frame_colour[2]
+    fade0, fade1, fade2 = frame_alpha[0], frame_alpha[1], frame_alpha[2]
+    one = np.float32(1.0)
+    # The clamp passes the gradient on: a colour at its border can come back.
+    for k in numba.prange(count):
+        sum0 = np.float32(0.0)
+        sum1 = np.float32(0.0)
+        sum2 = np.float32(0.0)
+        met = False
+        for n in range(layers_n):
+            g0 = np.float32(0.0)
+            g1 = np.float32(0.0)
+            g2 = np.float32(0.0)
+            g3 = np.float32(0.0)
+            for p in range(parts):
+                g0 += gradient[p, k, n, 0]
+                g1 += gradient[p, k, n, 1]
+                g2 += gradient[p, k, n, 2]
+                g3 += gradient[p, k, n, 3]
+                for q in range(4):
+                    gradient[p, k, n, q] = 0
+            if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
+                continue
+            met = True
+            sum0 += g0
+            sum1 += g1
+            sum2 += g2
+            for q in range(3):
+                g = g0 if q == 0 else (g1 if q == 1 else g2)
+                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], keep[0])
+            alpha = texture[k, n, 3]
+            g = g3 * alpha * (1 - alpha)
+            _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one)
+            layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
+            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep[1])
+        if not met:
+            continue
+        for q in range(3):
+            g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
+            _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one)
+            colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
+            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep[1])

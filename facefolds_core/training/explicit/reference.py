@@ -1,0 +1,91 @@
+"""The same as the compiled kernels, in plain torch: what they are tested against, and what runs on other devices."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2, EPSILON
+
+
+def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:
+    """[M, 3], [M, N, 4], [M, 3], [M, N] -> [M, N, 4] rgb and alpha in [0, 1]."""
+    rgb = ((colour + frame_colour)[:, None] + layers[..., :3]).clamp(0, 1)
+    return torch.cat([rgb, torch.sigmoid(layers[..., 3] + frame_alpha)[..., None]], -1)
+
+
+def look_up(codes: Tensor, texture: Tensor) -> Tensor:
+    """Bilinear rgba [R, N, 4] at 16-bit positions [R, N, 2] (int32); alpha 0 where missed (code 0)."""
+    height, width, layers, _ = texture.shape
+    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
+    b, a = (x - j)[..., None], (y - i)[..., None]
+    flat = texture.reshape(-1, 4)
+
+    def tap(di: int, dj: int) -> Tensor:
+        n = torch.arange(layers, device=texture.device)
+        return torch.nn.functional.embedding(((i + di) * width + j + dj) * layers + n, flat)
+
+    rgba = (tap(0, 0) * (1 - b) + tap(0, 1) * b) * (1 - a) + (tap(1, 0) * (1 - b) + tap(1, 1) * b) * a
+    hit = (codes[..., :1] > 0).to(rgba)
+    return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
+
+
+def shade(
+    codes: Tensor,  # [R, N, 2] int32
+    target: Tensor,  # [R, 3] in [0, 1]
+    background: Tensor,  # [R, 3]
+    texture: Tensor,  # [H, W, N, 4]
+    veil: float,
+    solid: float,
+    rate: float,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
+    texture = texture.detach().requires_grad_()
+    with torch.enable_grad():
+        rgba = look_up(codes, texture)
+        weights, through = compositing_weights(rgba[..., 3])
+        colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * background
+        squares = (colour - target).square().sum()
+        loss = 0.5 * squares + (veil * (1 - through) + solid * through * (1 - through)).sum()
+        (gradient,) = torch.autograd.grad(loss, texture)
+    moved = background - rate * (through**3)[:, None] * (colour - target)
+    return gradient, moved.detach().clamp(0, 1), squares.detach()
+
+
+def adam_step(
+    colour: Tensor,  # [3, M, 3]: values, first and second moments; all updated in place
+    layers: Tensor,  # [3, M, N, 4]
+    frame_colour: Tensor,  # [3, M, 3]
+    frame_alpha: Tensor,  # [3, M, N]
+    texture: Tensor,  # [M, N, 4]
+    gradient: Tensor,  # [M, N, 4]
+    rates: Tensor,  # [5]
+    keep: Tensor,  # [2]
+    correct: Tensor,  # [4]
+) -> None:
+    """As `adam_kernel.adam_step`."""
+    met = (gradient != 0).any(-1)
+    alpha = texture[..., 3]
+    slope = gradient[..., 3] * alpha * (1 - alpha)
+    one = torch.ones((), device=gradient.device)
+    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], keep[0])
+    _adam(layers[..., 3], slope, met, rates[2], correct[:2], one)
+    layers[0, ..., 3].clamp_(-9, 9)
+    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep[1])
+    total, any_met = gradient[..., :3].sum(1), met.any(1, keepdim=True)
+    _adam(colour, total, any_met, rates[0], correct[:2], one)
+    colour[0].clamp_(0, 1)
+    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep[1])
+
+
+def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: Tensor) -> None:
+    values, first, second = state
+    new_first = BETA1 * first + (1 - BETA1) * g
+    new_second = BETA2 * second + (1 - BETA2) * g * g
+    step = rate * (new_first * correct[0]) / ((new_second * correct[1]).sqrt() + EPSILON)
+    values.copy_(torch.where(met, (values - step) * keep, values))
+    first.copy_(torch.where(met, new_first, first))
+    second.copy_(torch.where(met, new_second, second))

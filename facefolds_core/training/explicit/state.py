@@ -1,0 +1,198 @@
+"""Texture grids while they are trained: values and Adam's moments, on a CPU (compiled) or any device (torch)."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
+from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
+from facefolds_core.training.explicit.views import Views
+
+INITIAL_COLOUR = 0.4
+INITIAL_ALPHA_LOGIT = -1.5
+"""sigmoid(-1.5) = 0.18: all of 12 layers are seen, and learn, at the start."""
+
+UNSEEN_LOGIT = -9.0
+"""Of texels that no training ray has met: transparent."""
+
+
+class TextureState:
+    """Grids of `GridTextures` flattened to M = H W texels, each stacked with its two moments.
+
+    Attributes:
+        shape: (H, W).
+        colour [3, M, 3], layers [3, M, N, 4], frame_colour [3, K, M, 3], frame_alpha [3, K, M, N].
+        background: [C, pixels, 3] float32.
+        steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int], layers: int, frames: int, background: Tensor, device: torch.device
+    ) -> None:
+        m = shape[0] * shape[1]
+        self.device = device
+        self.shape = shape
+        self.colour = torch.zeros(3, m, 3, device=device)
+        self.layers = torch.zeros(3, m, layers, 4, device=device)
+        self.frame_colour = torch.zeros(3, frames, m, 3, device=device)
+        self.frame_alpha = torch.zeros(3, frames, m, layers, device=device)
+        self.colour[0] = INITIAL_COLOUR
+        self.background = background.to(device)
+        self.reset_alpha()
+        self._allocate()
+
+    def _allocate(self) -> None:
+        m, n = self.layers.shape[1:3]
+        self.steps = np.zeros(self.frame_colour.shape[1], np.int64)
+        if self.device.type == "cpu":
+            self.texture = torch.empty(m, n, 4)
+            self.gradient = torch.zeros(shading_kernel.PARTS, m, n, 4)
+
+    def reset_alpha(self) -> None:
+        """Back to the initial opacity; colours stay. For layers that have moved."""
+        self.layers[..., 3] = 0
+        self.layers[1:, ..., :3] = 0
+        self.layers[0, ..., 3] = INITIAL_ALPHA_LOGIT
+        self.frame_alpha.zero_()
+
+    def grow(self, shape: tuple[int, int]) -> None:
+        """Resample all values to H x W texels (bilinear) and start the moments afresh."""
+        old = self.shape
+        self.shape = shape
+        self.colour = _resample(self.colour[:1], old, shape)
+        self.layers = _resample(self.layers[:1], old, shape)
+        self.frame_colour = _resample(self.frame_colour[0], old, shape)
+        self.frame_alpha = _resample(self.frame_alpha[0], old, shape)
+        self.colour, self.layers = (_with_moments(x[0]) for x in (self.colour, self.layers))
+        self.frame_colour, self.frame_alpha = (_with_moments(x) for x in (self.frame_colour, self.frame_alpha))
+        self._allocate()
+
+    def activated(self, frame: int) -> Tensor:
+        """[M, N, 4] of one frame."""
+        parts = (self.colour[0], self.layers[0], self.frame_colour[0, frame], self.frame_alpha[0, frame])
+        if self.device.type != "cpu":
+            return reference.activate(*parts)
+        adam_kernel.activate(*(p.numpy() for p in parts), self.texture.numpy())
+        return self.texture
+
+    def step(
+        self,
+        views: Views,
+        rays: NDArray[np.int64],
+        images: NDArray[np.uint8],
+        frame: int,
+        veil: float,
+        solid: float,
+        background_rate: float,
+        faint: float,
+        rates: NDArray[np.float32],
+        keep: NDArray[np.float32],
+    ) -> float:
+        """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
+        texture = self.activated(frame)
+        self.steps[frame] += 1
+        total, own = int(self.steps.sum()), int(self.steps[frame])
+        correct = np.array([1 / (1 - b**t) for t in (total, own) for b in (BETA1, BETA2)], np.float32)
+        if self.device.type == "cpu":
+            (h, w), n = self.shape, texture.shape[1]
+            squares = shading_kernel.shade(
+                views.codes,
+                views.camera,
+                views.pixel,
+                rays,
+                images,
+                self.background.numpy(),
+                texture.numpy().reshape(h, w, n, 4),
+                self.gradient.numpy().reshape(-1, h, w, n, 4),
+                veil,
+                solid,
+                background_rate,
+                faint,
+            )
+            adam_kernel.adam_step(
+                self.colour.numpy(),
+                self.layers.numpy(),
+                self.frame_colour[:, frame].numpy(),
+                self.frame_alpha[:, frame].numpy(),
+                texture.numpy(),
+                self.gradient.numpy(),
+                rates,
+                keep,
+                correct,
+            )
+        else:
+            squares = self._reference_step(
+                views, rays, images, frame, texture, veil, solid, background_rate, rates, keep, correct
+            )
+        return float(squares) / (3 * len(rays))
+
+    def _reference_step(
+        self,
+        views: Views,
+        rays: NDArray[np.int64],
+        images: NDArray[np.uint8],
+        frame: int,
+        texture: Tensor,
+        veil: float,
+        solid: float,
+        background_rate: float,
+        rates: NDArray[np.float32],
+        keep: NDArray[np.float32],
+        correct: NDArray[np.float32],
+    ) -> float:
+        """`step` in plain torch."""
+        camera, pixel = views.camera[rays], views.pixel[rays]
+        codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
+        target = torch.from_numpy(images[camera, pixel]).to(self.device).float() / 255
+        at = (
+            torch.from_numpy(camera.astype(np.int64)).to(self.device),
+            torch.from_numpy(pixel.astype(np.int64)).to(self.device),
+        )
+        n = texture.shape[1]
+        gradient, moved, squares = reference.shade(
+            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, solid, background_rate
+        )
+        self.background[at] = moved
+        reference.adam_step(
+            self.colour,
+            self.layers,
+            self.frame_colour[:, frame],
+            self.frame_alpha[:, frame],
+            texture,
+            gradient.view(-1, n, 4),
+            *(torch.from_numpy(x).to(self.device) for x in (rates, keep, correct)),
+        )
+        return float(squares)
+
+    def hide_unseen(self) -> None:
+        """Make texels transparent that no ray has met since the grids last grew."""
+        unseen = self.layers[2, ..., 3] == 0
+        self.layers[0, ..., 3] = torch.where(unseen, UNSEEN_LOGIT, self.layers[0, ..., 3])
+        self.frame_alpha[0] = torch.where(unseen, 0.0, self.frame_alpha[0])
+
+    def snapshot(self) -> list[Tensor]:
+        return [x.clone() for x in self._all()]
+
+    def restore(self, saved: list[Tensor]) -> None:
+        for tensor, value in zip(self._all(), saved, strict=True):
+            tensor.copy_(value)
+        if self.device.type == "cpu":
+            self.gradient.zero_()
+
+    def _all(self) -> list[Tensor]:
+        return [self.colour, self.layers, self.frame_colour, self.frame_alpha, self.background]
+
+
+def _with_moments(values: Tensor) -> Tensor:
+    return torch.cat([values[None], values.new_zeros(2, *values.shape)])
+
+
+def _resample(values: Tensor, old: tuple[int, int], new: tuple[int, int]) -> Tensor:
+    """[B, M, ...] on one grid -> the same on another, bilinear between texel centres."""
+    rest = values.shape[2:]
+    image = values.reshape(len(values), *old, -1).permute(0, 3, 1, 2)
+    image = torch.nn.functional.interpolate(image, size=new, mode="bilinear", align_corners=False)
+    return image.permute(0, 2, 3, 1).reshape(len(values), -1, *rest).contiguous()

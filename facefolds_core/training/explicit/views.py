@@ -1,0 +1,85 @@
+"""The training views as rays with stored crossings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.model.radial_kernel import texture_positions
+
+
+@dataclass(frozen=True)
+class Views:
+    """P rays of C training cameras that cross at least one layer.
+
+    Attributes:
+        codes: (P, N, 2) uint16: 1 + 65534 s and 1 + 65534 t of the crossing with each layer, over the window; 0 where
+            the layer is missed. A texel of 512 is 128 steps.
+        camera: (P,) int32, position in the list of training cameras.
+        pixel: (P,) int32, row-major.
+    """
+
+    codes: NDArray[np.uint16]
+    camera: NDArray[np.int32]
+    pixel: NDArray[np.int32]
+
+
+def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
+    """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers.
+
+    Raises:
+        UserError: if no ray of any camera crosses a layer.
+    """
+    codes, cameras, pixels = [], [], []
+    centre = manifolds.centre.cpu().numpy().astype(np.float64)
+    window = np.array(manifolds.window)
+    for position, index in enumerate(scene.indices("train")):
+        origins, directions = scene.cameras[index].rays()
+        first = position * 7 % stride
+        chosen = np.arange(first, scene.height * scene.width, stride)
+        offsets = np.ascontiguousarray(origins.reshape(-1, 3)[chosen] - centre)
+        directions = np.ascontiguousarray(directions.reshape(-1, 3)[chosen])
+        distance = manifolds.compiled_distances(offsets, directions)
+        hit = np.flatnonzero((distance > 0).any(1))
+        codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
+        cameras.append(np.full(len(hit), position, np.int32))
+        pixels.append(chosen[hit].astype(np.int32))
+    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels))
+    if len(views.pixel) == 0:
+        raise UserError(
+            "no pixel of any training camera sees the subject",
+            file=scene.folder / "scene.json",
+            expected="cameras that look at the origin",
+            remedy="check the capture's calibration, and `front` or the head poses",
+        )
+    return views
+
+
+class Images:
+    """The training images of one frame at a time, from the memory-mapped store.
+
+    Raises:
+        UserError: if a training image is missing.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.store = scene.open_frames()
+        self.cameras = scene.indices("train")
+        for camera in self.cameras:
+            for frame in range(scene.num_frames):
+                if (camera, frame) not in self.store:
+                    raise UserError(
+                        "a training image is missing",
+                        file=self.store.path,
+                        place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
+                        remedy="run `dvc repro` to make the normalised scene again",
+                    )
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """(C, H W, 3)."""
+        return np.stack([self.store.image(c, index).reshape(-1, 3) for c in self.cameras])

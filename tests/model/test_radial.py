@@ -1,0 +1,101 @@
+"""Radius maps: closed forms, compiled search against the reference, gradients, the window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.geometry.sphere_uv import points_to_uv
+from facefolds_core.model.radial import RadialManifolds
+
+C = (-0.25, 0.0, 0.0)
+WINDOW = (-0.6, 0.6, -0.6, 0.6)
+
+
+def _spheres(radius: float = 0.3, halfwidth: float = 0.03, layers: int = 3) -> RadialManifolds:
+    return RadialManifolds(C, WINDOW, torch.full((24, 20), radius), torch.full((24, 20), halfwidth), layers)
+
+
+def _bumpy(seed: int = 0) -> RadialManifolds:
+    generator = torch.Generator().manual_seed(seed)
+    coarse = torch.randn(1, 1, 6, 6, generator=generator)
+    bumps = torch.nn.functional.interpolate(coarse, size=(48, 40), mode="bicubic")[0, 0]
+    return RadialManifolds(C, WINDOW, 0.3 + 0.01 * bumps, torch.full((48, 40), 0.01), 4)
+
+
+def _rays(count: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
+    """From around (1, 0, 0) towards points around the origin."""
+    generator = torch.Generator().manual_seed(seed)
+    origins = torch.tensor([1.0, 0.0, 0.0]) + 0.5 * (torch.rand(count, 3, generator=generator) - 0.5)
+    targets = 0.2 * (torch.rand(count, 3, generator=generator) - 0.5)
+    return origins, torch.nn.functional.normalize(targets - origins, dim=1)
+
+
+@pytest.mark.parametrize("grad", [False, True])
+def test_concentric_spheres_in_closed_form(grad: bool) -> None:
+    manifolds = _spheres()
+    origins, directions = _rays(200)
+    offset = origins - manifolds.centre
+    b = (offset * directions).sum(1)
+    with torch.set_grad_enabled(grad):
+        crossings = manifolds.crossings(origins, directions)
+    for layer, radius in enumerate((0.33, 0.30, 0.27)):
+        expected = -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
+        hit = crossings.hit[:, layer]
+        assert hit.float().mean() > 0.9
+        torch.testing.assert_close(crossings.distance[hit, layer], expected[hit], atol=3e-6, rtol=0)
+
+
+def test_compiled_search_matches_the_reference() -> None:
+    manifolds = _bumpy()
+    origins, directions = _rays(500)
+    with torch.no_grad():
+        compiled = manifolds.crossings(origins, directions)
+        reference = manifolds.reference_crossings(origins, directions)
+    # A grazing ray may touch a bump between the samples of one search and not of the other.
+    same = compiled.hit == reference.hit
+    assert same.float().mean() > 0.998
+    both = compiled.hit & reference.hit
+    error = (compiled.distance - reference.distance)[both].abs()
+    assert (error < 1e-4).float().mean() > 0.995  # worst of the rest: another crossing of the same bump
+    assert error.median() < 1e-6
+
+
+def test_layers_are_nested() -> None:
+    radii = _bumpy().radii()
+    assert (radii[..., :-1] > radii[..., 1:]).all()
+
+
+def test_there_is_no_surface_outside_the_window() -> None:
+    manifolds = _spheres()
+    origins, directions = _rays(500, seed=1)
+    crossings = manifolds.crossings(origins, directions)
+    uv, _ = points_to_uv(crossings.points[crossings.hit], manifolds.centre)
+    assert uv.abs().max() <= 0.6 + 1e-4
+    beside = torch.tensor([[1.0, 0.45, 0.0]])  # meets the sphere of 0.3 nowhere, passes beside it
+    assert not manifolds.crossings(beside, torch.tensor([[-1.0, 0.0, 0.0]])).hit.any()
+
+
+def test_distance_gradient_against_finite_differences() -> None:
+    manifolds = _bumpy()
+    origins, directions = _rays(64, seed=2)
+    crossings = manifolds.crossings(origins, directions)
+    weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance) * crossings.hit
+    (crossings.distance * weights).sum().backward()
+    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
+    analytic = float((manifolds.middle.grad * step).sum())
+    values = []
+    for sign in (1, -1):
+        moved = RadialManifolds(C, WINDOW, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4)
+        with torch.no_grad():
+            values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
+    numeric = (values[0] - values[1]) / 4e-4
+    assert analytic == pytest.approx(numeric, rel=0.03)
+
+
+def test_one_layer_is_the_middle() -> None:
+    manifolds = _spheres(layers=1)
+    crossings = manifolds.crossings(torch.tensor([[1.0, 0.0, 0.0]]), torch.tensor([[-1.0, 0.0, 0.0]]))
+    assert crossings.distance.item() == pytest.approx(0.95, abs=1e-5)
+    assert np.isfinite(crossings.points.detach().numpy()).all()

@@ -1,0 +1,111 @@
+"""The explicit model's trainer on tiny analytic scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.model import load_model
+from facefolds_core.params import TrainParams
+from facefolds_core.training.explicit import fit
+from facefolds_core.training.explicit.loop import plan, train_explicit
+from facefolds_core.training.explicit.state import TextureState
+from tests.scenes import OPAQUE, make_scene
+
+
+def _params(**values: object) -> TrainParams:
+    return TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 150, **values})
+
+
+def _held_out_psnr(scene: Scene, folder: Path) -> float:
+    model = load_model(folder)
+    store, masks = scene.open_frames(), scene.open_masks()
+    assert masks is not None
+    errors = []
+    for index in scene.indices("holdout"):
+        rays = scene.cameras[index].rays()
+        origins, directions = (torch.from_numpy(np.ascontiguousarray(a.reshape(-1, 3))).float() for a in rays)
+        for frame in range(scene.num_frames):
+            mask = masks.image(index, frame).reshape(-1) == 255
+            rgb = model.render(origins, directions, float(frame), False).rgb.numpy()
+            errors.append(((rgb - store.image(index, frame).reshape(-1, 3) / 255)[mask] ** 2).mean())
+    return float(-10 * np.log10(np.mean(errors)))
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
+    folder = tmp_path_factory.mktemp("explicit")
+    scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius)
+    train_explicit(scene, _params(), folder / "model", folder / "log")
+    return scene, folder / "model"
+
+
+def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]) -> None:
+    assert _held_out_psnr(*trained) > 22
+
+
+def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
+    names = {p.name for p in trained[1].iterdir()}
+    assert names == {"model.safetensors", "model.json", "training.json", "fit.json"}
+
+
+def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
+    a, b = (load_model(folder).state_dict() for folder in (trained[1], tmp_path / "model"))
+    for name, tensor in a.items():
+        torch.testing.assert_close(tensor, b[name], atol=0, rtol=0, msg=name)
+
+
+def test_surface_points_lie_on_the_sphere(trained: tuple[Scene, Path]) -> None:
+    model = load_model(trained[1])
+    points, valid = model.surface_points(torch.zeros(1, 2))
+    radius = (points[:, 0] - model.centre).norm(dim=-1)
+    assert valid.all()
+    assert radius.mean().item() == pytest.approx(OPAQUE[0].radius, abs=0.003)
+    assert (radius[:-1] > radius[1:]).all()
+
+
+def test_recentring_finds_the_opaque_layer() -> None:
+    radii = np.broadcast_to(np.linspace(0.4, 0.3, 11), (20, 20, 11))
+    alpha = np.zeros((20, 20, 11), np.float32)
+    alpha[..., 3] = 1.0
+    moved = fit.recentre(radii, alpha, blur=2.0)
+    np.testing.assert_allclose(moved, radii[0, 0, 3] - 0.35, atol=1e-6)
+
+
+def test_recentring_stays_where_nothing_is_opaque() -> None:
+    radii = np.broadcast_to(np.linspace(0.4, 0.3, 11), (20, 20, 11))
+    np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
+
+
+def test_plan_spends_all_iterations() -> None:
+    chosen = fit.Fit((-0.5, 0.5, -0.5, 0.5), np.ones((4, 4)), (0.02, 0.01), (128, 96), ())
+    levels = plan(chosen, 400)
+    assert sum(level.iterations for level in levels) == 400
+    assert levels[-1].texels == (128, 96)
+
+
+def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(TextureState, "step", lambda self, *args: float("nan"))
+    with pytest.raises(UserError, match="diverged"):
+        train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
+    assert not (tmp_path / "model").exists()
+
+
+def test_divergence_is_rolled_back(
+    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, calls = TextureState.step, []
+
+    def fail_once(self: TextureState, *args: object) -> float:
+        calls.append(1)
+        return float("nan") if len(calls) == 30 else real(self, *args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(TextureState, "step", fail_once)
+    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
+    assert "diverged" in (tmp_path / "model" / "fit.json").read_text()
