@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
+from torch.nn.functional import grid_sample
 
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model.textures import Shaded
@@ -45,6 +46,25 @@ class GridTextures(nn.Module):
     @property
     def shape(self) -> tuple[int, int]:
         return self.colour.shape[0], self.colour.shape[1]
+
+    def image(self, layer: int, time: float) -> Tensor:
+        """RGBA [H, W, 4] of one layer at one time, at the texels."""
+        time = min(max(float(time), 0.0), self.num_frames - 1.0)
+        before = int(time)
+        after, fraction = min(before + 1, self.num_frames - 1), time - before
+        own = self.layers[:, :, layer]
+        moving = torch.lerp(self.frame_colour[before], self.frame_colour[after], fraction)
+        fading = torch.lerp(self.frame_alpha[before, :, :, layer], self.frame_alpha[after, :, :, layer], fraction)
+        rgb = (self.colour + own[..., :3] + moving).clamp(0, 1)
+        return torch.cat([rgb, torch.sigmoid(own[..., 3:] + fading[..., None])], -1)
+
+    def sheet(self, uv: Tensor, layer: int, time: float) -> Shaded:
+        """Points at uv [P, 2] of one layer at one time; its image is made once and sampled."""
+        at = uv_to_st(uv, self.window) * 2 - 1
+        image = self.image(layer, time).permute(2, 0, 1)[None]
+        rgba = grid_sample(image, at[None, None], mode="bilinear", padding_mode="border", align_corners=False)
+        rgba = rgba[0, :, 0].T
+        return Shaded(rgba[:, :3], rgba[:, 3], None)
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
         """Points at uv [P, 2] of layers [P] at frame times [P]. There is no view-dependent term."""
