@@ -84,6 +84,13 @@ def test_a_killed_training_resumes(project: TinyProject) -> None:
     assert (folder / "model" / "model.safetensors").exists()
 
 
+def test_the_explicit_model_runs_to_the_end(project: TinyProject) -> None:
+    status, output = project.repro("evaluate@fast")
+    assert status == 0, output
+    metrics = json.loads((project.root / "data" / "fast" / "metrics.json").read_text())
+    assert metrics["asset"]["psnr_subject"] > 10
+
+
 def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
     status, output = project.repro("evaluate@stabilised")
     assert status == 0, output
