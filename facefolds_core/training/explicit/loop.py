@@ -47,6 +47,10 @@ BACKGROUND_RATE = 0.5
 FAINT = 0.002
 """Layers with less alpha are skipped once the textures are at half resolution."""
 
+LATE_VEIL = 0.1
+"""Once it is decided what the background explains, the price of opacity falls to this part, and rays that are nearly
+opaque are pressed to be so."""
+
 BLUR = 6.0
 """Smoothing of the layers' motion between rounds of geometry, nodes of the radius maps."""
 
@@ -196,6 +200,7 @@ class _Trainer:
         count = len(self.views.pixel)
         texels = level.texels[0] * level.texels[1]
         stride = max(1, int(count / (RAYS_PER_TEXEL * texels)))
+        coarse = number < len(self.fit.halfwidths)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -206,10 +211,10 @@ class _Trainer:
                 rays,
                 self.images.frame(frame),
                 frame,
-                self.params.lambda_veil,
-                self.params.lambda_solid,
+                self.params.lambda_veil * (1.0 if coarse else LATE_VEIL),
+                0.0 if coarse else self.params.lambda_solid,
                 BACKGROUND_RATE,
-                FAINT if number >= len(self.fit.halfwidths) else 0.0,
+                0.0 if coarse else FAINT,
                 rates,
                 keep,
             )
