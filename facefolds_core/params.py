@@ -139,7 +139,7 @@ class TrainParams(Section):
     lambda_view: Annotated[float, Field(ge=0)]
     lambda_reg: Annotated[float, Field(ge=0)]
     lambda_veil: Annotated[float, Field(ge=0)] = 0.003
-    lambda_solid: Annotated[float, Field(ge=0)] = 0.01
+    lambda_solid: Annotated[float, Field(ge=0)] = 0.003
     checkpoint_seconds: Annotated[float, Field(gt=0)] = 60.0
 
     @model_validator(mode="before")

@@ -51,7 +51,7 @@ FAST: dict[str, Any] = {
     "model": "explicit",
     "level_halfwidth": 0.006,
     "manifold_start": "surface",
-    "iterations": 280,
+    "iterations": 460,
     "lr_texture": 0.02,
 }
 

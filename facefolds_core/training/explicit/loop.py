@@ -84,6 +84,7 @@ class Level:
 
 def plan(fit: Fit, iterations: int) -> list[Level]:
     """Rounds of geometry, quarter, half and full resolution."""
+
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
@@ -192,7 +193,9 @@ class _Trainer:
             alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
         )
         radii = self.manifolds().radii().detach().double().numpy()
-        self.middle += torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
+        moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
+        start = torch.from_numpy(self.fit.middle).float()
+        self.middle = start + torch.nn.functional.softshrink(moved - start, self.fit.trust)
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
@@ -243,13 +246,13 @@ class _Trainer:
         assert self.state is not None
         state, n = self.state, self.params.layers
         state.hide_unseen()
-        peak = torch.stack(
-            [state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]
-        ).amax(0)
+        peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= EPSILON] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
-        self.events += [f"layer {i} dropped: alpha at most {float(peak[i]):.4f}" for i in range(n) if not first <= i <= last]
+        self.events += [
+            f"layer {i} dropped: alpha at most {float(peak[i]):.4f}" for i in range(n) if not first <= i <= last
+        ]
         radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape

@@ -75,7 +75,8 @@ class TextureState:
         parts = (self.colour[0], self.layers[0], self.frame_colour[0, frame], self.frame_alpha[0, frame])
         if self.device.type != "cpu":
             return reference.activate(*parts)
-        adam_kernel.activate(*(p.numpy() for p in parts), self.texture.numpy())
+        a, b, c, d = (p.numpy() for p in parts)
+        adam_kernel.activate(a, b, c, d, self.texture.numpy())
         return self.texture
 
     def step(
