@@ -40,7 +40,9 @@ QUICK: dict[str, Any] = {
     "search_samples": 24,
     "rays": 2048,
     "iterations": 4_000,
+    "lr_manifold": 1e-4,
     "lr_texture": 4e-3,
+    "lambda_reg": 1e-6,
     "decay_interval": 4_000,
 }
 

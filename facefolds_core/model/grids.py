@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor, nn
+from torch.nn.functional import grid_sample
 
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model.textures import Shaded
@@ -46,6 +49,25 @@ class GridTextures(nn.Module):
     def shape(self) -> tuple[int, int]:
         return self.colour.shape[0], self.colour.shape[1]
 
+    def image(self, layer: int, time: float) -> Tensor:
+        """RGBA [H, W, 4] of one layer at one time, at the texels."""
+        time = min(max(float(time), 0.0), self.num_frames - 1.0)
+        before = int(time)
+        after, fraction = min(before + 1, self.num_frames - 1), time - before
+        own = self.layers[:, :, layer]
+        moving = torch.lerp(self.frame_colour[before], self.frame_colour[after], fraction)
+        fading = torch.lerp(self.frame_alpha[before, :, :, layer], self.frame_alpha[after, :, :, layer], fraction)
+        rgb = (self.colour + own[..., :3] + moving).clamp(0, 1)
+        return torch.cat([rgb, torch.sigmoid(own[..., 3:] + fading[..., None])], -1)
+
+    def sheet(self, uv: Tensor, layer: int, time: float) -> Shaded:
+        """Points at uv [P, 2] of one layer at one time; its image is made once and sampled."""
+        at = uv_to_st(uv, self.window) * 2 - 1
+        image = self.image(layer, time).permute(2, 0, 1)[None]
+        rgba = grid_sample(image, at[None, None], mode="bilinear", padding_mode="border", align_corners=False)
+        rgba = rgba[0, :, 0].T
+        return Shaded(rgba[:, :3], rgba[:, 3], None)
+
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
         """Points at uv [P, 2] of layers [P] at frame times [P]. There is no view-dependent term."""
         height, width = self.shape
@@ -54,20 +76,29 @@ class GridTextures(nn.Module):
         y = (st[:, 1] * height - 0.5).clamp(0, height - 1)
         j, i = x.floor().clamp(max=max(width - 2, 0)).long(), y.floor().clamp(max=max(height - 2, 0)).long()
         b, a = (x - j)[:, None], (y - i)[:, None]
-        time = time.clamp(0, self.num_frames - 1)
-        before = time.floor().long()
-        after = (before + 1).clamp(max=self.num_frames - 1)
-        fraction = (time - before)[:, None]
+        look_up = self._look_up(layer, time)
         rgba = torch.zeros_like(b)
         for di, wi in ((0, 1 - a), (1, a)):
             for dj, wj in ((0, 1 - b), (1, b)):
-                ii, jj = (i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1)
-                own = self.layers[ii, jj, layer]
-                moving = torch.lerp(self.frame_colour[before, ii, jj], self.frame_colour[after, ii, jj], fraction)
-                fading = torch.lerp(
-                    self.frame_alpha[before, ii, jj, layer], self.frame_alpha[after, ii, jj, layer], fraction[:, 0]
-                )
-                rgb = (self.colour[ii, jj] + own[:, :3] + moving).clamp(0, 1)
-                alpha = torch.sigmoid(own[:, 3] + fading)
-                rgba = rgba + wi * wj * torch.cat([rgb, alpha[:, None]], 1)
+                rgba = rgba + wi * wj * look_up((i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1))
         return Shaded(rgba[:, :3], rgba[:, 3], None)
+
+    def _look_up(self, layer: Tensor, time: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
+        """Function of texel rows and columns [P] -> RGBA [P, 4], for points of layers [P] at times [P]."""
+        if len(time) and bool((time == time[0]).all()):
+            # One time for all, as in rendering: make the images once and gather from them.
+            images = torch.stack([self.image(n, float(time[0])) for n in range(self.layers.shape[2])])
+            return lambda i, j: images[layer, i, j]
+        time = time.clamp(0, self.num_frames - 1)
+        before = time.floor().long()
+        after = (before + 1).clamp(max=self.num_frames - 1)
+        fraction = time - before
+
+        def texel(i: Tensor, j: Tensor) -> Tensor:
+            own = self.layers[i, j, layer]
+            moving = torch.lerp(self.frame_colour[before, i, j], self.frame_colour[after, i, j], fraction[:, None])
+            fading = torch.lerp(self.frame_alpha[before, i, j, layer], self.frame_alpha[after, i, j, layer], fraction)
+            rgb = (self.colour[i, j] + own[:, :3] + moving).clamp(0, 1)
+            return torch.cat([rgb, torch.sigmoid(own[:, 3] + fading)[:, None]], 1)
+
+        return texel

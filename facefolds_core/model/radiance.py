@@ -14,7 +14,10 @@ from facefolds_core.model.manifolds import Manifolds
 from facefolds_core.model.textures import Textures
 
 RAYS_AT_ONCE = 8192
-"""Rays (or texels) that `render`, `surface_points` and `texture` work on together: bounds their memory."""
+"""Rays that `render` and `surface_points` work on together: bounds their memory."""
+
+TEXELS_AT_ONCE = 65_536
+"""Likewise for `texture`."""
 
 
 @dataclass(frozen=True)
@@ -145,9 +148,7 @@ class RadianceManifolds(nn.Module):
         Returns:
             rgb [M, 3] and alpha [M], in [0, 1].
         """
-        layers = torch.full((len(uv),), layer, dtype=torch.int64, device=uv.device)
-        times = torch.full((len(uv),), float(time), dtype=uv.dtype, device=uv.device)
-        parts = [self.textures.shade(at, i, t, None) for at, i, t in _chunks(uv, layers, times)]
+        parts = [self.textures.sheet(at, layer, time) for at in uv.split(TEXELS_AT_ONCE)]
         return torch.cat([p.rgb for p in parts]), torch.cat([p.alpha for p in parts])
 
 

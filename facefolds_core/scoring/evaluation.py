@@ -52,7 +52,10 @@ class ImageScore:
 
 @dataclass(frozen=True)
 class Panel:
-    """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores."""
+    """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores.
+
+    `mask` is the subject's opacity (H, W), or None where the capture has none.
+    """
 
     camera: str
     frame: str
@@ -61,6 +64,7 @@ class Panel:
     asset: Array
     model_score: ImageScore
     asset_score: ImageScore
+    mask: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ def evaluate(
                 scores += group.values()
                 if k in on_sheet:
                     shot = (truth, pictures["model"], pictures["asset"])
-                    panels.append(Panel(camera.name, frame, *shot, group["model"], group["asset"]))
+                    panels.append(Panel(camera.name, frame, *shot, group["model"], group["asset"], mask))
                 bar.update()
     return Evaluation(scores, panels)
 

@@ -82,10 +82,17 @@ def plan(width: int, height: int, cameras: int, rows: int) -> SheetLayout:
     return SheetLayout(cell, cameras, rows, min(range(1, cameras + 1), key=distance))
 
 
-def error_image(image: Array, truth: Array) -> tuple[Array, float]:
-    """Mean absolute error of R, G and B in colours (H, W, 3), and its mean over the image."""
-    error = np.abs(image - truth).mean(-1)
-    return np.asarray(colormaps[ERROR_COLOURS](np.clip(error / MAX_ERROR, 0, 1))[..., :3]), float(error.mean())
+def error_image(image: Array, truth: Array, mask: Array | None = None) -> tuple[Array, float]:
+    """Mean absolute error of R, G and B in colours (H, W, 3), and its mean over the image.
+
+    Args:
+        image, truth: (H, W, 3).
+        mask: (H, W) opacity of the subject: the error is weighted with it, and the mean taken over the subject.
+    """
+    weight = np.ones(image.shape[:2]) if mask is None else mask
+    error = np.abs(image - truth).mean(-1) * weight
+    colours = np.asarray(colormaps[ERROR_COLOURS](np.clip(error / MAX_ERROR, 0, 1))[..., :3])
+    return colours, float(error.sum() / max(float(weight.sum()), 1.0))
 
 
 def write_contact_sheet(path: Path, subject: str, panels: Sequence[Panel], metrics: dict[str, Any]) -> None:
@@ -114,9 +121,10 @@ def _summary(metrics: dict[str, Any]) -> str:
     parts = []
     for variant, name in names.items():
         values = metrics[variant]
-        subject = "" if values["psnr_subject"] is None else f" (subject {values['psnr_subject']:.2f})"
-        parts.append(f"{name} {values['psnr']:.2f}{subject} dB")
-    return "Held-out cameras, mean PSNR:   " + "   ·   ".join(parts)
+        frame, subject = values["psnr"], values["psnr_subject"]
+        parts.append(f"{name} {frame:.2f} dB" if subject is None else f"{name} {subject:.2f} dB (frame {frame:.2f})")
+    what = "" if metrics["asset"]["psnr_subject"] is None else " of the subject"
+    return f"Held-out cameras, mean PSNR{what}:   " + "   ·   ".join(parts)
 
 
 def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequence[Panel]) -> None:
@@ -127,8 +135,9 @@ def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequ
         sheet.text(left + FRAME_LABEL + column * (width + GAP) + width / 2, top + 38, name, size=10.5, centred=True)
     for row, panel in enumerate(block):
         y = top + BLOCK_HEAD + row * (height + CAPTION)
-        error, mean_error = error_image(panel.asset, panel.truth)
-        captions = ("", _caption(panel.model_score), _caption(panel.asset_score), f"mean {mean_error:.4f}")
+        error, mean_error = error_image(panel.asset, panel.truth, panel.mask)
+        of = "" if panel.mask is None else "subject: "
+        captions = ("", _caption(panel.model_score), _caption(panel.asset_score), f"{of}mean {mean_error:.4f}")
         sheet.text(left + 10, y + height / 2, f"frame {panel.frame}", size=8.5, colour=FAINT, centred=True, rotation=90)
         for column, image in enumerate((panel.truth, panel.model, panel.asset, error)):
             x = left + FRAME_LABEL + column * (width + GAP)
@@ -137,8 +146,8 @@ def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequ
 
 
 def _caption(score: ImageScore) -> str:
-    subject = score.values["psnr_subject"]
-    return f"{score.values['psnr']:.2f} dB" + ("" if subject is None else f" (subject {subject:.2f})")
+    frame, subject = score.values["psnr"], score.values["psnr_subject"]
+    return f"{frame:.2f} dB" if subject is None else f"subject {subject:.2f} dB (frame {frame:.2f})"
 
 
 class _Sheet:
@@ -193,8 +202,8 @@ class _Sheet:
         axes.tick_params(labelsize=8, colors=FAINT, length=3)
         for edge in axes.spines.values():
             edge.set_visible(False)
-        label = "error: |asset − truth|, mean of R, G, B; values are in [0, 1]"
-        if self.width > MARGIN + width + 420:
+        label = "error: |asset − truth|, mean of R, G, B in [0, 1]; of the subject alone where its mask is known"
+        if self.width > MARGIN + width + 640:
             self.text(MARGIN + width + 16, self.height - 40, label, size=9, colour=FAINT)
         else:
             self.text(MARGIN, self.height - 56, label, size=9, colour=FAINT)

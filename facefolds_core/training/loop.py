@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
 import time
 from dataclasses import asdict
 from pathlib import Path
 
 import torch
-from dvclive.live import Live
-from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
@@ -19,6 +16,7 @@ from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model, save_model
 from facefolds_core.params import TrainParams
+from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import (
     CHECKPOINT,
     TrainingState,
@@ -26,6 +24,7 @@ from facefolds_core.training.checkpoints import (
     load_checkpoint,
     save_checkpoint,
 )
+from facefolds_core.training.log import open_log
 from facefolds_core.training.losses import Losses, batch_losses
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
@@ -114,11 +113,8 @@ class _Progress:
         self.params = params
         self.every = max(1, min(100, params.iterations // LOG_POINTS))
         _trim_log(folder, iteration)
-        # No experiment, no report, no dvc.yaml: the log is a folder of text files and nothing else. A user's token for
-        # DVC Studio must not make dvclive send it anywhere.
-        os.environ["DVC_STUDIO_OFFLINE"] = "true"
-        self.live = Live(dir=str(folder), resume=iteration > 0, save_dvc_exp=False, dvcyaml=None, report=None)
-        self.bar = tqdm(total=params.iterations, initial=iteration, unit="it", desc="train", mininterval=1.0)
+        self.live = open_log(folder, resume=iteration > 0)
+        self.bar = progress(total=params.iterations, initial=iteration, unit="it", desc="train")
         self.sums: list[float] = []
         self.count = 0
         self.since = time.perf_counter()

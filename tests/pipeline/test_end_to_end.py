@@ -24,7 +24,7 @@ def stages_run(output: str) -> list[str]:
 def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
     """A tiny project that has been run once."""
     tiny = TinyProject(project_root, tmp_path_factory.mktemp("tiny"))
-    status, output = tiny.repro()
+    status, output = tiny.repro("evaluate@actor")
     assert status == 0, output
     return tiny
 
@@ -46,53 +46,55 @@ def test_the_asset_is_valid(project: TinyProject) -> None:
 
 
 def test_nothing_to_do(project: TinyProject) -> None:
-    status, output = project.repro()
+    status, output = project.repro("evaluate@actor")
     assert status == 0
     assert stages_run(output) == []
 
 
 def test_a_texture_resolution_reruns_three_stages(project: TinyProject) -> None:
     project.write_params(PARAMS.replace("texture: {resolution: 32}", "texture: {resolution: 48}"))
-    status, output = project.repro()
+    status, output = project.repro("evaluate@actor")
     assert status == 0, output
     assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
 
 
 def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
     override = "    holdout: {every: 4}\n    texture: {resolution: 40}\n"
-    project.write_params(PARAMS.replace("    holdout: {every: 4}\n", override))
-    status, output = project.repro()
+    project.write_params(PARAMS.replace("    holdout: {every: 4}\n", override, 1))
+    status, output = project.repro("evaluate@actor")
     assert status == 0, output
     assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
 
 
-def test_a_killed_training_resumes(project_root: Path, tmp_path: Path, project: TinyProject) -> None:
-    train = "train: {preset: quick, iterations: 400, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, "
-    params = re.sub(r"^train: \{[^\n]*$", train + "manifold_width: 32}", PARAMS, flags=re.MULTILINE)
-    tiny = TinyProject(project_root, tmp_path / "killed", params)
-    status, output = tiny.repro("normalize@actor")
+def test_a_killed_training_resumes(project: TinyProject) -> None:
+    status, output = project.repro("normalize@killed")
     assert status == 0, output
-    process = tiny.start("dvc", "repro", "train@actor")
-    checkpoints = tiny.root / "data" / "actor" / "checkpoints"
+    folder = project.root / "data" / "killed"
+    process = project.start("dvc", "repro", "train@killed")
     deadline = time.monotonic() + 120
-    while not list(checkpoints.glob("**/*.safetensors")) and time.monotonic() < deadline:
+    while not list(folder.glob("checkpoints/*/checkpoint.safetensors")) and time.monotonic() < deadline:
         assert process.poll() is None, process.communicate()[0]
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    assert not (tiny.root / "data" / "actor" / "model").exists()
-    status, output = tiny.repro("train@actor")
+    assert not (folder / "model").exists()
+    status, output = project.repro("train@killed")
     assert status == 0, output
-    assert "resum" in output
-    assert (tiny.root / "data" / "actor" / "model" / "model.safetensors").exists()
+    assert "continuing from iteration" in output
+    assert (folder / "model" / "model.safetensors").exists()
 
 
-def test_a_stabilised_capture_runs_to_the_end(project_root: Path, tmp_path: Path) -> None:
-    params = PARAMS.replace("iterations: 60", "iterations: 10") + "normalize: {stabilize: true}\n"
-    tiny = TinyProject(project_root, tmp_path / "stabilised", params)
-    status, output = tiny.repro()
+def test_the_explicit_model_runs_to_the_end(project: TinyProject) -> None:
+    status, output = project.repro("evaluate@fast")
     assert status == 0, output
-    metrics = json.loads((tiny.root / "data" / "actor" / "metrics.json").read_text())
+    metrics = json.loads((project.root / "data" / "fast" / "metrics.json").read_text())
+    assert metrics["asset"]["psnr_subject"] > 10
+
+
+def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
+    status, output = project.repro("evaluate@stabilised")
+    assert status == 0, output
+    metrics = json.loads((project.root / "data" / "stabilised" / "metrics.json").read_text())
     assert metrics["images"] == 4  # two held-out cameras, two frames, one camera an image
 
 
@@ -101,8 +103,8 @@ def test_a_stabilised_capture_runs_to_the_end(project_root: Path, tmp_path: Path
     [
         (PARAMS.replace("every: 4", "every: 1"), "holdout"),
         (PARAMS.replace("{every: 4}", "[nobody]"), "nobody"),
-        (PARAMS + "normalize: {max_azimuth: 0.001}\n", "azimuth"),
-        (PARAMS.replace("texture:", "texure:"), "texure"),
+        (PARAMS.replace("normalize: {}", "normalize: {max_azimuth: 0.001}"), "azimuth"),
+        (PARAMS + "texure: {}\n", "texure"),
         (PARAMS.replace("subjects:", "subjects: ["), "line"),
     ],
 )
@@ -110,9 +112,10 @@ def test_mistakes_in_params_stop_with_one_message(project: TinyProject, params: 
     before = project.params
     project.write_params(params)
     try:
-        status, output = project.repro()
+        status, output = project.repro("evaluate@actor")
     finally:
         project.write_params(before)
+        project.repro("configure@actor")
     assert status != 0
     assert says in output
     assert "Traceback" not in output

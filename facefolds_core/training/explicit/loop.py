@@ -21,11 +21,13 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, save_model
 from facefolds_core.params import TrainParams
+from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.fit import Fit, fit_scene, recentre
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Images, Views, trace_views
+from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 
 RAYS_PER_TEXEL = 2.5
@@ -107,8 +109,8 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     fit = fit_scene(scene, params.level_halfwidth)
     levels = plan(fit, params.iterations)
     trainer = _Trainer(scene, params, fit, device)
-    with Live(str(log), save_dvc_exp=False, dvcyaml=None, monitor_system=False) as live:
-        bar = tqdm(total=sum(level.iterations for level in levels), desc="train", unit="it")
+    with open_log(log) as live:
+        bar = progress(total=sum(level.iterations for level in levels), desc="train", unit="it")
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()

@@ -77,7 +77,9 @@ class Images:
                         "a training image is missing",
                         file=self.store.path,
                         place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                        remedy="run `dvc repro` to make the normalised scene again",
+                        expected="every frame from every camera: the explicit model learns one background a camera",
+                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; otherwise run "
+                        "`dvc repro` to make the normalised scene again",
                     )
 
     def frame(self, index: int) -> NDArray[np.uint8]:
