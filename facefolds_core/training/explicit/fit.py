@@ -26,11 +26,12 @@ NODES = 384
 """Nodes along the longer side of the radius maps."""
 
 PIXELS_PER_TEXEL = 2.0
-"""Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on cameras
-left out: some thirty cameras do not determine so many texels of twelve layers."""
+"""Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
+cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
 
 MESH_TRUST = 0.004
-"""Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as much, units."""
+"""Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
+much, units."""
 
 MESH_HALFWIDTH = 0.025
 """Half of the space between the outermost and the innermost layer in the first round around a tracked mesh, units: a
@@ -94,9 +95,9 @@ def fit_scene(scene: Scene, halfwidth: float) -> Fit:
 
 
 def shrinking(widest: float, narrowest: float) -> tuple[float, ...]:
-    """From `widest` to `narrowest` (first and last value) by equal factors of at most 2; one value if it starts there."""
+    """From `widest` to `narrowest` (first and last value) by equal factors of at most 2."""
     rounds = max(0, math.ceil(math.log2(widest / narrowest) - 1e-9))
-    return tuple(widest * (narrowest / widest) ** (k / rounds) for k in range(rounds)) + (narrowest,)
+    return (*(widest * (narrowest / widest) ** (k / rounds) for k in range(rounds)), narrowest)
 
 
 def mesh_window(vertices: Array) -> Window:

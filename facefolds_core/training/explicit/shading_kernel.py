@@ -51,8 +51,9 @@ def shade(  # type: ignore[no-untyped-def]
     rate,  # of the background
     faint,  # layers with less alpha are left out
 ):
-    """Sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid T (1 - T) [T < 1/2; solid / 4 beyond]: adds its gradient to `gradient`; returns the sum of |C - I|^2.
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid t (1 - t), t = min(T, 1/2).
 
+    Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     C = sum_i w_i c_i + T B. Each pixel's background moves by -rate T^3 (C - I): in proportion to the cube of the
     transmittance, so that it cannot explain what the layers have begun to explain.
     """

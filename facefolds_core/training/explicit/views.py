@@ -77,7 +77,7 @@ class Images:
                         "a training image is missing",
                         file=self.store.path,
                         place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                        expected="every frame from every camera: the explicit model learns one background a camera",
+                        expected="every frame of every camera: the explicit model learns one background each",
                         remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; otherwise run "
                         "`dvc repro` to make the normalised scene again",
                     )
