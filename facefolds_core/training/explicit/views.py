@@ -78,7 +78,7 @@ class Images:
                         file=self.store.path,
                         place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
                         expected="every frame of every camera: the explicit model learns one background each",
-                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; otherwise run "
+                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; else run "
                         "`dvc repro` to make the normalised scene again",
                     )
 
