@@ -109,7 +109,7 @@ class TrainParams(Section):
         decay_manifold, decay_texture: factors by which the rates fall each `decay_interval` iterations, exponentially.
         lambda_view, lambda_reg: weights of |view term|^2 and of |manifold weights|^2.
         lambda_veil: explicit model: weight of the opacity of a ray, so that what the background explains stays clear.
-        lambda_solid: explicit model: weight of T (1 - T), T a ray's transmittance: what is not clear is to be solid.
+        lambda_solid: explicit model: weight of T (1 - T), T a ray's transmittance below 1/2: a face is solid.
         checkpoint_seconds: a checkpoint is written this often.
     """
 
@@ -138,8 +138,8 @@ class TrainParams(Section):
     decay_interval: Positive
     lambda_view: Annotated[float, Field(ge=0)]
     lambda_reg: Annotated[float, Field(ge=0)]
-    lambda_veil: Annotated[float, Field(ge=0)] = 0.001
-    lambda_solid: Annotated[float, Field(ge=0)] = 0.01
+    lambda_veil: Annotated[float, Field(ge=0)] = 0.003
+    lambda_solid: Annotated[float, Field(ge=0)] = 0.003
     checkpoint_seconds: Annotated[float, Field(gt=0)] = 60.0
 
     @model_validator(mode="before")

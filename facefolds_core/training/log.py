@@ -17,6 +17,4 @@ def open_log(folder: Path, resume: bool = False) -> Live:
     """
     # A user's token for DVC Studio must not make dvclive send the log there.
     os.environ["DVC_STUDIO_OFFLINE"] = "true"
-    return Live(
-        dir=str(folder), resume=resume, save_dvc_exp=False, dvcyaml=None, report=None, monitor_system=False
-    )
+    return Live(dir=str(folder), resume=resume, save_dvc_exp=False, dvcyaml=None, report=None, monitor_system=False)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.model.grids import GridTextures
 from facefolds_core.geometry.sphere_uv import st_to_uv
+from facefolds_core.model.grids import GridTextures
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
@@ -86,7 +86,10 @@ def test_adam_step_matches_the_reference() -> None:
     keep, correct = torch.tensor([0.99, 0.999]), torch.tensor([1.5, 2.0, 4.0, 6.0])
     compiled = [p.clone() for p in parts]
     adam_kernel.adam_step(
-        *(p.numpy() for p in compiled), texture.numpy(), gradient.clone().numpy(), *(x.numpy() for x in (rates, keep, correct))
+        *(p.numpy() for p in compiled),
+        texture.numpy(),
+        gradient.clone().numpy(),
+        *(x.numpy() for x in (rates, keep, correct)),
     )
     reference.adam_step(*parts, texture, gradient.sum(0), rates, keep, correct)
     for a, b in zip(compiled, parts, strict=True):

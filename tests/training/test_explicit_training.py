@@ -19,7 +19,7 @@ from tests.scenes import OPAQUE, make_scene
 
 
 def _params(**values: object) -> TrainParams:
-    return TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 150, **values})
+    return TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values})
 
 
 def _held_out_psnr(scene: Scene, folder: Path) -> float:
@@ -84,7 +84,7 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
 
 
 def test_plan_spends_all_iterations() -> None:
-    chosen = fit.Fit((-0.5, 0.5, -0.5, 0.5), np.ones((4, 4)), (0.02, 0.01), (128, 96), ())
+    chosen = fit.Fit((-0.5, 0.5, -0.5, 0.5), np.ones((4, 4)), 0.0, (0.02, 0.01), (128, 96), ())
     levels = plan(chosen, 400)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)

@@ -16,7 +16,7 @@ from facefolds_core.training.start import fitted_radius
 
 Array = NDArray[np.float64]
 
-WINDOW_MARGIN = 0.25
+WINDOW_MARGIN = 0.35
 """The window reaches this fraction of the mesh's extent beyond the mesh on each side: room for hair and ears."""
 
 WINDOW_LIMIT = 0.9
@@ -26,11 +26,19 @@ NODES = 384
 """Nodes along the longer side of the radius maps."""
 
 PIXELS_PER_TEXEL = 2.0
-"""Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on cameras
-left out: some thirty cameras do not determine so many texels of twelve layers."""
+"""Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
+cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
 
-SPHERE_HALFWIDTH = 0.06
-"""Half of the space between the outermost and the innermost layer in the first round where there is no mesh, units."""
+MESH_TRUST = 0.004
+"""Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
+much, units."""
+
+MESH_HALFWIDTH = 0.025
+"""Half of the space between the outermost and the innermost layer in the first round around a tracked mesh, units: a
+mesh knows no hair."""
+
+SPHERE_HALFWIDTH = 0.12
+"""The same where there is no mesh."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,7 @@ class Fit:
     Attributes:
         window: (u0, u1, v0, v1).
         middle: (rows, columns) starting radii of the middle of the layers, units.
+        trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         halfwidths: half the space between outermost and innermost layer, one for each round of geometry, units; the
             last one is the model's.
         texels: (H, W) of the finest textures.
@@ -48,6 +57,7 @@ class Fit:
 
     window: Window
     middle: Array
+    trust: float
     halfwidths: tuple[float, ...]
     texels: tuple[int, int]
     reasons: tuple[str, ...]
@@ -62,7 +72,7 @@ def fit_scene(scene: Scene, halfwidth: float) -> Fit:
         window = mesh_window(vertices.astype(np.float64))
         rows, columns = _nodes(window)
         middle = extrapolate(mesh_radii(vertices.astype(np.float64), faces, window, rows, columns))
-        halfwidths: tuple[float, ...] = (halfwidth,)
+        widest, trust = MESH_HALFWIDTH, MESH_TRUST
         reasons = [
             f"window: the tracked mesh over all frames, {WINDOW_MARGIN:.0%} of its extent added on each side",
             "middle radius: the tracked mesh, mean over frames, continued smoothly beyond its border",
@@ -72,15 +82,22 @@ def fit_scene(scene: Scene, halfwidth: float) -> Fit:
         window = ball_window(farthest - float(np.linalg.norm(SPHERE_CENTRE)))
         rows, columns = _nodes(window)
         middle = np.full((rows, columns), r0)
-        rounds = max(1, math.ceil(math.log2(SPHERE_HALFWIDTH / halfwidth)))
-        halfwidths = tuple(SPHERE_HALFWIDTH * (halfwidth / SPHERE_HALFWIDTH) ** (k / rounds) for k in range(rounds + 1))
+        widest, trust = SPHERE_HALFWIDTH, 0.0
         reasons = [
             "window: a ball at the scene's origin that fills 0.8 of the median camera's narrower half field of view",
-            f"middle radius: a sphere of {r0:.3f}, then {rounds} rounds: each moves it to the opacity found",
+            f"middle radius: a sphere of {r0:.3f}",
         ]
+    halfwidths = shrinking(widest, halfwidth)
+    reasons.append(f"then {len(halfwidths) - 1} rounds: each moves the layers to the opacity found and narrows them")
     texels = texel_count(scene, window, float(np.median(middle)))
     reasons.append(f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera")
-    return Fit(window, middle, halfwidths, texels, tuple(reasons))
+    return Fit(window, middle, trust, halfwidths, texels, tuple(reasons))
+
+
+def shrinking(widest: float, narrowest: float) -> tuple[float, ...]:
+    """From `widest` to `narrowest` (first and last value) by equal factors of at most 2."""
+    rounds = max(0, math.ceil(math.log2(widest / narrowest) - 1e-9))
+    return (*(widest * (narrowest / widest) ** (k / rounds) for k in range(rounds)), narrowest)
 
 
 def mesh_window(vertices: Array) -> Window:

@@ -49,6 +49,10 @@ BACKGROUND_RATE = 0.5
 FAINT = 0.002
 """Layers with less alpha are skipped once the textures are at half resolution."""
 
+LATE_VEIL = 0.1
+"""Once it is decided what the background explains, the price of opacity falls to this part, and rays that are nearly
+opaque are pressed to be so."""
+
 BLUR = 6.0
 """Smoothing of the layers' motion between rounds of geometry, nodes of the radius maps."""
 
@@ -82,6 +86,7 @@ class Level:
 
 def plan(fit: Fit, iterations: int) -> list[Level]:
     """Rounds of geometry, quarter, half and full resolution."""
+
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
@@ -190,7 +195,9 @@ class _Trainer:
             alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
         )
         radii = self.manifolds().radii().detach().double().numpy()
-        self.middle += torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
+        moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
+        start = torch.from_numpy(self.fit.middle).float()
+        self.middle = start + torch.nn.functional.softshrink(moved - start, self.fit.trust)
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
@@ -198,6 +205,7 @@ class _Trainer:
         count = len(self.views.pixel)
         texels = level.texels[0] * level.texels[1]
         stride = max(1, int(count / (RAYS_PER_TEXEL * texels)))
+        coarse = number < len(self.fit.halfwidths)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -208,10 +216,10 @@ class _Trainer:
                 rays,
                 self.images.frame(frame),
                 frame,
-                self.params.lambda_veil,
-                self.params.lambda_solid,
+                self.params.lambda_veil * (1.0 if coarse else LATE_VEIL),
+                0.0 if coarse else self.params.lambda_solid,
                 BACKGROUND_RATE,
-                FAINT if number >= len(self.fit.halfwidths) else 0.0,
+                0.0 if coarse else FAINT,
                 rates,
                 keep,
             )
@@ -240,13 +248,13 @@ class _Trainer:
         assert self.state is not None
         state, n = self.state, self.params.layers
         state.hide_unseen()
-        peak = torch.stack(
-            [state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]
-        ).amax(0)
+        peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= EPSILON] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
-        self.events += [f"layer {i} dropped: alpha at most {float(peak[i]):.4f}" for i in range(n) if not first <= i <= last]
+        self.events += [
+            f"layer {i} dropped: alpha at most {float(peak[i]):.4f}" for i in range(n) if not first <= i <= last
+        ]
         radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape

@@ -49,7 +49,8 @@ def shade(
         weights, through = compositing_weights(rgba[..., 3])
         colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * background
         squares = (colour - target).square().sum()
-        loss = 0.5 * squares + (veil * (1 - through) + solid * through * (1 - through)).sum()
+        nearly = through.clamp(max=0.5)
+        loss = 0.5 * squares + (veil * (1 - through) + solid * nearly * (1 - nearly)).sum()
         (gradient,) = torch.autograd.grad(loss, texture)
     moved = background - rate * (through**3)[:, None] * (colour - target)
     return gradient, moved.detach().clamp(0, 1), squares.detach()

@@ -47,12 +47,13 @@ def shade(  # type: ignore[no-untyped-def]
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
     gradient,  # (PARTS, H, W, N, 4), added to
     veil,  # weight of opacity
-    solid,  # weight of semi-transparent rays
+    solid,  # weight of rays that are nearly, but not quite, opaque
     rate,  # of the background
     faint,  # layers with less alpha are left out
 ):
-    """Sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid T (1 - T): adds its gradient to `gradient`; returns the sum of |C - I|^2.
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid t (1 - t), t = min(T, 1/2).
 
+    Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     C = sum_i w_i c_i + T B. Each pixel's background moves by -rate T^3 (C - I): in proportion to the cube of the
     transmittance, so that it cannot explain what the layers have begun to explain.
     """
@@ -110,7 +111,7 @@ def shade(  # type: ignore[no-untyped-def]
             background[cam, pix, 1] = min(max(s1 - step * d1, np.float32(0.0)), one)
             background[cam, pix, 2] = min(max(s2 - step * d2, np.float32(0.0)), one)
             # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
-            push = np.float32(veil - solid * (1 - 2 * through))
+            push = np.float32(veil - solid * max(1 - 2 * through, np.float32(0.0)))
             rest = one
             for q in range(m - 1, -1, -1):
                 alpha = c[q, 3]

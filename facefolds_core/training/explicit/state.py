@@ -12,8 +12,9 @@ from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
 from facefolds_core.training.explicit.views import Views
 
 INITIAL_COLOUR = 0.4
-INITIAL_ALPHA_LOGIT = -1.5
-"""sigmoid(-1.5) = 0.18: all of 12 layers are seen, and learn, at the start."""
+INITIAL_OPACITY = 0.9
+"""Of all layers together at the start, in equal weights: one alpha for all would favour the outer ones, and the rounds
+of geometry would drift outwards."""
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent."""
@@ -55,7 +56,10 @@ class TextureState:
         """Back to the initial opacity; colours stay. For layers that have moved."""
         self.layers[..., 3] = 0
         self.layers[1:, ..., :3] = 0
-        self.layers[0, ..., 3] = INITIAL_ALPHA_LOGIT
+        n = self.layers.shape[2]
+        weight = INITIAL_OPACITY / n
+        alpha = weight / (1 - weight * torch.arange(n, device=self.device))
+        self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
 
     def grow(self, shape: tuple[int, int]) -> None:
@@ -75,7 +79,8 @@ class TextureState:
         parts = (self.colour[0], self.layers[0], self.frame_colour[0, frame], self.frame_alpha[0, frame])
         if self.device.type != "cpu":
             return reference.activate(*parts)
-        adam_kernel.activate(*(p.numpy() for p in parts), self.texture.numpy())
+        a, b, c, d = (p.numpy() for p in parts)
+        adam_kernel.activate(a, b, c, d, self.texture.numpy())
         return self.texture
 
     def step(

@@ -77,8 +77,8 @@ class Images:
                         "a training image is missing",
                         file=self.store.path,
                         place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                        expected="every frame from every camera: the explicit model learns one background a camera",
-                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; otherwise run "
+                        expected="every frame of every camera: the explicit model learns one background each",
+                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; else run "
                         "`dvc repro` to make the normalised scene again",
                     )
 
