@@ -16,10 +16,10 @@ from facefolds_core.files import read_json, write_text
 
 START, END = "<!-- results: written by bench/readme_tables.py -->", "<!-- end of results -->"
 
-# FaceFolds, tables 1 and 3: five Multiface subjects (row 1), subject 002914589 by mesh resolution (row 2).
+# FaceFolds, its tables of comparisons (row 1) and of mesh resolution (row 2, R^m = 32). It gives no training time.
 PAPER_ROWS = [
-    "| paper, 5 Multiface subjects, 768x500 | 25.49 | 0.788 | LPIPS 0.356 | | | | 6 264 412 | 118 MiB | V100, days |",
-    "| paper, 002914589, R^m = 32 | 29.12 | 0.831 | LPIPS 0.291 | | | | 9 962 | 170 KB + 5.9 MB | V100, days |",
+    "| paper, 5 Multiface subjects, 768x500 | 25.49 | 0.788 | LPIPS 0.356 | | | | | 118 MiB | V100 |",
+    "| paper, 002914589, R^m = 32 | 29.12 | 0.831 | LPIPS 0.291 | | | | 9 962 | 170 KB + 5.9 MB | V100 |",
 ]
 HEADER = [
     "| | PSNR | SSIM | perceptual | PSNR of the subject: asset | diffuse | model "
@@ -36,13 +36,13 @@ def size(count: int) -> str:
     return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.0f} KB"
 
 
-def row(subject: str, metrics: dict[str, Any]) -> str:
+def row(subject: str, preset: str, metrics: dict[str, Any]) -> str:
     """One table row of a subject's metrics.json: the asset over the whole frame, then all three over the subject."""
     asset, cost = metrics["asset"], metrics["cost"]
     lpips, st_lpips = asset.get("lpips"), asset.get("st_lpips")
     perceptual = f"LPIPS {lpips:.3f}" if lpips is not None else f"ST-LPIPS {number(st_lpips, 3)}"
     cells = [
-        f"ours, `{subject}`",
+        f"ours, `{subject}`, {preset}",
         number(asset["psnr"], 2),
         number(asset["ssim"], 3),
         perceptual,
@@ -58,7 +58,10 @@ def tables(data: Path) -> str:
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    rows = [row(path.parent.name, read_json(path)) for path in files]
+    rows = []
+    for path in files:
+        preset = read_json(path.parent / "model" / "training.json")["preset"]
+        rows.append(row(path.parent.name, f"preset `{preset}`", read_json(path)))
     return "\n".join([*HEADER, *PAPER_ROWS, *rows])
 
 

@@ -22,7 +22,7 @@ def params_file(folder: Path, text: str) -> Path:
 
 def test_the_projects_own_file_is_valid(project_root: Path) -> None:
     params = load_params(project_root / "params.yaml")
-    assert list(params.subjects) == ["actor"]
+    assert params.subject("actor").source == "actor"
 
 
 def test_a_preset_fills_what_is_not_given(tmp_path: Path) -> None:
