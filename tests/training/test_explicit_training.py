@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.params import TrainParams
 from facefolds_core.training.explicit import fit
 from facefolds_core.training.explicit.loop import plan, train_explicit
 from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
 
@@ -64,9 +65,12 @@ def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> No
 def test_surface_points_lie_on_the_sphere(trained: tuple[Scene, Path]) -> None:
     model = load_model(trained[1])
     points, valid = model.surface_points(torch.zeros(1, 2))
-    radius = (points[:, 0] - model.centre).norm(dim=-1)
     assert valid.all()
-    assert radius.mean().item() == pytest.approx(OPAQUE[0].radius, abs=0.003)
+    # The model's centre is fitted; the sphere stands around the scene's.
+    assert (points[:, 0] - torch.tensor(SPHERE_CENTRE)).norm(dim=-1).mean().item() == pytest.approx(
+        OPAQUE[0].radius, abs=0.003
+    )
+    radius = (points[:, 0] - model.centre).norm(dim=-1)
     assert (radius[:-1] > radius[1:]).all()
 
 
@@ -83,8 +87,32 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
     np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
 
 
+def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
+    mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.31)
+    mesh[:, 30:] = np.nan
+    volume[:, :10] = 0.3 + 2 * fit.MESH_REACH
+    volume[20, 20] = np.nan
+    radii, kept = fit.blend(mesh, volume)
+    np.testing.assert_allclose(radii[:, :10], volume[:, :10])
+    np.testing.assert_allclose(radii[:, 30:], 0.31)
+    assert radii[20, 20] == 0.3
+    assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
+
+
+def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
+    radius = np.full((30, 30), 0.3)
+    seen = Profile(
+        radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
+    )
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, voxel=0.01), 0.006)
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, 0.006, voxel=0.01), fit.WIDEST)
+
+
 def test_plan_spends_all_iterations() -> None:
-    chosen = fit.Fit((-0.5, 0.5, -0.5, 0.5), np.ones((4, 4)), 0.0, (0.02, 0.01), (128, 96), ())
+    ones = np.ones((4, 4))
+    window = (-0.5, 0.5, -0.5, 0.5)
+    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), {})
     levels = plan(chosen, 400)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)

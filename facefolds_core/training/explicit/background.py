@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import torch
-from scipy import ndimage
 from torch import Tensor
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.training.explicit.views import Images, Views
+from facefolds_core.training.explicit.views import Images
+from facefolds_core.training.volume.fit import Volume
 
 REDUCE = 4
-"""The guess is made on every 4th pixel."""
+"""The volume is looked at on every 4th pixel."""
+
+FREE = 0.05
+"""Pixels through which the volume is less opaque show the background itself."""
+
+FRAMES = 5
+"""Frames whose mean is taken, at most: rooms stand still."""
 
 
-def first_background(scene: Scene, images: Images, views: Views) -> Tensor:
-    """[C, H W, 3] in [0, 1]: what is seen where no layer is crossed, continued smoothly behind the layers.
-
-    Pixels that miss all layers show the background. The others take a mean of these, weighted by a Gaussian that is
-    widened until it reaches some (a camera that has none takes the mean of all cameras that have).
-
-    Args:
-        views: of every pixel (stride 1).
-    """
+def first_background(scene: Scene, images: Images, volume: Volume) -> Tensor:
+    """[C, H W, 3] in [0, 1]: the image where the volume is clear, what lies behind the volume elsewhere."""
     h, w = scene.height, scene.width
-    colours = images.frame(0).reshape(-1, h, w, 3)
-    result = np.zeros((len(colours), h, w, 3), np.float32)
-    seen = np.zeros((len(colours), h * w), bool)
-    seen[views.camera, views.pixel] = True
-    free = ~seen.reshape(-1, h, w)
-    fallback = colours[free].mean(0) / 255 if free.any() else np.zeros(3)
-    for image, mask, out in zip(colours, free, result, strict=True):
-        small, known = image[::REDUCE, ::REDUCE].astype(np.float32) / 255, mask[::REDUCE, ::REDUCE].astype(np.float32)
-        guess = np.broadcast_to(fallback, small.shape).astype(np.float32)
-        for sigma in (64.0, 16.0, 4.0):
-            weight = ndimage.gaussian_filter(known, sigma)[..., None]
-            value = np.stack([ndimage.gaussian_filter(small[..., q] * known, sigma) for q in range(3)], -1)
-            trust = np.clip(weight / 0.02, 0, 1)
-            guess = trust * value / np.maximum(weight, 1e-6) + (1 - trust) * guess
-        full = guess.repeat(REDUCE, 0).repeat(REDUCE, 1)[:h, :w]
-        out[:] = np.where(mask[..., None], image / 255.0, full)
-    return torch.from_numpy(result.reshape(len(colours), h * w, 3))
+    frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, FRAMES)})
+    mean = np.mean([images.frame(k).astype(np.float32) / 255 for k in frames], 0).reshape(-1, h, w, 3)
+    rows, columns = -(-h // REDUCE), -(-w // REDUCE)
+    x, y = np.meshgrid((np.arange(columns) + 0.5) * w / columns, (np.arange(rows) + 0.5) * h / rows)
+    for image, index in zip(mean, images.cameras, strict=True):
+        origins, directions = scene.cameras[index].rays(np.stack([x, y], -1).reshape(-1, 2))
+        at = np.broadcast_to(origins, directions.shape).astype(np.float32)
+        along = directions.astype(np.float32)
+        _, alpha, _ = volume.render(at, along)
+        behind, _, _ = volume.environment.look_up(at, along)
+        full = [cv2.resize(a.reshape(rows, columns, -1), (w, h)) for a in (alpha, behind)]
+        covered = full[0] >= FREE
+        image[covered] = full[1][covered]
+    return torch.from_numpy(mean.reshape(len(mean), h * w, 3).astype(np.float32))

@@ -3,119 +3,179 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
-from facefolds_core.geometry.sphere_uv import Window, directions_to_uv, uv_to_directions
-from facefolds_core.training.start import fitted_radius
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
+from facefolds_core.training.volume.fit import SEEN, Volume, seen_share
+from facefolds_core.training.volume.outline import (
+    SURE,
+    WINDOW_LIMIT,
+    Profile,
+    choose_centre,
+    profile,
+    visible_points,
+    window_directions,
+)
 
 Array = NDArray[np.float64]
 
-WINDOW_MARGIN = 0.35
-"""The window reaches this fraction of the mesh's extent beyond the mesh on each side: room for hair and ears."""
-
-WINDOW_LIMIT = 0.9
-"""No window reaches beyond |u|, |v| = 0.9: at the poles and behind c a radius map has no meaning."""
+WINDOW_MARGIN = 0.04
+"""The window reaches this far in u and v beyond what holds the subject: the volume is coarse."""
 
 NODES = 384
 """Nodes along the longer side of the radius maps."""
 
-PIXELS_PER_TEXEL = 2.0
+PIXELS_PER_TEXEL = 1.5
 """Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
 cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
+
+MESH_REACH = 0.03
+"""Where tracked mesh and volume differ by more, units, the volume is believed: a mesh knows no hair and no clothes."""
 
 MESH_TRUST = 0.004
 """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
 much, units."""
 
-MESH_HALFWIDTH = 0.025
-"""Half of the space between the outermost and the innermost layer in the first round around a tracked mesh, units: a
-mesh knows no hair."""
+LEAST_RADIUS = 0.08
+"""No layer's middle comes nearer to c, units: the search for crossings takes strides of less than half of that."""
 
-SPHERE_HALFWIDTH = 0.12
-"""The same where there is no mesh."""
+WIDEST = 0.015
+"""No layers lie farther from their middle than this, units."""
+
+ROUNDS = (2.5, 1.6, 1.0)
+"""Halfwidths of the rounds of geometry, in halfwidths of the model: each moves the layers to the opacity found."""
+
+MESH_OPACITY = 0.9
+"""Opacity at the start where only the tracked mesh says that there is something."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What was chosen, and why.
+    """What was chosen, and why. Maps are (rows, columns) at the nodes of the radius maps.
 
     Attributes:
+        centre: (3,) c, units.
         window: (u0, u1, v0, v1).
-        middle: (rows, columns) starting radii of the middle of the layers, units.
+        middle: starting radii of the middle of the layers, units.
+        halfwidth: half the space between the outermost and the innermost layer, units.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
-        halfwidths: half the space between outermost and innermost layer, one for each round of geometry, units; the
-            last one is the model's.
+        opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
         reasons: one line a choice.
+        figures: numbers behind the choices, for the summary.
     """
 
+    centre: Array
     window: Window
     middle: Array
-    trust: float
-    halfwidths: tuple[float, ...]
+    halfwidth: Array
+    trust: Array
+    opacity: Array
+    rgb: Array
     texels: tuple[int, int]
     reasons: tuple[str, ...]
+    figures: dict[str, object]
 
 
-def fit_scene(scene: Scene, halfwidth: float) -> Fit:
-    """Start from the tracked mesh where there is one, else from a sphere and the cameras."""
-    surface = scene.load_surface()
+def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
+    """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
+
+    Args:
+        volume: of the scene's middle frame, without what floats beside the subject.
+        halfwidth: least half of the space between the outermost and the innermost layer, units.
+    """
     cameras = [scene.cameras[i] for i in scene.indices("train")]
-    if surface is not None:
-        vertices, faces = surface
-        window = mesh_window(vertices.astype(np.float64))
-        rows, columns = _nodes(window)
-        middle = extrapolate(mesh_radii(vertices.astype(np.float64), faces, window, rows, columns))
-        widest, trust = MESH_HALFWIDTH, MESH_TRUST
-        reasons = [
-            f"window: the tracked mesh over all frames, {WINDOW_MARGIN:.0%} of its extent added on each side",
-            "middle radius: the tracked mesh, mean over frames, continued smoothly beyond its border",
-        ]
+    centre, losses = choose_centre(volume, visible_points(volume, cameras))
+    surface = scene.load_surface()
+    vertices = None if surface is None else surface[0].astype(np.float64)
+    window = fit_window(volume, centre, vertices)
+    rows, columns = _nodes(window)
+    directions = window_directions(window, rows, columns)
+    seen = profile(volume, centre, directions)
+    opacity = seen.opacity.astype(np.float64)
+    if surface is None or vertices is None:
+        known = seen.radius
+        trust = np.zeros((rows, columns))
+        source = "the volume, where half of its opacity is reached from outside"
     else:
-        r0, farthest = fitted_radius(cameras)
-        window = ball_window(farthest - float(np.linalg.norm(SPHERE_CENTRE)))
-        rows, columns = _nodes(window)
-        middle = np.full((rows, columns), r0)
-        widest, trust = SPHERE_HALFWIDTH, 0.0
-        reasons = [
-            "window: a ball at the scene's origin that fills 0.8 of the median camera's narrower half field of view",
-            f"middle radius: a sphere of {r0:.3f}",
-        ]
-    halfwidths = shrinking(widest, halfwidth)
-    reasons.append(f"then {len(halfwidths) - 1} rounds: each moves the layers to the opacity found and narrows them")
-    texels = texel_count(scene, window, float(np.median(middle)))
-    reasons.append(f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera")
-    return Fit(window, middle, trust, halfwidths, texels, tuple(reasons))
+        mesh = mesh_radii(vertices, surface[1], centre, directions)
+        unseen = seen_share(cameras, (centre + mesh[..., None] * directions).reshape(-1, 3)).reshape(mesh.shape) < SEEN
+        seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
+        known, kept = blend(mesh, seen.radius)
+        trust = MESH_TRUST * kept
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH_OPACITY), opacity)
+        source = f"the tracked mesh, mean over frames, where it lies within {MESH_REACH} of the volume; else the volume"
+    middle = extrapolate(known).clip(LEAST_RADIUS)
+    widths = spread(seen, middle, halfwidth, volume.voxel)
+    texels = texel_count(scene, window, float(np.quantile(middle[opacity >= SURE], 0.9)))
+    return Fit(
+        centre=centre,
+        window=window,
+        middle=middle,
+        halfwidth=widths,
+        trust=trust,
+        opacity=opacity,
+        rgb=seen.rgb.astype(np.float64),
+        texels=texels,
+        reasons=(
+            f"centre: of the candidates, the one whose hemisphere loses least of the visible surface "
+            f"({losses[f'{centre[0]:.2f}']:.1%})",
+            f"window: directions in which the volume is at least {SURE:.0%} opaque (and the tracked mesh, where there "
+            f"is one), and {WINDOW_MARGIN} on each side",
+            f"middle radius: {source}",
+            f"halfwidth: {halfwidth}, more where the volume is blurred or far from the middle, at most {WIDEST}",
+            f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera",
+        ),
+        figures={"lost_by_centre": losses, "volume_psnr": volume.psnr, "volume_shape": list(volume.grid.shape[:3])},
+    )
 
 
-def shrinking(widest: float, narrowest: float) -> tuple[float, ...]:
-    """From `widest` to `narrowest` (first and last value) by equal factors of at most 2."""
-    rounds = max(0, math.ceil(math.log2(widest / narrowest) - 1e-9))
-    return (*(widest * (narrowest / widest) ** (k / rounds) for k in range(rounds)), narrowest)
-
-
-def mesh_window(vertices: Array) -> Window:
-    """Vertices (K, V, 3) -> the box around the (u, v) of those in front of c, widened by WINDOW_MARGIN."""
-    offset = vertices.reshape(-1, 3) - np.array(SPHERE_CENTRE)
-    offset = offset[offset[:, 0] > 0]
-    uv = directions_to_uv(offset / np.linalg.norm(offset, axis=1, keepdims=True))
-    low, high = uv.min(0), uv.max(0)
-    margin = WINDOW_MARGIN * (high - low)
-    low, high = np.maximum(low - margin, -WINDOW_LIMIT), np.minimum(high + margin, WINDOW_LIMIT)
+def fit_window(volume: Volume, centre: Array, vertices: Array | None) -> Window:
+    """Box around the directions that hold the subject: the volume's, and those of mesh vertices (K, V, 3) before c."""
+    uv = np.linspace(-1, 1, 192)
+    solid = profile(volume, centre, window_directions(FULL_WINDOW, len(uv), len(uv))).opacity >= SURE
+    held = [np.stack(np.meshgrid(uv[::-1], uv, indexing="ij"), -1)[solid]]
+    if vertices is not None:
+        offset = vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3) - centre
+        offset = offset[offset[:, 0] > 0]
+        held.append(directions_to_uv(offset / np.linalg.norm(offset, axis=1, keepdims=True)))
+    points = np.concatenate(held)
+    low = np.maximum(points.min(0) - WINDOW_MARGIN, -WINDOW_LIMIT)
+    high = np.minimum(points.max(0) + WINDOW_MARGIN, WINDOW_LIMIT)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def ball_window(radius: float) -> Window:
-    """The directions from c under which a ball of `radius` at the origin is seen, at most WINDOW_LIMIT."""
-    sine = min(1.0, radius / float(np.linalg.norm(SPHERE_CENTRE)))
-    reach = min(WINDOW_LIMIT, 1.1 * 2 / math.pi * math.asin(sine))
-    return -reach, reach, -reach, reach
+def blend(mesh: Array, volume: Array) -> tuple[Array, Array]:
+    """Radii of the mesh where it is close to the volume or alone, of the volume elsewhere, with a soft border.
+
+    Returns:
+        radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
+    """
+    close = np.isfinite(mesh) & ~(np.abs(mesh - volume) > MESH_REACH)
+    # Ten nodes inside the border the mesh rules alone.
+    kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
+    kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
+    filled = np.where(np.isnan(volume), mesh, volume)
+    return np.where(
+        kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled
+    ), kept
+
+
+def spread(seen: Profile, middle: Array, halfwidth: float, voxel: float) -> Array:
+    """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
+    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
+    thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
+    off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
+    wide: Array = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
+        halfwidth, max(halfwidth, WIDEST)
+    )
+    return wide
 
 
 def _nodes(window: Window) -> tuple[int, int]:
@@ -124,23 +184,20 @@ def _nodes(window: Window) -> tuple[int, int]:
     return max(8, round(scale * height)), max(8, round(scale * width))
 
 
-def mesh_radii(vertices: Array, faces: NDArray[np.int32], window: Window, rows: int, columns: int) -> Array:
-    """(rows, columns) distance of the mesh's outermost point from c at the grid's nodes, mean over frames (K, V, 3).
+def mesh_radii(vertices: Array, faces: NDArray[np.int32], centre: Array, directions: Array) -> Array:
+    """(...) distance of the mesh's outermost point from `centre` along (..., 3), mean over frames (K, V, 3).
 
     NaN where no frame's mesh has a point.
     """
-    u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
-    directions = uv_to_directions(np.stack(np.meshgrid(u, v, indexing="ij"), -1).reshape(-1, 2))
-    centre = np.array(SPHERE_CENTRE)
-    total, count = np.zeros(len(directions)), np.zeros(len(directions))
+    flat = directions.reshape(-1, 3)
+    total, count = np.zeros(len(flat)), np.zeros(len(flat))
     for frame in vertices[:: max(1, len(vertices) // 12)]:
         mesh = trimesh.Trimesh(frame, faces, process=False)
         start = 2 * float(np.linalg.norm(frame - centre, axis=1).max())
-        points, ray, _ = mesh.ray.intersects_location(centre + start * directions, -directions, multiple_hits=False)
+        points, ray, _ = mesh.ray.intersects_location(centre + start * flat, -flat, multiple_hits=False)
         total[ray] += np.linalg.norm(points - centre, axis=1)
         count[ray] += 1
-    radii = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    return radii.reshape(rows, columns)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(directions.shape[:-1])
 
 
 def extrapolate(radii: Array) -> Array:

@@ -13,7 +13,7 @@ from dvclive.live import Live
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.grids import GridTextures
@@ -24,11 +24,13 @@ from facefolds_core.params import TrainParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
-from facefolds_core.training.explicit.fit import Fit, fit_scene, recentre
+from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, recentre
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Images, Views, trace_views
 from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
+from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
+from facefolds_core.training.volume.outline import largest_body
 
 RAYS_PER_TEXEL = 2.5
 """Of one frame, in one step."""
@@ -73,14 +75,14 @@ class Level:
         texels: (H, W).
         iterations: steps.
         stride: of the pixels that are traced.
-        halfwidth: of the layers, units.
+        geometry: halfwidths of the layers, in those of the fit.
         last: the learning rates fall to a tenth along it.
     """
 
     texels: tuple[int, int]
     iterations: int
     stride: int
-    halfwidth: float
+    geometry: float
     last: bool
 
 
@@ -90,11 +92,11 @@ def plan(fit: Fit, iterations: int) -> list[Level]:
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
-    levels = [Level(size(4), ROUND_ITERATIONS, 8, h, False) for h in fit.halfwidths]
+    levels = [Level(size(4), ROUND_ITERATIONS, 8, scale, False) for scale in ROUNDS]
     rest = max(3, iterations - ROUND_ITERATIONS * len(levels))
     half = round(HALF_SHARE * rest)
-    levels.append(Level(size(2), half, 1, fit.halfwidths[-1], False))
-    levels.append(Level(fit.texels, rest - half, 1, fit.halfwidths[-1], True))
+    levels.append(Level(size(2), half, 1, ROUNDS[-1], False))
+    levels.append(Level(fit.texels, rest - half, 1, ROUNDS[-1], True))
     return levels
 
 
@@ -106,11 +108,12 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     """
     device = pick_device(params.device)
     began = time.perf_counter()
-    fit = fit_scene(scene, params.level_halfwidth)
-    levels = plan(fit, params.iterations)
-    trainer = _Trainer(scene, params, fit, device)
     with open_log(log) as live:
-        bar = progress(total=sum(level.iterations for level in levels), desc="train", unit="it")
+        bar = progress(total=iterations() + params.iterations, desc="train", unit="it")
+        volume = largest_body(fit_volume(scene, params.seed, bar))
+        fit = fit_scene(scene, volume, params.level_halfwidth)
+        trainer = _Trainer(scene, params, fit, volume, device)
+        levels = plan(fit, params.iterations)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
@@ -126,12 +129,14 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
 
 
 class _Trainer:
-    def __init__(self, scene: Scene, params: TrainParams, fit: Fit, device: torch.device) -> None:
-        self.scene, self.params, self.fit, self.device = scene, params, fit, device
+    def __init__(self, scene: Scene, params: TrainParams, fit: Fit, volume: Volume, device: torch.device) -> None:
+        self.scene, self.params, self.fit, self.volume, self.device = scene, params, fit, volume, device
         self.images = Images(scene)
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
-        self.halfwidth = 0.0
+        self.geometry = 0.0
+        x, y, z = (float(v) for v in fit.centre)
+        self.centre = (x, y, z)
         self.views: Views | None = None
         self.stride = 0
         self.state: TextureState | None = None
@@ -141,8 +146,8 @@ class _Trainer:
         self.events: list[str] = []
 
     def manifolds(self) -> RadialManifolds:
-        halfwidth = torch.full_like(self.middle, self.halfwidth)
-        return RadialManifolds(SPHERE_CENTRE, self.fit.window, self.middle, halfwidth, self.params.layers)
+        halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
+        return RadialManifolds(self.centre, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level, again from its start at a third of the learning rate if it diverges."""
@@ -166,19 +171,19 @@ class _Trainer:
 
     def _prepare(self, level: Level) -> None:
         """Geometry, stored crossings and grids of this level."""
-        moved = self.halfwidth != level.halfwidth
+        moved = self.geometry != level.geometry
         if moved and self.state is not None:
             self._recentre()
-        self.halfwidth = level.halfwidth
+        self.geometry = level.geometry
         if moved or self.stride != level.stride:
             self.views = trace_views(self.scene, self.manifolds(), level.stride)
             self.stride = level.stride
         assert self.views is not None
         if self.state is None:
-            everything = trace_views(self.scene, self.manifolds(), 1) if level.stride > 1 else self.views
-            background = first_background(self.scene, self.images, everything)
+            background = first_background(self.scene, self.images, self.volume)
+            start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
             shape = (self.params.layers, self.scene.num_frames)
-            self.state = TextureState(level.texels, *shape, background, self.device)
+            self.state = TextureState(level.texels, *shape, start, background, self.device)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:
@@ -197,7 +202,7 @@ class _Trainer:
         radii = self.manifolds().radii().detach().double().numpy()
         moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
         start = torch.from_numpy(self.fit.middle).float()
-        self.middle = start + torch.nn.functional.softshrink(moved - start, self.fit.trust)
+        self.middle = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
@@ -205,7 +210,7 @@ class _Trainer:
         count = len(self.views.pixel)
         texels = level.texels[0] * level.texels[1]
         stride = max(1, int(count / (RAYS_PER_TEXEL * texels)))
-        coarse = number < len(self.fit.halfwidths)
+        coarse = number < len(ROUNDS)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -259,7 +264,7 @@ class _Trainer:
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
-        manifolds = RadialManifolds(SPHERE_CENTRE, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
+        manifolds = RadialManifolds(self.centre, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
         textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames)
         with torch.no_grad():
             textures.colour.copy_(state.colour[0].view(h, w, 3))
@@ -267,7 +272,7 @@ class _Trainer:
             textures.frame_colour.copy_(state.frame_colour[0].view(-1, h, w, 3))
             textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., first : last + 1])
         spec = ExplicitSpec(
-            centre=SPHERE_CENTRE,
+            centre=self.centre,
             window=self.fit.window,
             nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),
@@ -282,9 +287,16 @@ class _Trainer:
         return {
             "window": list(spec.window),
             "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
-            "halfwidths": list(self.fit.halfwidths),
+            "centre": list(spec.centre),
+            "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
             "layers": spec.num_layers,
             "texels": list(spec.texels),
             "reasons": list(self.fit.reasons),
+            "figures": self.fit.figures,
             "events": self.events,
         }
+
+
+def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:
+    """Towards 0 by `by`, not beyond."""
+    return values.sign() * (values.abs() - by).clamp(min=0)

@@ -11,10 +11,9 @@ from facefolds_core.training.explicit import adam_kernel, reference, shading_ker
 from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
 from facefolds_core.training.explicit.views import Views
 
-INITIAL_COLOUR = 0.4
-INITIAL_OPACITY = 0.9
-"""Of all layers together at the start, in equal weights: one alpha for all would favour the outer ones, and the rounds
-of geometry would drift outwards."""
+LEAST_OPACITY, MOST_OPACITY = 0.02, 0.9
+"""Of all layers together at the start. Their weights are equal: one alpha for all would favour the outer ones, and the
+rounds of geometry would drift outwards."""
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent."""
@@ -26,12 +25,20 @@ class TextureState:
     Attributes:
         shape: (H, W).
         colour [3, M, 3], layers [3, M, N, 4], frame_colour [3, K, M, 3], frame_alpha [3, K, M, N].
+        start: [rows, columns, 4] colour and opacity of all layers together at the start, over the window with its
+            borders at the first and last rows and columns.
         background: [C, pixels, 3] float32.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
     """
 
     def __init__(
-        self, shape: tuple[int, int], layers: int, frames: int, background: Tensor, device: torch.device
+        self,
+        shape: tuple[int, int],
+        layers: int,
+        frames: int,
+        start: Tensor,
+        background: Tensor,
+        device: torch.device,
     ) -> None:
         m = shape[0] * shape[1]
         self.device = device
@@ -40,7 +47,8 @@ class TextureState:
         self.layers = torch.zeros(3, m, layers, 4, device=device)
         self.frame_colour = torch.zeros(3, frames, m, 3, device=device)
         self.frame_alpha = torch.zeros(3, frames, m, layers, device=device)
-        self.colour[0] = INITIAL_COLOUR
+        self.start = start.to(device)
+        self.colour[0] = self._start()[:, :3]
         self.background = background.to(device)
         self.reset_alpha()
         self._allocate()
@@ -57,10 +65,16 @@ class TextureState:
         self.layers[..., 3] = 0
         self.layers[1:, ..., :3] = 0
         n = self.layers.shape[2]
-        weight = INITIAL_OPACITY / n
+        weight = self._start()[:, 3:].clamp(LEAST_OPACITY, MOST_OPACITY) / n
         alpha = weight / (1 - weight * torch.arange(n, device=self.device))
         self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
+
+    def _start(self) -> Tensor:
+        """[M, 4]: `start` at the texels."""
+        image = self.start.permute(2, 0, 1)[None]
+        image = torch.nn.functional.interpolate(image, size=self.shape, mode="bilinear", align_corners=False)
+        return image[0].permute(1, 2, 0).reshape(-1, 4)
 
     def grow(self, shape: tuple[int, int]) -> None:
         """Resample all values to H x W texels (bilinear) and start the moments afresh."""

@@ -1,0 +1,271 @@
+"""Rays through a grid of density and colour, forwards and backwards in one pass, and the grid's Adam step.
+
+Compiled for CPUs. Reference: `reference.py`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
+
+PARTS = 2
+"""Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads."""
+
+BLOCK = 4
+"""Voxels a side of a block of the occupancy map."""
+
+CLEAR, OPAQUE = 1e-4, 1e-3
+"""Samples with less alpha are left out, and so is what lies behind less transmittance."""
+
+BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
+LIMIT = 12.0
+"""Of |raw density|."""
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def _softplus(x):  # type: ignore[no-untyped-def]
+    return x if x > 15.0 else math.log1p(math.exp(x))
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def _span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
+    """Distances at which a ray enters and leaves the box of voxel centres; empty if the second is smaller."""
+    near, far = 0.0, 1e30
+    for a in range(3):
+        slope = d[a] if abs(d[a]) > 1e-9 else 1e-9
+        t0 = (lower[a] - o[a]) / slope
+        t1 = (lower[a] + voxel * (grid.shape[a] - 1) - o[a]) / slope
+        near = max(near, min(t0, t1))
+        far = min(far, max(t0, t1))
+    return near, far
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def _sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Trilinear values at voxel coordinates (x, y, z) into out[0:4]; returns the lower corner and the fractions."""
+    i = min(max(int(x), 0), grid.shape[0] - 2)
+    j = min(max(int(y), 0), grid.shape[1] - 2)
+    k = min(max(int(z), 0), grid.shape[2] - 2)
+    fx = np.float32(min(max(x - i, 0.0), 1.0))
+    fy = np.float32(min(max(y - j, 0.0), 1.0))
+    fz = np.float32(min(max(z - k, 0.0), 1.0))
+    for q in range(4):
+        out[q] = 0
+    for t in range(8):
+        di, dj, dk = t >> 2, (t >> 1) & 1, t & 1
+        w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
+        for q in range(4):
+            out[q] += w * grid[i + di, j + dj, k + dk, q]
+    return i, j, k, fx, fy, fz
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def shade(  # type: ignore[no-untyped-def]
+    origins,  # (R, 3) float32
+    directions,  # (R, 3) float32, unit
+    jitter,  # (R,) float32 in [0, 1): where in the first step the first sample lies
+    target,  # (R, 3) float32 in [0, 1]
+    background,  # (R, 3) float32
+    grid,  # (X, Y, Z, 4) float32: raw density, rgb
+    occupied,  # (X / BLOCK, ...) bool, rounded up: blocks that may hold something
+    lower,  # (3,) position of voxel (0, 0, 0)
+    voxel,  # its side, units
+    step,  # between samples, units
+    samples,  # at most so many on a ray
+    gradient,  # (PARTS, X, Y, Z, 4), added to
+    residual,  # (R, 3) out: C - I
+    through,  # (R,) out: transmittance
+    veil,  # weight of opacity
+    solid,  # weight of rays that are nearly, but not quite, opaque
+):
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid t (1 - t), t = min(T, 1/2).
+
+    A sample has alpha = 1 - exp(-softplus(raw) step / voxel). Returns the sum of |C - I|^2.
+    """
+    count = origins.shape[0]
+    sums = np.zeros(gradient.shape[0])
+    density = step / voxel
+    for part in numba.prange(gradient.shape[0]):
+        own = gradient[part]
+        corner = np.empty((samples, 3), np.int32)
+        fraction = np.empty((samples, 3), np.float32)
+        colour = np.empty((samples, 3), np.float32)
+        alpha = np.empty(samples, np.float32)
+        slope = np.empty(samples, np.float32)
+        before = np.empty(samples, np.float32)
+        value = np.empty(4, np.float32)
+        total = 0.0
+        for r in range(count * part // gradient.shape[0], count * (part + 1) // gradient.shape[0]):
+            o, d = origins[r], directions[r]
+            near, far = _span(o, d, lower, voxel, grid)
+            c = np.zeros(3, np.float32)
+            t = np.float32(1.0)
+            m = 0
+            s = near + jitter[r] * step
+            while s < far and m < samples and t >= OPAQUE:
+                x = (o[0] + s * d[0] - lower[0]) / voxel
+                y = (o[1] + s * d[1] - lower[1]) / voxel
+                z = (o[2] + s * d[2] - lower[2]) / voxel
+                s += step
+                if not occupied[int(max(x, 0.0)) // BLOCK, int(max(y, 0.0)) // BLOCK, int(max(z, 0.0)) // BLOCK]:
+                    continue
+                i, j, k, fx, fy, fz = _sample(grid, x, y, z, value)
+                rest = math.exp(-_softplus(value[0]) * density)
+                a = np.float32(1 - rest)
+                if a < CLEAR:
+                    continue
+                corner[m, 0], corner[m, 1], corner[m, 2] = i, j, k
+                fraction[m, 0], fraction[m, 1], fraction[m, 2] = fx, fy, fz
+                alpha[m] = a
+                slope[m] = rest * density / (1 + math.exp(-value[0]))
+                before[m] = t
+                for q in range(3):
+                    colour[m, q] = value[q + 1]
+                    c[q] += t * a * value[q + 1]
+                t *= 1 - a
+                m += 1
+            through[r] = t
+            behind = np.empty(3, np.float32)
+            for q in range(3):
+                behind[q] = background[r, q]
+                residual[r, q] = c[q] + t * background[r, q] - target[r, q]
+                total += residual[r, q] * residual[r, q]
+            # From the back: `behind` is the colour, `after` the transmittance of all that lies behind sample n.
+            push = np.float32(veil - solid * max(1 - 2 * t, np.float32(0.0)))
+            after = np.float32(1.0)
+            for n in range(m - 1, -1, -1):
+                a, light = alpha[n], before[n]
+                pull = push * after
+                for q in range(3):
+                    pull += residual[r, q] * (colour[n, q] - behind[q])
+                    behind[q] = a * colour[n, q] + (1 - a) * behind[q]
+                after *= 1 - a
+                g = light * pull * slope[n]
+                i, j, k = corner[n, 0], corner[n, 1], corner[n, 2]
+                fx, fy, fz = fraction[n, 0], fraction[n, 1], fraction[n, 2]
+                for tap in range(8):
+                    di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
+                    w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
+                    own[i + di, j + dj, k + dk, 0] += w * g
+                    for q in range(3):
+                        own[i + di, j + dj, k + dk, q + 1] += w * light * a * residual[r, q]
+        sums[part] = total
+    return sums.sum()
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
+    """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance at which half of alpha is reached (R,) or 0."""
+    count = origins.shape[0]
+    rgb = np.zeros((count, 3), np.float32)
+    alpha = np.zeros(count, np.float32)
+    depth = np.zeros(count, np.float32)
+    for r in numba.prange(count):
+        o, d = origins[r], directions[r]
+        near, far = _span(o, d, lower, voxel, grid)
+        value = np.empty(4, np.float32)
+        t = np.float32(1.0)
+        s = near + 0.5 * step
+        while s < far and t >= OPAQUE:
+            x = (o[0] + s * d[0] - lower[0]) / voxel
+            y = (o[1] + s * d[1] - lower[1]) / voxel
+            z = (o[2] + s * d[2] - lower[2]) / voxel
+            _sample(grid, x, y, z, value)
+            a = np.float32(1 - math.exp(-_softplus(value[0]) * step / voxel))
+            for q in range(3):
+                rgb[r, q] += t * a * value[q + 1]
+            t *= 1 - a
+            if depth[r] == 0 and t < 0.5:
+                depth[r] = s
+            s += step
+        alpha[r] = 1 - t
+    return rgb, alpha, depth
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def adam_step(  # type: ignore[no-untyped-def]
+    grid,  # (3, X, Y, Z, 4): values, first and second moments; all updated in place
+    gradient,  # (PARTS, X, Y, Z, 4); zero afterwards
+    share,  # (X, Y, Z) factor on the rate of density
+    rate_density,
+    rate_colour,
+    correct1,  # bias corrections of the two moments
+    correct2,
+    smooth,  # weight of sum sqrt(1 + d^2) over differences d of raw density to the six neighbours
+):
+    """Adam on the voxels that the rays have met; the others stay as they are, moments included."""
+    values = grid[0]
+    old = values[..., 0].copy()
+    nx, ny, nz = old.shape
+    for i in numba.prange(nx):
+        for j in range(ny):
+            for k in range(nz):
+                if gradient[0, i, j, k, 0] == 0 and gradient[1, i, j, k, 0] == 0:
+                    continue
+                for q in range(4):
+                    g = gradient[0, i, j, k, q] + gradient[1, i, j, k, q]
+                    gradient[0, i, j, k, q] = 0
+                    gradient[1, i, j, k, q] = 0
+                    if q == 0:
+                        for n in range(6):
+                            a, b = n >> 1, 2 * (n & 1) - 1
+                            x, y, z = i + (b if a == 0 else 0), j + (b if a == 1 else 0), k + (b if a == 2 else 0)
+                            if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz:
+                                difference = old[i, j, k] - old[x, y, z]
+                                g += np.float32(smooth) * difference / math.sqrt(1 + difference * difference)
+                    m1 = np.float32(BETA1) * grid[1, i, j, k, q] + np.float32(1 - BETA1) * g
+                    m2 = np.float32(BETA2) * grid[2, i, j, k, q] + np.float32(1 - BETA2) * g * g
+                    grid[1, i, j, k, q], grid[2, i, j, k, q] = m1, m2
+                    rate = rate_density * share[i, j, k] if q == 0 else rate_colour
+                    moved = values[i, j, k, q] - rate * (m1 * correct1) / (math.sqrt(m2 * correct2) + EPSILON)
+                    low, high = (-LIMIT, LIMIT) if q == 0 else (0.0, 1.0)
+                    values[i, j, k, q] = min(max(moved, low), high)
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
+    """Along each direction (R, 3), from `farthest` in to `centre`.
+
+    Returns opacity (R,), colour over black (R, 3), and the radii (R, S) at which the given shares of the opacity are
+    reached, linear between samples; 0 where all is clear.
+    """
+    count = directions.shape[0]
+    samples = int(farthest / step)
+    opacity = np.zeros(count, np.float32)
+    rgb = np.zeros((count, 3), np.float32)
+    radius = np.zeros((count, shares.shape[0]), np.float32)
+    for r in numba.prange(count):
+        reached = np.zeros(samples + 1, np.float32)
+        value = np.empty(4, np.float32)
+        t = np.float32(1.0)
+        for n in range(samples):
+            s = farthest - (n + 0.5) * step
+            x = (centre[0] + s * directions[r, 0] - lower[0]) / voxel
+            y = (centre[1] + s * directions[r, 1] - lower[1]) / voxel
+            z = (centre[2] + s * directions[r, 2] - lower[2]) / voxel
+            inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
+            if inside and t >= OPAQUE:
+                _sample(grid, x, y, z, value)
+                a = np.float32(1 - math.exp(-_softplus(value[0]) * step / voxel))
+                for q in range(3):
+                    rgb[r, q] += t * a * value[q + 1]
+                t *= 1 - a
+            reached[n + 1] = 1 - t
+        opacity[r] = 1 - t
+        if opacity[r] < CLEAR:
+            continue
+        for k in range(shares.shape[0]):
+            wanted = shares[k] * opacity[r]
+            n = 1
+            while n < samples and reached[n] < wanted:
+                n += 1
+            f = (wanted - reached[n - 1]) / max(reached[n] - reached[n - 1], np.float32(1e-9))
+            radius[r, k] = farthest - (n - 1 + min(max(f, 0.0), 1.0)) * step
+    return opacity, rgb, radius

@@ -1,0 +1,134 @@
+"""What a volume says about star-shaped layers: where they lie in each direction from a centre, how opaque they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv, uv_to_directions
+from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume.fit import Volume
+
+Array = NDArray[np.float64]
+
+CENTRES = tuple(-0.05 * k for k in range(2, 9))
+"""Candidates for the sphere centre: (x, 0, 0) with these x, units. The paper's is -0.25."""
+
+TIE = 0.01
+"""Of the centres whose loss is within this of the least, the one farthest back wins: directions fan out less."""
+
+WINDOW_LIMIT = 0.9
+"""No window reaches beyond |u|, |v| = 0.9: at the poles and behind c a radius map has no meaning."""
+
+MAP_NODES = 96
+"""A side of the coarse radius map over the hemisphere by which centres are compared."""
+
+SURE = 0.5
+"""Opacity from which on a direction, or a pixel, is taken to hold the subject."""
+
+SOLID_DEPTH = 0.1
+"""Optical depth of a voxel from which on it belongs to a body (`largest_body`)."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The volume along directions from a centre.
+
+    Attributes:
+        radius: (...) where half of the opacity is reached from outside; NaN where there is less than SURE of it, units.
+        outer, inner: (...) where a tenth and nine tenths of it are reached, units.
+        opacity: (...) along the whole direction, float32.
+        rgb: (..., 3) colour, composited from outside and divided by the opacity, float32.
+    """
+
+    radius: Array
+    outer: Array
+    inner: Array
+    opacity: NDArray[np.float32]
+    rgb: NDArray[np.float32]
+
+
+def largest_body(volume: Volume) -> Volume:
+    """The volume without what floats beside its largest connected body."""
+    depth = np.logaddexp(0, volume.grid[..., 0])
+    labels, count = ndimage.label(depth > SOLID_DEPTH)
+    if count < 2:
+        return volume
+    mass = ndimage.sum_labels(depth, labels, np.arange(1, count + 1))
+    body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=2)
+    grid = volume.grid.copy()
+    grid[~body, 0] = np.minimum(grid[~body, 0], math.log(math.expm1(1e-5)))
+    return replace(volume, grid=grid)
+
+
+def profile(volume: Volume, centre: Array, directions: Array) -> Profile:
+    """Integrate the volume from outside towards `centre` along unit directions (..., 3)."""
+    size = np.array(volume.grid.shape[:3]) - 1
+    ends = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    corners = volume.lower + volume.voxel * ends * size
+    farthest = float(np.linalg.norm(corners - centre, axis=1).max())
+    flat = np.ascontiguousarray(directions.reshape(-1, 3))
+    opacity, rgb, radii = kernel.profile(
+        volume.grid, volume.lower, volume.voxel, centre, flat, farthest, 0.5 * volume.voxel, np.array([0.5, 0.1, 0.9])
+    )
+    radii = np.where(opacity[:, None] >= SURE, radii, np.nan).astype(np.float64)
+    rgb /= np.maximum(opacity, kernel.CLEAR)[:, None]
+    shape = directions.shape[:-1]
+    middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
+    return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))
+
+
+def window_directions(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 3) directions of the nodes of a radius map: they include the window's borders."""
+    u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
+    directions: Array = uv_to_directions(np.stack(np.meshgrid(u, v, indexing="ij"), -1))
+    return directions
+
+
+def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int = 2500) -> Array:
+    """(P, 3) where training rays reach half transmittance: the surface that the cameras see."""
+    points = []
+    for camera in cameras:
+        stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / rays_per_camera)))
+        x, y = np.meshgrid(
+            np.arange(stride // 2, camera.width, stride) + 0.5, np.arange(stride // 2, camera.height, stride) + 0.5
+        )
+        origins, directions = camera.rays(np.stack([x, y], -1).reshape(-1, 2))
+        origins = np.broadcast_to(origins, directions.shape)
+        _, _, depth = volume.render(origins.astype(np.float32), directions.astype(np.float32))
+        seen = depth > 0
+        points.append(origins[seen] + depth[seen, None] * directions[seen])
+    return np.concatenate(points)
+
+
+def lost_share(volume: Volume, centre: Array, points: Array) -> float:
+    """Share of visible points that no sheet over the hemisphere of `centre` can hold.
+
+    They lie behind it or at its rim, or beneath or above the outermost surface in their direction by more than two
+    voxels and what the surface's slope explains.
+    """
+    offset = points - centre
+    radius = np.linalg.norm(offset, axis=1)
+    uv = directions_to_uv(offset / radius[:, None])
+    front = (offset[:, 0] > 0) & (np.abs(uv) <= WINDOW_LIMIT).all(1)
+    radii = profile(volume, centre, window_directions(FULL_WINDOW, MAP_NODES, MAP_NODES)).radius
+    high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
+    low = ndimage.minimum_filter(np.where(np.isnan(radii), np.inf, radii), 3)
+    i = np.rint((1 - uv[:, 0]) / 2 * (MAP_NODES - 1)).astype(int).clip(0, MAP_NODES - 1)
+    j = np.rint((uv[:, 1] + 1) / 2 * (MAP_NODES - 1)).astype(int).clip(0, MAP_NODES - 1)
+    margin = 2 * volume.voxel
+    held = front & (radius <= high[i, j] + margin) & (radius >= low[i, j] - margin)
+    return float(1 - held.mean())
+
+
+def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[str, float]]:
+    """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x."""
+    losses = {x: lost_share(volume, np.array([x, 0.0, 0.0]), points) for x in CENTRES}
+    least = min(losses.values())
+    best = min(x for x, loss in losses.items() if loss <= least + TIE)
+    return np.array([best, 0.0, 0.0]), {f"{x:.2f}": loss for x, loss in losses.items()}
