@@ -12,6 +12,7 @@ from safetensors.torch import load_file
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
+from facefolds_core.model.device import pick_device
 from facefolds_core.params import TrainParams
 from facefolds_core.training import loop
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
@@ -258,4 +259,4 @@ def test_missing_training_image(tmp_path: Path) -> None:
 @pytest.mark.skipif(torch.cuda.is_available(), reason="only where there is no CUDA device")
 def test_cuda_where_there_is_none() -> None:
     with pytest.raises(UserError, match="no CUDA device"):
-        loop.pick_device("cuda")
+        pick_device("cuda")
