@@ -1,0 +1,167 @@
+"""Speed against accuracy of the trainers: `make bench`.
+
+Trains the presets on prepared scenes (data/<subject>/scene), scores the view-independent model on the held-out cameras
+after each of --seconds, keeps every measurement in bench/results/speed_accuracy.json, and draws the chart. What is
+already there for this commit is not measured again; an interrupted run goes on from its checkpoint.
+"""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import torch
+import typer
+
+from bench.results import ClockKind, Conditions, Measurement, Results, commit_name, describe, machine_name
+from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.model.device import pick_device
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.report import device_name
+
+SECONDS = "10,30,60,120,300,900"
+PRESETS = "fast,quick,paper"
+OWN_SUBJECTS = ("actor", "mugsy")
+RESULTS = Path("bench/results/speed_accuracy.json")
+NEAR = 0.25
+"""An explicit run that misses its budget by more than this fraction is run once more with better iterations."""
+
+
+def find_scenes(names: list[str], data: Path) -> dict[str, Path]:
+    """Prepared scenes of the subjects; without names those of OWN_SUBJECTS that are there.
+
+    Raises:
+        UserError: if a scene is not there.
+    """
+    chosen = names or [name for name in OWN_SUBJECTS if _has_scene(data, name)] or [OWN_SUBJECTS[0]]
+    for name in chosen:
+        if not _has_scene(data, name):
+            raise UserError(
+                f"no prepared scene of {name}",
+                file=SubjectFolders(data / name).scene,
+                expected="a normalised scene (scene.json and frames.arrow)",
+                remedy=f"`dvc repro normalize@{name}` makes it of a subject in params.yaml (docs/subjects.md), or give "
+                "other names by --subjects",
+            )
+    return {name: SubjectFolders(data / name).scene for name in chosen}
+
+
+def _has_scene(data: Path, name: str) -> bool:
+    return (SubjectFolders(data / name).scene / "scene.json").exists()
+
+
+def next_iterations(budget: float, known: list[tuple[int, float]], start: int) -> int:
+    """Iterations that take about `budget` seconds.
+
+    Args:
+        known: (iterations, seconds) of runs so far: the line through the two nearest to the budget, at least the
+            proportion to the nearest if there is one only; `start` if there is none.
+    """
+    if not known:
+        return start
+    nearest = sorted(known, key=lambda run: abs(run[1] - budget))[:2]
+    (n, t), rate = nearest[0], nearest[0][1] / nearest[0][0]
+    if len(nearest) == 2 and (nearest[1][0] - n) * (nearest[1][1] - t) > 0:
+        rate = (nearest[1][1] - t) / (nearest[1][0] - n)
+    return max(1, round(n + (budget - t) / rate))
+
+
+def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
+    """Runs of about `budgets` seconds each. If none is known yet, a first one, not kept, warms caches and is timed."""
+    like = job.measurement(1.0, 0.0, 0, 0, None)
+    known = [(m.iterations, m.seconds) for m in results.read() if m.key() == like.key() and m.scores is not None]
+    if not known:
+        first = in_a_process(measure_whole, job, budgets[0], ignore)
+        known = [(first.iterations, first.seconds)]
+    for budget in budgets:
+        for _ in range(2):
+            iterations = next_iterations(budget, known, job.params.iterations)
+            shorter = replace(job, params=job.params.model_copy(update={"iterations": iterations}))
+            made = in_a_process(measure_whole, shorter, budget, partial(keep, results.path))
+            known = [run for run in known if run[0] != iterations] + [(iterations, made.seconds)]
+            if abs(made.seconds - budget) <= NEAR * budget or next_iterations(budget, known, 1) == iterations:
+                break
+
+
+def keep(path: Path, measurement: Measurement) -> None:
+    Results(path).add(measurement)
+    typer.echo(f"bench: {describe(measurement)}")
+
+
+def ignore(measurement: Measurement) -> None:
+    typer.echo(f"bench: (warm-up, not kept) {describe(measurement)}")
+
+
+def measure(job: Job, budgets: list[float], results: Results, force: bool) -> None:
+    """Measure what is missing of one preset on one subject."""
+    wanted = [b for b in budgets if force or not results.measured(job.measurement(b, 0.0, 0, 0, None))]
+    if not wanted:
+        typer.echo(f"bench: {job.subject}, {job.params.preset}: nothing to do, all is measured at this commit")
+        return
+    if force:
+        shutil.rmtree(job.scratch, ignore_errors=True)
+    if job.params.model == "explicit":
+        measure_explicit(job, wanted, results)
+    else:
+        in_a_process(measure_on_the_way, job, wanted, partial(keep, results.path))
+
+
+def numbers(text: str, option: str) -> list[float]:
+    """ "10,30" -> [10.0, 30.0], rising.
+
+    Raises:
+        UserError: if it is not a list of positive numbers.
+    """
+    try:
+        values = sorted({float(part) for part in text.split(",")})
+    except ValueError:
+        values = [0.0]
+    if values[0] <= 0:
+        raise UserError("not a list of seconds", place=option, expected="e.g. 10,30,60", found=text)
+    return values
+
+
+def main(
+    subjects: Annotated[str, typer.Option(help="Comma-separated; by default actor, and mugsy where present.")] = "",
+    presets: Annotated[str, typer.Option(help="Comma-separated.")] = PRESETS,
+    seconds: Annotated[str, typer.Option(help="Comma-separated training times.")] = SECONDS,
+    clock: Annotated[
+        ClockKind,
+        typer.Option(help="`processor`: processor time / --threads, for a machine that is not idle."),
+    ] = "wall",
+    threads: Annotated[int, typer.Option(help="That share the work; 0 is what torch takes.")] = 0,
+    frames: Annotated[int, typer.Option(help="Of each held-out camera that are scored, evenly spaced.")] = 3,
+    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
+    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    results: Annotated[Path, typer.Option(help="File that measurements are added to.")] = RESULTS,
+    force: Annotated[bool, typer.Option("--force", help="Measure again what is there.")] = False,
+    draw_only: Annotated[bool, typer.Option("--draw-only", help="Only draw what is there.")] = False,
+) -> None:
+    """Measure and draw speed against accuracy."""
+    with report_user_errors("bench"):
+        budgets = numbers(seconds, "--seconds")
+        file = Results(results)
+        if not draw_only:
+            name = device_name(pick_device(device))
+            conditions = Conditions(
+                commit=commit_name(Path(__file__).parent),
+                clock=clock,
+                threads=threads or torch.get_num_threads(),
+                machine=machine_name(name),
+                frames=frames,
+            )
+            typer.echo(f"bench: clock {clock}, {conditions.threads} threads, {conditions.machine}, {conditions.commit}")
+            scenes = find_scenes([s for s in subjects.split(",") if s], data)
+            for preset in presets.split(","):
+                for subject, scene in scenes.items():
+                    params = check_train_params({"preset": preset, "device": device})
+                    scratch = data / subject / "bench" / f"{conditions.commit}-{clock}{conditions.threads}"
+                    measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)
+
+
+if __name__ == "__main__":
+    typer.run(main)
