@@ -20,10 +20,11 @@ class Clock:
         self._source = source
         self._since = source()
         self._before = 0.0
+        self._still = False
 
     @property
     def seconds(self) -> float:
-        return self._before + self._source() - self._since
+        return self._before if self._still else self._before + self._source() - self._since
 
     def set(self, seconds: float) -> None:
         """Go on from this reading."""
@@ -31,11 +32,13 @@ class Clock:
 
     @contextmanager
     def paused(self) -> Iterator[None]:
-        reading = self.seconds
+        """Stand still; a pause within a pause changes nothing."""
+        before = self._still
+        self._before, self._still = self.seconds, True
         try:
             yield
         finally:
-            self.set(reading)
+            self._since, self._still = self._source(), before
 
 
 def time_source(kind: ClockKind, threads: int) -> Callable[[], float]:

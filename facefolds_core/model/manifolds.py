@@ -18,7 +18,7 @@ CHUNK = {"cpu": 1 << 15, "cuda": 1 << 21}
 INPUT_SCALE = 6.0
 """The MLP sees (x - c) in units of a sixth of the outermost radius: without it, SiLU layers of He's size are too smooth
 to follow a face. Fitted to a head for the same time, the median error was 1.2e-3 units at scale 1, 0.8e-3 at 3 and
-0.5e-3 at 6."""
+0.5e-3 at 6. A model keeps the scale that it was trained with in its model.json."""
 
 
 class Manifolds(Protocol):
@@ -60,6 +60,7 @@ class MlpManifolds(nn.Module):
         radius: of the ball that encloses all layers: crossings are searched in its front half only.
         hidden_layers, width: of the MLP.
         samples: M, samples a ray for the search.
+        input_scale: the MLP sees input_scale (x - c) / levels[0].
     """
 
     centre: Tensor
@@ -73,12 +74,13 @@ class MlpManifolds(nn.Module):
         hidden_layers: int,
         width: int,
         samples: int,
+        input_scale: float = INPUT_SCALE,
     ) -> None:
         super().__init__()
         self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
         self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
         self.radius = radius
-        self.scale = INPUT_SCALE / levels[0]
+        self.scale = input_scale / levels[0]
         self.samples = samples
         self.hidden = LinearStack([3] + [width] * hidden_layers)
         self.last = nn.Linear(width, 1)
