@@ -16,6 +16,7 @@ from typing import Annotated
 import torch
 import typer
 
+from bench.chart import draw, write_plot_data
 from bench.results import ClockKind, Conditions, Measurement, Results, commit_name, describe, machine_name
 from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole
 from facefolds_core.errors import UserError, report_user_errors
@@ -27,6 +28,7 @@ SECONDS = "10,30,60,120,300,900"
 PRESETS = "fast,quick,paper"
 OWN_SUBJECTS = ("actor", "mugsy")
 RESULTS = Path("bench/results/speed_accuracy.json")
+PICTURE = Path("docs/images/speed_accuracy.png")
 NEAR = 0.25
 """An explicit run that misses its budget by more than this fraction is run once more with better iterations."""
 
@@ -138,6 +140,7 @@ def main(
     device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
     results: Annotated[Path, typer.Option(help="File that measurements are added to.")] = RESULTS,
+    picture: Annotated[Path, typer.Option(help="The chart.")] = PICTURE,
     force: Annotated[bool, typer.Option("--force", help="Measure again what is there.")] = False,
     draw_only: Annotated[bool, typer.Option("--draw-only", help="Only draw what is there.")] = False,
 ) -> None:
@@ -161,6 +164,10 @@ def main(
                     params = check_train_params({"preset": preset, "device": device})
                     scratch = data / subject / "bench" / f"{conditions.commit}-{clock}{conditions.threads}"
                     measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)
+        measurements = file.read()
+        draw(measurements, picture)
+        write_plot_data(measurements, results.with_name(f"{results.stem}_plot.json"))
+        typer.echo(f"bench: {picture} drawn from {results}")
 
 
 if __name__ == "__main__":
