@@ -13,47 +13,20 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import torch
 import typer
 
 from bench.chart import draw, write_plot_data
-from bench.results import ClockKind, Conditions, Measurement, Results, commit_name, describe, machine_name
+from bench.common import conditions_now, find_scenes, keep, numbers, words
+from bench.results import ClockKind, Measurement, Results, describe
 from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.model.device import pick_device
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.training.report import device_name
 
 SECONDS = "10,30,60,120,300,900"
 PRESETS = "fast,quick,paper"
-OWN_SUBJECTS = ("actor", "mugsy")
 RESULTS = Path("bench/results/speed_accuracy.json")
 PICTURE = Path("docs/images/speed_accuracy.png")
 NEAR = 0.25
 """An explicit run that misses its budget by more than this fraction is run once more with better iterations."""
-
-
-def find_scenes(names: list[str], data: Path) -> dict[str, Path]:
-    """Prepared scenes of the subjects; without names those of OWN_SUBJECTS that are there.
-
-    Raises:
-        UserError: if a scene is not there.
-    """
-    chosen = names or [name for name in OWN_SUBJECTS if _has_scene(data, name)] or [OWN_SUBJECTS[0]]
-    for name in chosen:
-        if not _has_scene(data, name):
-            raise UserError(
-                f"no prepared scene of {name}",
-                file=SubjectFolders(data / name).scene,
-                expected="a normalised scene (scene.json and frames.arrow)",
-                remedy=f"`dvc repro normalize@{name}` makes it of a subject in params.yaml (docs/subjects.md), or give "
-                "other names by --subjects",
-            )
-    return {name: SubjectFolders(data / name).scene for name in chosen}
-
-
-def _has_scene(data: Path, name: str) -> bool:
-    return (SubjectFolders(data / name).scene / "scene.json").exists()
 
 
 def next_iterations(budget: float, known: list[tuple[int, float]], start: int) -> int:
@@ -89,11 +62,6 @@ def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
                 break
 
 
-def keep(path: Path, measurement: Measurement) -> None:
-    Results(path).add(measurement)
-    typer.echo(f"bench: {describe(measurement)}")
-
-
 def ignore(measurement: Measurement) -> None:
     typer.echo(f"bench: (warm-up, not kept) {describe(measurement)}")
 
@@ -110,21 +78,6 @@ def measure(job: Job, budgets: list[float], results: Results, force: bool) -> No
         measure_explicit(job, wanted, results)
     else:
         in_a_process(measure_on_the_way, job, wanted, partial(keep, results.path))
-
-
-def numbers(text: str, option: str) -> list[float]:
-    """ "10,30" -> [10.0, 30.0], rising.
-
-    Raises:
-        UserError: if it is not a list of positive numbers.
-    """
-    try:
-        values = sorted({float(part) for part in text.split(",")})
-    except ValueError:
-        values = [0.0]
-    if values[0] <= 0:
-        raise UserError("not a list of seconds", place=option, expected="e.g. 10,30,60", found=text)
-    return values
 
 
 def main(
@@ -148,26 +101,24 @@ def main(
     with report_user_errors("bench"):
         budgets = numbers(seconds, "--seconds")
         file = Results(results)
+        failures = []
         if not draw_only:
-            name = device_name(pick_device(device))
-            conditions = Conditions(
-                commit=commit_name(Path(__file__).parent),
-                clock=clock,
-                threads=threads or torch.get_num_threads(),
-                machine=machine_name(name),
-                frames=frames,
-            )
-            typer.echo(f"bench: clock {clock}, {conditions.threads} threads, {conditions.machine}, {conditions.commit}")
-            scenes = find_scenes([s for s in subjects.split(",") if s], data)
-            for preset in presets.split(","):
+            conditions = conditions_now(clock, threads, frames, device)
+            scenes = find_scenes(words(subjects), data)
+            for preset in words(presets):
                 for subject, scene in scenes.items():
                     params = check_train_params({"preset": preset, "device": device})
                     scratch = data / subject / "bench" / f"{conditions.commit}-{clock}{conditions.threads}"
-                    measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)
+                    try:
+                        measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)
+                    except UserError as error:
+                        failures.append(f"{subject}, {preset}: {error}")
         measurements = file.read()
         draw(measurements, picture)
         write_plot_data(measurements, results.with_name(f"{results.stem}_plot.json"))
         typer.echo(f"bench: {picture} drawn from {results}")
+        if failures:
+            raise UserError("not everything could be measured:\n" + "\n".join(failures))
 
 
 if __name__ == "__main__":
