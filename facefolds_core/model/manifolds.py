@@ -49,7 +49,7 @@ class Manifolds(Protocol):
 class MlpManifolds(nn.Module):
     """The paper's manifold predictor: layer i is {x : G(x) = s_i}, G a multilayer perceptron.
 
-    G(x) = |x - c| + MLP(6 (x - c) / levels[0]), the last layer of the MLP zero to start with. The start is an exact
+    G(x) = |x - c| + k MLP(6 (x - c) / levels[0]), the last layer of the MLP zero to start with. The start is an exact
     sphere around c with |grad G| = 1, and the s-values are radii in scene units. (The paper starts from the
     initialisation of Atzmon & Lipman 2020, which is a sphere only in the limit of infinite width.) Activation: SiLU, so
     that surfaces are smooth; the paper names none.
@@ -61,6 +61,7 @@ class MlpManifolds(nn.Module):
         hidden_layers, width: of the MLP.
         samples: M, samples a ray for the search.
         input_scale: the MLP sees input_scale (x - c) / levels[0].
+        output_scale: k. With a last layer of zeros it sets how far a step of Adam moves the surfaces.
     """
 
     centre: Tensor
@@ -75,12 +76,14 @@ class MlpManifolds(nn.Module):
         width: int,
         samples: int,
         input_scale: float = INPUT_SCALE,
+        output_scale: float = 1.0,
     ) -> None:
         super().__init__()
         self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
         self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
         self.radius = radius
         self.scale = input_scale / levels[0]
+        self.output_scale = output_scale
         self.samples = samples
         self.hidden = LinearStack([3] + [width] * hidden_layers)
         self.last = nn.Linear(width, 1)
@@ -117,7 +120,7 @@ class MlpManifolds(nn.Module):
         h = offset * self.scale
         for layer in self.hidden:
             h = silu(layer(h), inplace=not torch.is_grad_enabled())
-        values: Tensor = offset.norm(dim=-1) + self.last(h).squeeze(-1)
+        values: Tensor = offset.norm(dim=-1) + self.output_scale * self.last(h).squeeze(-1)
         return values
 
     def value_and_slope(self, points: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
@@ -132,5 +135,6 @@ class MlpManifolds(nn.Module):
                 s = torch.sigmoid(z)
                 dh = (dh @ layer.weight.T) * (s + h * (1 - s))  # silu'(z) = s + z s (1 - s), h = z s
         with torch.no_grad():
-            slope = (offset * directions).sum(-1) / distance.clamp(min=1e-9) + (dh @ self.last.weight.T).squeeze(-1)
-        return distance + self.last(h).squeeze(-1), slope
+            bent = self.output_scale * (dh @ self.last.weight.T).squeeze(-1)
+            slope = (offset * directions).sum(-1) / distance.clamp(min=1e-9) + bent
+        return distance + self.output_scale * self.last(h).squeeze(-1), slope

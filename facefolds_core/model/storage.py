@@ -25,8 +25,8 @@ _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 Count = Annotated[int, Field(ge=2)]
 
 
-INPUT_SCALE_1 = 6.0
-"""`input_scale` of models of version 1, which do not name it."""
+SCALES_1 = {"input_scale": 6.0, "output_scale": 1.0}
+"""Of models of version 1, which do not name them."""
 
 
 class ModelSpec(BaseModel):
@@ -38,7 +38,7 @@ class ModelSpec(BaseModel):
         radius: of the ball around c that encloses all layers, units.
         num_frames: K.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
-        input_scale: of `MlpManifolds`.
+        input_scale, output_scale: of `MlpManifolds`.
         others: as in TrainParams.
     """
 
@@ -61,13 +61,14 @@ class ModelSpec(BaseModel):
     level_frequencies: int
     view_frequencies: int
     input_scale: float = INPUT_SCALE
+    output_scale: float = 1.0
     fingerprint: str = ""
 
     @model_validator(mode="before")
     @classmethod
     def _from_version_1(cls, value: Any) -> Any:
-        if isinstance(value, dict) and value.get("version") == 1 and "input_scale" not in value:
-            return {**value, "version": 2, "input_scale": INPUT_SCALE_1}
+        if isinstance(value, dict) and value.get("version") == 1 and not SCALES_1.keys() & value.keys():
+            return {**value, "version": 2, **SCALES_1}
         return value
 
 
@@ -117,6 +118,7 @@ def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
         spec.manifold_width,
         spec.search_samples,
         spec.input_scale,
+        spec.output_scale,
     )
     textures = MlpTextures(
         len(spec.levels),

@@ -123,6 +123,18 @@ def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
     assert float((radii - 0.33).abs().mean()) < 0.004
 
 
+def test_the_first_steps_of_the_papers_preset_keep_the_surfaces(tmp_path: Path) -> None:
+    # With an output scale of 1 they do not: three steps move them all out of the search ball, and nothing comes back.
+    scene = make_scene(tmp_path, OPAQUE, size=48, surface_radius=0.33)
+    settings = TrainParams.model_validate({"preset": "paper", "rays": 256, "search_samples": 64})
+    state, sampler = state_for(scene, settings)
+    for _ in range(5):
+        loop.train_step(state, sampler, settings)
+    rays = sampler.draw(256, torch.Generator().manual_seed(0))
+    crossings = state.model.crossings(rays.origins, rays.directions)
+    assert float(crossings.hit.float().sum(1).median()) >= settings.layers / 2
+
+
 class Killed(BaseException):
     """Stands for a signal that ends the process."""
 
