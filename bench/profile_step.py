@@ -72,10 +72,14 @@ class Step:
 
 
 def take_apart(run: loop.TrainingRun, params: Any, clock: Callable[[], float]) -> Step:
-    """One step timed, one counted, one seen by torch.profiler."""
+    """The same step timed, counted, and seen by torch.profiler; only the last of the three moves the parameters."""
     step = Step()
-    _sectioned(run, params, step, clock, count=False)
-    _sectioned(run, params, step, clock, count=True)
+    generator = run.state.generator
+    draws = generator.get_state()
+    for count in (False, True):
+        generator.set_state(draws)
+        _sectioned(run, params, step, clock, count)
+    generator.set_state(draws)
     for values in (step.seconds, step.products):
         values["other forward"] -= sum(values[name] for name in ("search", "refine", "shade"))
     with profile(activities=[ProfilerActivity.CPU]) as profiler:
@@ -106,6 +110,8 @@ def _sectioned(run: loop.TrainingRun, params: Any, step: Step, clock: Callable[[
         rays = timed("draw rays", run.sampler.draw)(params.rays, state.generator)
         losses = timed("other forward", batch_losses)(state.model, rays, params.lambda_view, params.lambda_reg)
     state.optimiser.zero_grad()
+    for group in state.optimiser.param_groups:
+        group["lr"] = 0.0
     timed("backward", losses.total.backward)()
     timed("optimiser", state.optimiser.step)()
 
