@@ -33,15 +33,18 @@ def next_iterations(budget: float, known: list[tuple[int, float]], start: int) -
     """Iterations that take about `budget` seconds.
 
     Args:
-        known: (iterations, seconds) of runs so far: the line through the two nearest to the budget, at least the
-            proportion to the nearest if there is one only; `start` if there is none.
+        known: (iterations, seconds) of runs so far: the line through the last one and, of the others, the one nearest
+            to the budget; without such a line in proportion to the last one.
+        start: if there is none.
     """
     if not known:
         return start
-    nearest = sorted(known, key=lambda run: abs(run[1] - budget))[:2]
-    (n, t), rate = nearest[0], nearest[0][1] / nearest[0][0]
-    if len(nearest) == 2 and (nearest[1][0] - n) * (nearest[1][1] - t) > 0:
-        rate = (nearest[1][1] - t) / (nearest[1][0] - n)
+    n, t = known[-1]
+    rate = t / n
+    others = [run for run in known if (run[0] - n) * (run[1] - t) > 0]
+    if others:
+        m, s = min(others, key=lambda run: abs(run[1] - budget))
+        rate = (s - t) / (m - n)
     return max(1, round(n + (budget - t) / rate))
 
 
@@ -49,16 +52,17 @@ def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
     """Runs of about `budgets` seconds each. If none is known yet, a first one, not kept, warms caches and is timed."""
     like = job.measurement(1.0, 0.0, 0, 0, None)
     known = [(m.iterations, m.seconds) for m in results.read() if m.key() == like.key() and m.scores is not None]
+    guess = job.params.iterations
     if not known:
         first = in_a_process(measure_whole, job, budgets[0], ignore)
-        known = [(first.iterations, first.seconds)]
+        guess = next_iterations(budgets[0], [(first.iterations, first.seconds)], guess)
     for budget in budgets:
         for _ in range(2):
-            iterations = next_iterations(budget, known, job.params.iterations)
+            iterations = next_iterations(budget, known, guess)
             shorter = replace(job, params=job.params.model_copy(update={"iterations": iterations}))
             made = in_a_process(measure_whole, shorter, budget, partial(keep, results.path))
             known = [run for run in known if run[0] != iterations] + [(iterations, made.seconds)]
-            if abs(made.seconds - budget) <= NEAR * budget or next_iterations(budget, known, 1) == iterations:
+            if abs(made.seconds - budget) <= NEAR * budget or next_iterations(budget, known, guess) == iterations:
                 break
 
 

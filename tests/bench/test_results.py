@@ -74,11 +74,12 @@ def test_explicit_runs_are_sized_by_those_before(tmp_path: Path, monkeypatch: py
     assert len(runs) <= 1 + 2 * 3
 
 
-def test_iterations_follow_the_line_through_the_nearest_runs() -> None:
+def test_iterations_follow_the_line_through_the_last_run() -> None:
     assert next_iterations(30.0, [], 460) == 460
     assert next_iterations(30.0, [(100, 10.0)], 460) == 300
-    assert next_iterations(60.0, [(100, 15.0), (300, 25.0), (900, 500.0)], 460) == 1000
+    assert next_iterations(60.0, [(900, 500.0), (100, 15.0), (300, 25.0)], 460) == 1000
     assert next_iterations(1.0, [(100, 15.0), (300, 25.0)], 460) == 1
+    assert next_iterations(30.0, [(100, 15.0), (300, 10.0)], 460) == 900  # noise: no line falls
 
 
 def test_records_tell_what_happened(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
