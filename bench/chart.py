@@ -24,6 +24,7 @@ FRONTIER_COLOUR = "#e9c46a"
 RING: dict[str, Any] = {"ms": 8, "mfc": "none", "mec": "#333333", "mew": 0.9, "zorder": 4}
 
 TITLE = "Held-out accuracy against training time, view-independent model"
+FRONTIER = "Pareto frontier"
 TIMES = {10: "10 s", 30: "30 s", 60: "1 min", 120: "2 min", 300: "5 min", 900: "15 min", 1800: "30 min", 3600: "1 h"}
 
 NOTE = (
@@ -105,6 +106,7 @@ def draw(measurements: Sequence[Measurement], path: Path) -> None:
     subjects = sorted({m.subject for m in data})
     metrics = [metric for metric in METRICS if any(value(m, metric) is not None for m in data)]
     heights = [metric.height for metric in metrics]
+    seconds = [m.seconds for m in data]
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(1.2 + 4.4 * len(subjects), 1.6 + 1.45 * sum(heights)), dpi=150, layout="constrained")
         grid = figure.subplots(
@@ -117,11 +119,13 @@ def draw(measurements: Sequence[Measurement], path: Path) -> None:
                 if column == 0:
                     better = "higher" if metric.up else "lower"
                     grid[row, column].set_ylabel(f"{metric.label}\n({better} is better)")
+            grid[-1, column].set_xlim(min(8.0, 0.9 * min(seconds)), 2.6 * max(seconds))
             grid[0, column].set_title(_title(subject, own), loc="left", fontsize=9, fontweight="bold")
             grid[-1, column].set_xlabel(_time_label(own))
-        figure.suptitle(
-            "Held-out accuracy against training time, view-independent model", fontsize=11, x=0.01, ha="left"
-        )
+        figure.suptitle(TITLE, fontsize=11, x=0.01, ha="left")
+        lines = {str(line.get_label()): line for axes in grid[0] for line in axes.get_lines()}
+        names = [FRONTIER, *sorted({m.preset for m in data}, key=_order)]
+        figure.legend([lines[name] for name in names], names, loc="upper right", ncols=len(names), frameon=False)
         figure.supxlabel(f"{conditions_text(data)}\n{NOTE}", fontsize=6.5, x=0.01, ha="left", color="#555555")
         with atomic_file(path) as temporary:
             figure.savefig(temporary)
@@ -132,7 +136,7 @@ def _panel(axes: Axes, measurements: list[Measurement], metric: Metric) -> None:
     best = [shown[i] for i in frontier([(m.seconds, v) for m, v in shown], metric.up)]
     axes.plot(
         [m.seconds for m, _ in best], [v for _, v in best], drawstyle="steps-post", color=FRONTIER_COLOUR, lw=5,
-        alpha=0.55, solid_capstyle="butt", zorder=1, label="Pareto frontier",
+        alpha=0.55, solid_capstyle="butt", zorder=1, label=FRONTIER,
     )  # fmt: skip
     for preset in sorted({m.preset for m, _ in shown}, key=_order):
         line = [(m.seconds, v) for m, v in shown if m.preset == preset]
@@ -146,8 +150,6 @@ def _panel(axes: Axes, measurements: list[Measurement], metric: Metric) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: TIMES.get(round(x), "")))
     axes.grid(color="#e6e6e6", lw=0.6, zorder=0)
-    seconds = [m.seconds for m in measurements]
-    axes.set_xlim(min(8.0, 0.9 * min(seconds)), 2.6 * max(seconds))
 
 
 def _title(subject: str, measurements: list[Measurement]) -> str:
