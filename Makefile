@@ -1,6 +1,7 @@
 # make repro   set up, then run the pipeline for every subject in params.yaml
 # make test    set up, then run the tests
 # make lint    ruff, mypy and the layer check
+# make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make clean   remove the environment and all results
 
 PYTHON ?= python3
@@ -21,6 +22,10 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+bench: $(READY)
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
+	$(BIN)/python -m bench.speed_accuracy
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'

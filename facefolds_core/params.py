@@ -99,6 +99,7 @@ class TrainParams(Section):
         manifold_start: "sphere" (the paper's), or "surface": the tracked mesh, where there is one, by a short fit
             before training; without one it is the sphere.
         manifold_layers, manifold_width: hidden layers of the manifold predictor.
+        output_scale: factor on its output: how far a step of Adam moves the surfaces.
         texture_layers, texture_width: hidden layers of the texture predictor.
         latent_dim: frame latents.
         uv_frequencies, level_frequencies, view_frequencies: octaves of the positional encodings.
@@ -122,6 +123,7 @@ class TrainParams(Section):
     manifold_start: Literal["sphere", "surface"]
     manifold_layers: Positive
     manifold_width: Positive
+    output_scale: Annotated[float, Field(gt=0)] = 1.0
     texture_layers: Positive
     texture_width: Positive
     latent_dim: Positive

@@ -11,6 +11,8 @@ PAPER: dict[str, Any] = {
     "manifold_start": "sphere",
     "manifold_layers": 3,
     "manifold_width": 128,
+    # Ours: a step at the paper's rate then moves the surfaces as far as in the paper's network (docs/method.md).
+    "output_scale": 0.36,
     "texture_layers": 8,
     "texture_width": 256,
     "latent_dim": 32,
@@ -34,6 +36,7 @@ QUICK: dict[str, Any] = {
     "layers": 6,
     "manifold_start": "surface",
     "manifold_width": 64,
+    "output_scale": 1.0,
     "texture_layers": 4,
     "texture_width": 96,
     "uv_frequencies": 7,

@@ -9,13 +9,13 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
+from facefolds_core.model.device import pick_device
 from facefolds_core.params import EvaluateParams, TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import evaluate
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
-from facefolds_core.training.report import pick_device
 from stages.common import run_stage
 
 

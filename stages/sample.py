@@ -11,9 +11,9 @@ from facefolds_core.export.window import visible_window
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
 from facefolds_core.model import RadianceManifolds, load_model
+from facefolds_core.model.device import pick_device
 from facefolds_core.params import SampleParams, TrainParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.training.report import pick_device
 from stages.common import run_stage
 
 

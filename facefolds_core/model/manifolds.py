@@ -18,7 +18,7 @@ CHUNK = {"cpu": 1 << 15, "cuda": 1 << 21}
 INPUT_SCALE = 6.0
 """The MLP sees (x - c) in units of a sixth of the outermost radius: without it, SiLU layers of He's size are too smooth
 to follow a face. Fitted to a head for the same time, the median error was 1.2e-3 units at scale 1, 0.8e-3 at 3 and
-0.5e-3 at 6."""
+0.5e-3 at 6. A model keeps the scale that it was trained with in its model.json."""
 
 
 class Manifolds(Protocol):
@@ -49,7 +49,7 @@ class Manifolds(Protocol):
 class MlpManifolds(nn.Module):
     """The paper's manifold predictor: layer i is {x : G(x) = s_i}, G a multilayer perceptron.
 
-    G(x) = |x - c| + MLP(6 (x - c) / levels[0]), the last layer of the MLP zero to start with. The start is an exact
+    G(x) = |x - c| + k MLP(6 (x - c) / levels[0]), the last layer of the MLP zero to start with. The start is an exact
     sphere around c with |grad G| = 1, and the s-values are radii in scene units. (The paper starts from the
     initialisation of Atzmon & Lipman 2020, which is a sphere only in the limit of infinite width.) Activation: SiLU, so
     that surfaces are smooth; the paper names none.
@@ -60,6 +60,8 @@ class MlpManifolds(nn.Module):
         radius: of the ball that encloses all layers: crossings are searched in its front half only.
         hidden_layers, width: of the MLP.
         samples: M, samples a ray for the search.
+        input_scale: the MLP sees input_scale (x - c) / levels[0].
+        output_scale: k. With a last layer of zeros it sets how far a step of Adam moves the surfaces.
     """
 
     centre: Tensor
@@ -73,12 +75,15 @@ class MlpManifolds(nn.Module):
         hidden_layers: int,
         width: int,
         samples: int,
+        input_scale: float = INPUT_SCALE,
+        output_scale: float = 1.0,
     ) -> None:
         super().__init__()
         self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
         self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
         self.radius = radius
-        self.scale = INPUT_SCALE / levels[0]
+        self.scale = input_scale / levels[0]
+        self.output_scale = output_scale
         self.samples = samples
         self.hidden = LinearStack([3] + [width] * hidden_layers)
         self.last = nn.Linear(width, 1)
@@ -115,7 +120,7 @@ class MlpManifolds(nn.Module):
         h = offset * self.scale
         for layer in self.hidden:
             h = silu(layer(h), inplace=not torch.is_grad_enabled())
-        values: Tensor = offset.norm(dim=-1) + self.last(h).squeeze(-1)
+        values: Tensor = offset.norm(dim=-1) + self.output_scale * self.last(h).squeeze(-1)
         return values
 
     def value_and_slope(self, points: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
@@ -130,5 +135,6 @@ class MlpManifolds(nn.Module):
                 s = torch.sigmoid(z)
                 dh = (dh @ layer.weight.T) * (s + h * (1 - s))  # silu'(z) = s + z s (1 - s), h = z s
         with torch.no_grad():
-            slope = (offset * directions).sum(-1) / distance.clamp(min=1e-9) + (dh @ self.last.weight.T).squeeze(-1)
-        return distance + self.last(h).squeeze(-1), slope
+            bent = self.output_scale * (dh @ self.last.weight.T).squeeze(-1)
+            slope = (offset * directions).sum(-1) / distance.clamp(min=1e-9) + bent
+        return distance + self.output_scale * self.last(h).squeeze(-1), slope

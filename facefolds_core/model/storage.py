@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
@@ -14,7 +14,7 @@ from torch import Tensor
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.model.grids import GridTextures
-from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.model.manifolds import INPUT_SCALE, MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.textures import MlpTextures
@@ -25,8 +25,12 @@ _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 Count = Annotated[int, Field(ge=2)]
 
 
+SCALES_1 = {"input_scale": 6.0, "output_scale": 1.0}
+"""Of models of version 1, which do not name them."""
+
+
 class ModelSpec(BaseModel):
-    """Everything that is needed to build a model but its numbers.
+    """Everything that is needed to build a model but its numbers. Version 1 is read as version 2.
 
     Attributes:
         centre: c, units.
@@ -34,13 +38,14 @@ class ModelSpec(BaseModel):
         radius: of the ball around c that encloses all layers, units.
         num_frames: K.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
+        input_scale, output_scale: of `MlpManifolds`.
         others: as in TrainParams.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal["facefolds-model"] = "facefolds-model"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     kind: Literal["mlp"] = "mlp"
     centre: tuple[float, float, float]
     levels: Annotated[tuple[float, ...], Field(min_length=1)]
@@ -55,7 +60,16 @@ class ModelSpec(BaseModel):
     uv_frequencies: int
     level_frequencies: int
     view_frequencies: int
+    input_scale: float = INPUT_SCALE
+    output_scale: float = 1.0
     fingerprint: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_version_1(cls, value: Any) -> Any:
+        if isinstance(value, dict) and value.get("version") == 1 and not SCALES_1.keys() & value.keys():
+            return {**value, "version": 2, **SCALES_1}
+        return value
 
 
 class ExplicitSpec(BaseModel):
@@ -97,7 +111,14 @@ def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
             GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames),
         )
     manifolds = MlpManifolds(
-        spec.centre, spec.levels, spec.radius, spec.manifold_layers, spec.manifold_width, spec.search_samples
+        spec.centre,
+        spec.levels,
+        spec.radius,
+        spec.manifold_layers,
+        spec.manifold_width,
+        spec.search_samples,
+        spec.input_scale,
+        spec.output_scale,
     )
     textures = MlpTextures(
         len(spec.levels),
@@ -187,6 +208,14 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
         ) from None
 
 
+def _describes(description: str, spec: ModelSpec | ExplicitSpec) -> bool:
+    """Whether a description in JSON, of this version or an older one, says the same as `spec`."""
+    try:
+        return _SPEC.validate_json(description) == spec
+    except ValidationError:
+        return False
+
+
 def load_model(folder: str | Path, device: torch.device | str = "cpu") -> RadianceManifolds:
     """The trained model of a folder, in evaluation mode.
 
@@ -197,7 +226,7 @@ def load_model(folder: str | Path, device: torch.device | str = "cpu") -> Radian
     spec = read_spec(folder)
     path = folder / "model.safetensors"
     tensors, metadata = read_tensors(path, _REMEDY)
-    if metadata.get("spec") != spec.model_dump_json():
+    if not _describes(metadata.get("spec", ""), spec):
         raise UserError(
             "model.safetensors and model.json are of different models",
             file=path,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import torch
@@ -13,6 +13,7 @@ import torch
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model, save_model
 from facefolds_core.params import TrainParams
@@ -27,7 +28,7 @@ from facefolds_core.training.checkpoints import (
 from facefolds_core.training.log import open_log
 from facefolds_core.training.losses import Losses, batch_losses
 from facefolds_core.training.rays import RaySampler
-from facefolds_core.training.report import TrainingReport, make_report, pick_device
+from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.start import Start, find_start, fit_outline
 
 LOG_POINTS = 500
@@ -106,6 +107,47 @@ def train_step(state: TrainingState, sampler: RaySampler, params: TrainParams) -
     return losses
 
 
+@dataclass(frozen=True)
+class TrainingRun:
+    """A training under way: what `train_step` asks for, and what its model folder and checkpoint need.
+
+    Attributes:
+        state, sampler: see there.
+        spec: of the model.
+        mark: the run's `fingerprint`.
+        checkpoints: folder of this run's checkpoint.
+    """
+
+    state: TrainingState
+    sampler: RaySampler
+    spec: ModelSpec
+    mark: str
+    checkpoints: Path
+
+
+def begin(scene: Scene, params: TrainParams, checkpoints: Path) -> TrainingRun:
+    """A training before its first step, or at its last checkpoint if there is one.
+
+    Args:
+        checkpoints: folder of checkpoints; this run's lies in a subfolder named by its fingerprint.
+
+    Raises:
+        UserError: if the checkpoint found is damaged.
+    """
+    device = pick_device(params.device)
+    start = find_start(scene, params.layers, params.level_halfwidth)
+    mark = fingerprint(params, scene)
+    spec = model_spec(params, start, scene.num_frames, mark)
+    state = new_state(params, spec, device)
+    run = TrainingRun(state, RaySampler(scene, state.model.centre, spec.radius, device), spec, mark, checkpoints / mark)
+    if (run.checkpoints / CHECKPOINT).exists():
+        load_checkpoint(state, mark, run.checkpoints)
+        print(f"train: continuing from iteration {state.iteration} ({run.checkpoints / CHECKPOINT})")
+    else:
+        _move_to_mesh(state, params, start)
+    return run
+
+
 class _Progress:
     """Log (dvclive) and progress bar: averages over the iterations since the last line."""
 
@@ -172,29 +214,19 @@ def train(scene: Scene, params: TrainParams, model_folder: Path, checkpoints: Pa
     Raises:
         UserError: if training diverges (the last checkpoint stays), or the checkpoint found is damaged.
     """
-    device = pick_device(params.device)
-    start = find_start(scene, params.layers, params.level_halfwidth)
-    mark = fingerprint(params, scene)
-    spec = model_spec(params, start, scene.num_frames, mark)
-    state = new_state(params, spec, device)
-    sampler = RaySampler(scene, state.model.centre, spec.radius, device)
-    own_checkpoints = checkpoints / mark
-    if (own_checkpoints / CHECKPOINT).exists():
-        load_checkpoint(state, mark, own_checkpoints)
-        print(f"train: continuing from iteration {state.iteration} ({own_checkpoints / CHECKPOINT})")
-    else:
-        _begin(state, params, start)
-    psnr = _run(state, sampler, params, mark, own_checkpoints, log)
+    run = begin(scene, params, checkpoints)
+    psnr = _finish(run, params, log)
+    state = run.state
     rays = state.iteration * params.rays
-    report = make_report(state.seconds, state.iteration, device, params.preset, rays, psnr)
+    report = make_report(state.seconds, state.iteration, run.sampler.device, params.preset, rays, psnr)
     with atomic_folder(model_folder) as temporary:
-        save_model(state.model, spec, temporary)
+        save_model(state.model, run.spec, temporary)
         write_json(temporary / "training.json", asdict(report))
-    shutil.rmtree(own_checkpoints, ignore_errors=True)
+    shutil.rmtree(run.checkpoints, ignore_errors=True)
     return report
 
 
-def _begin(state: TrainingState, params: TrainParams, start: Start) -> None:
+def _move_to_mesh(state: TrainingState, params: TrainParams, start: Start) -> None:
     manifolds = state.model.manifolds
     if params.manifold_start == "surface" and start.outline is not None and isinstance(manifolds, MlpManifolds):
         began = time.perf_counter()
@@ -203,20 +235,19 @@ def _begin(state: TrainingState, params: TrainParams, start: Start) -> None:
         print(f"train: manifolds start at the tracked mesh, mean error {error:.4f} units")
 
 
-def _run(
-    state: TrainingState, sampler: RaySampler, params: TrainParams, mark: str, checkpoints: Path, log: Path
-) -> float:
+def _finish(run: TrainingRun, params: TrainParams, log: Path) -> float:
     """All remaining iterations; returns the PSNR of the last log interval."""
+    state = run.state
     progress = _Progress(params, log, state.iteration)
     saved = last = time.perf_counter()
     try:
         while state.iteration < params.iterations:
-            losses = train_step(state, sampler, params)
+            losses = train_step(state, run.sampler, params)
             progress.update(losses, state.iteration)
             now = time.perf_counter()
             state.seconds, last = state.seconds + now - last, now
             if now - saved > params.checkpoint_seconds:
-                save_checkpoint(state, mark, checkpoints)
+                save_checkpoint(state, run.mark, run.checkpoints)
                 saved = now
     finally:
         progress.close()

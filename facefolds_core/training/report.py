@@ -1,4 +1,4 @@
-"""What every trainer reports, and the device it runs on."""
+"""What every trainer reports."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import torch
 
-from facefolds_core.errors import UserError
+from facefolds_core.model.device import pick_device as pick_device
 
 
 @dataclass(frozen=True)
@@ -33,40 +33,28 @@ class TrainingReport:
     final_psnr: float
 
 
-def pick_device(name: str) -> torch.device:
-    """ "auto", "cpu" or "cuda" -> device.
+def device_name(device: torch.device) -> str:
+    """ "cpu (2 threads)" or the GPU's name."""
+    return torch.cuda.get_device_name(device) if device.type == "cuda" else f"cpu ({torch.get_num_threads()} threads)"
 
-    Raises:
-        UserError: if CUDA is asked for and there is none.
-    """
-    if name == "cuda" and not torch.cuda.is_available():
-        raise UserError(
-            "no CUDA device",
-            place="train.device",
-            expected="a CUDA GPU that this build of torch can use",
-            found="none",
-            remedy="set `device: auto` or `device: cpu` in params.yaml, or install a CUDA build of torch",
-        )
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    return torch.device(name)
+
+def peak_memory(device: torch.device) -> int:
+    """Bytes allocated on a GPU, or resident in this process, at most until now."""
+    if device.type == "cuda":
+        return torch.cuda.max_memory_allocated(device)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def make_report(
     seconds: float, iterations: int, device: torch.device, preset: str, rays: int, psnr: float
 ) -> TrainingReport:
     """Args: `rays`: shaded in all iterations together; the others as in `TrainingReport`."""
-    if device.type == "cuda":
-        name, peak = torch.cuda.get_device_name(device), torch.cuda.max_memory_allocated(device)
-    else:
-        name = f"cpu ({torch.get_num_threads()} threads)"
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     return TrainingReport(
         seconds=round(seconds, 1),
         iterations=iterations,
-        device=name,
+        device=device_name(device),
         preset=preset,
         rays_per_second=round(rays / max(seconds, 1e-9), 1),
-        peak_memory_bytes=peak,
+        peak_memory_bytes=peak_memory(device),
         final_psnr=round(psnr, 3),
     )

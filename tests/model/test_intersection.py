@@ -36,8 +36,9 @@ def spheres(levels: tuple[float, ...] = LEVELS, samples: int = 64) -> MlpManifol
 def bumpy(samples: int = 64) -> MlpManifolds:
     """A field with a last layer that is not zero: surfaces about 0.01 away from spheres."""
     manifolds = spheres(samples=samples)
+    manifolds.output_scale = 0.5
     with torch.no_grad():
-        manifolds.last.weight.normal_(std=0.001)
+        manifolds.last.weight.normal_(std=0.002)
     return manifolds
 
 

@@ -12,6 +12,7 @@ from safetensors.torch import load_file
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
+from facefolds_core.model.device import pick_device
 from facefolds_core.params import TrainParams
 from facefolds_core.training import loop
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
@@ -120,6 +121,18 @@ def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
     radii = (points[0] - state.model.centre).norm(dim=-1)
     assert valid.all()
     assert float((radii - 0.33).abs().mean()) < 0.004
+
+
+def test_the_first_steps_of_the_papers_preset_keep_the_surfaces(tmp_path: Path) -> None:
+    # With an output scale of 1 they do not: three steps move them all out of the search ball, and nothing comes back.
+    scene = make_scene(tmp_path, OPAQUE, size=48, surface_radius=0.33)
+    settings = TrainParams.model_validate({"preset": "paper", "rays": 256, "search_samples": 64})
+    state, sampler = state_for(scene, settings)
+    for _ in range(5):
+        loop.train_step(state, sampler, settings)
+    rays = sampler.draw(256, torch.Generator().manual_seed(0))
+    crossings = state.model.crossings(rays.origins, rays.directions)
+    assert float(crossings.hit.float().sum(1).median()) >= settings.layers / 2
 
 
 class Killed(BaseException):
@@ -258,4 +271,4 @@ def test_missing_training_image(tmp_path: Path) -> None:
 @pytest.mark.skipif(torch.cuda.is_available(), reason="only where there is no CUDA device")
 def test_cuda_where_there_is_none() -> None:
     with pytest.raises(UserError, match="no CUDA device"):
-        loop.pick_device("cuda")
+        pick_device("cuda")
