@@ -167,17 +167,18 @@ class SampleParams(Section):
 
 
 class ReconstructParams(Section):
-    """`reconstruct`: screened Poisson, trimmed to the sampled sheet.
+    """`reconstruct`.
 
     Attributes:
-        method: "poisson".
-        resolution: samples a side that Poisson sees (the R x R grid is thinned to it); null takes all.
-        depth: of the octree: 2^depth cells along the longest side of the layer's bounding box and a tenth.
-        point_weight: of the samples (screening).
-        trim: vertices farther than this many local sample spacings from the samples are removed.
+        method: "grid" takes the samples themselves as vertices; "poisson" is the paper's screened Poisson surface of
+            each layer, trimmed to the sampled sheet.
+        resolution: samples a side that are used (the R x R grid is thinned to it); null takes all.
+        depth: poisson: of the octree, 2^depth cells along the longest side of the layer's bounding box and a tenth.
+        point_weight: poisson: of the samples (screening).
+        trim: poisson: vertices farther than this many local sample spacings from the samples are removed.
     """
 
-    method: Literal["poisson"] = "poisson"
+    method: Literal["grid", "poisson"] = "grid"
     resolution: Annotated[int, Field(ge=8)] | None = None
     depth: Annotated[int, Field(ge=4, le=12)] = 7
     point_weight: Annotated[float, Field(ge=0)] = 4.0
@@ -189,8 +190,8 @@ class DecimateParams(Section):
 
     Attributes:
         resolution: R^m; each layer keeps at most R^m x R^m vertices.
-        uv: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper), "exact" those of its own
-            direction from the sphere centre.
+        uv: of Poisson surfaces: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper),
+            "exact" those of its own direction from the sphere centre. Vertices of `grid` are samples and keep theirs.
     """
 
     resolution: Annotated[int, Field(ge=8, le=2048)] = 64
