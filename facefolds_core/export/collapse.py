@@ -2,7 +2,8 @@
 
 Edges collapse in the order of the quadric error (`collapse_kernel`), summed over layers. It measures the distance from
 the surface and the shift of the texture together, in units of length, weighted by how much a place shows. Layers stay
-nested (see `sheets`), vertices stay samples with exact texture coordinates, and the window's border stays straight.
+nested (see `sheets`), vertices keep the directions and texture coordinates of samples, and the window's border stays
+straight. Then each layer's radii at the vertices are fitted to all samples (`refit`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
 from facefolds_core.export.collapse_kernel import build_quadrics, collapse, covers
+from facefolds_core.export.refit import refit_radii
 from facefolds_core.export.sheets import Array, directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -50,12 +52,13 @@ def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
     cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
     alive = collapse(st, towards, _borders(len(sheets.st)), points, faces, quadrics, max_vertices, LEAST_AREA * cell)
     faces = faces[alive]
+    fitted = refit_radii(sheets, shows, faces, towards)
     opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
     kept = covers(faces, len(sheets.st), np.ascontiguousarray(opaque.transpose(1, 2, 0)))
     meshes = []
     for layer in range(sheets.num_layers):
         own = kept[:, layer] if kept[:, layer].any() else np.ones(len(faces), bool)
-        meshes.append(sheet_mesh(sheets, layer, faces[own], towards))
+        meshes.append(sheet_mesh(fitted, layer, faces[own], towards))
     return meshes
 
 

@@ -257,21 +257,41 @@ def collapse(  # type: ignore[no-untyped-def]
     return alive
 
 
+@numba.njit(error_model="numpy", cache=True, inline="always")
+def _holds(corners, r, c):  # type: ignore[no-untyped-def]
+    """Whether a triangle with corners (3, 2) in rows and columns holds the point (r, c), its border included."""
+    e0 = (corners[1, 1] - corners[0, 1]) * (r - corners[0, 0]) - (corners[1, 0] - corners[0, 0]) * (c - corners[0, 1])
+    e1 = (corners[2, 1] - corners[1, 1]) * (r - corners[1, 0]) - (corners[2, 0] - corners[1, 0]) * (c - corners[1, 1])
+    e2 = (corners[0, 1] - corners[2, 1]) * (r - corners[2, 0]) - (corners[0, 0] - corners[2, 0]) * (c - corners[2, 1])
+    return (e0 <= 0 and e1 <= 0 and e2 <= 0) or (e0 >= 0 and e1 >= 0 and e2 >= 0)
+
+
+@numba.njit(error_model="numpy", cache=True)
+def locate(faces, n):  # type: ignore[no-untyped-def]
+    """(n, n): the last of the faces (F, 3) over an n x n grid's vertices that holds each vertex; -1 without any."""
+    found = np.full((n, n), -1, np.int64)
+    corners = np.empty((3, 2), np.int64)
+    for f in range(faces.shape[0]):
+        for k in range(3):
+            corners[k, 0], corners[k, 1] = faces[f, k] // n, faces[f, k] % n
+        for r in range(corners[:, 0].min(), corners[:, 0].max() + 1):
+            for c in range(corners[:, 1].min(), corners[:, 1].max() + 1):
+                if _holds(corners, r, c):
+                    found[r, c] = f
+    return found
+
+
 @numba.njit(error_model="numpy", cache=True)
 def covers(faces, n, opaque):  # type: ignore[no-untyped-def]
-    """(F, N) bool: faces (F, 3) over an n x n grid's vertices that hold a vertex, corners included, with `opaque`
-    (n, n, N)."""
+    """(F, N) bool: faces (F, 3) that hold a vertex of the n x n grid with `opaque` (n, n, N), corners included."""
     found = np.zeros((faces.shape[0], opaque.shape[2]), np.bool_)
+    corners = np.empty((3, 2), np.int64)
     for f in range(faces.shape[0]):
-        r0, c0 = faces[f, 0] // n, faces[f, 0] % n
-        r1, c1 = faces[f, 1] // n, faces[f, 1] % n
-        r2, c2 = faces[f, 2] // n, faces[f, 2] % n
-        for r in range(min(r0, r1, r2), max(r0, r1, r2) + 1):
-            for c in range(min(c0, c1, c2), max(c0, c1, c2) + 1):
-                e0 = (c1 - c0) * (r - r0) - (r1 - r0) * (c - c0)
-                e1 = (c2 - c1) * (r - r1) - (r2 - r1) * (c - c1)
-                e2 = (c0 - c2) * (r - r2) - (r0 - r2) * (c - c2)
-                if (e0 <= 0 and e1 <= 0 and e2 <= 0) or (e0 >= 0 and e1 >= 0 and e2 >= 0):
+        for k in range(3):
+            corners[k, 0], corners[k, 1] = faces[f, k] // n, faces[f, k] % n
+        for r in range(corners[:, 0].min(), corners[:, 0].max() + 1):
+            for c in range(corners[:, 1].min(), corners[:, 1].max() + 1):
+                if _holds(corners, r, c):
                     for layer in range(opaque.shape[2]):
                         found[f, layer] |= opaque[r, c, layer]
     return found

@@ -6,15 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from facefolds_core.export.collapse import contribution, decimate_sheets
 from facefolds_core.export.decimation import exact_st, layer_order
 from facefolds_core.export.poisson import boundary_loops
+from facefolds_core.export.refit import radial_cosines, refit_radii
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.sheets import grid_sheets
+from facefolds_core.export.sheets import directions, grid_sheets, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.rendering.intersection import EmbreeMesh
 from tests.ellipsoids import Ellipsoids
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
@@ -48,6 +51,45 @@ def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
         assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.centre)).max() < 1e-5
         drift = mesh.st[mesh.faces].mean(1) - exact_st(middle.astype(np.float32), WINDOW, sheets.centre)
         assert np.abs(drift).max() < 0.005
+
+
+def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
+    towards = directions(sheets)
+    faces = coarse_faces()
+    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, towards)
+    for layer in range(sheets.num_layers):
+        before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
+        assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both
+    assert (np.diff(fitted.radii, axis=0) <= 0).all()
+
+
+def coarse_faces() -> NDArray[np.int64]:
+    """Two triangles for each square of 21 x 21 cells of the grid."""
+    index = np.arange(N * N).reshape(N, N)[::21, ::21]
+    a, b, c, d = (x.reshape(-1) for x in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
+    return np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
+
+
+def radial_errors(coarse: Sheets, sheets: Sheets, layer: int, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Radius of a coarse mesh, by casting rays from c, minus that of the samples."""
+    towards = directions(sheets)
+    mesh = sheet_mesh(coarse, layer, faces, towards)
+    origins = np.tile(sheets.centre, (len(towards), 1))
+    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, towards)
+    found = hits.triangle >= 0
+    corners = mesh.vertices[mesh.faces[hits.triangle[found]]].astype(np.float64)
+    points = (hits.barycentric[found][..., None] * corners).sum(1)
+    return np.linalg.norm(points - sheets.centre, axis=-1) - sheets.radii[layer].reshape(-1)[found]
+
+
+def test_cosines_are_those_of_the_normals(sheets: Sheets) -> None:
+    for layer, axes in enumerate(Ellipsoids().axes):
+        points = sheets.radii[layer].reshape(-1, 1) * directions(sheets)
+        normals = points / np.array(axes) ** 2
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        cosines = (normals * directions(sheets)).sum(-1).reshape(N, N)
+        inside = (slice(1, -1), slice(1, -1))  # differences are one-sided at the border
+        assert np.abs(radial_cosines(sheets, layer) - cosines)[inside].max() < 1e-3
 
 
 def test_the_border_stays_where_it_was(sheets: Sheets) -> None:
@@ -101,7 +143,8 @@ def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
     (mesh, _) = decimate_sheets(replace(sheets, radii=radii), 256)
     column = mesh.st[:, 0] * N - 0.5
     assert (np.abs(column - (N / 2 - 0.5)) < 1).mean() > 0.1  # 2 of 64 columns, 3 %; seen: 16 %
-    assert np.isin(np.linalg.norm(mesh.vertices - sheets.centre, axis=-1).round(4), [0.3, 0.35]).all()
+    radius = np.linalg.norm(mesh.vertices - sheets.centre, axis=-1)
+    assert np.minimum(np.abs(radius - 0.3), np.abs(radius - 0.35)).max() < 2e-3
 
 
 def test_what_is_transparent_in_all_frames_is_trimmed(sheets: Sheets) -> None:
