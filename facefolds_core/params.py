@@ -208,6 +208,17 @@ class TextureParams(Section):
     resolution: Annotated[int, Field(ge=8, le=4096)] = 512
 
 
+class BakeParams(Section):
+    """`bake`: textures are fitted to the meshes that ship.
+
+    Attributes:
+        iterations: passes over the training cameras' rays in the first frame; later frames start from its result and
+            take a quarter of them. 0 leaves the textures as `texture` made them.
+    """
+
+    iterations: Annotated[int, Field(ge=0)] = 2
+
+
 class MeshCodec(Section):
     """Draco.
 
@@ -265,6 +276,7 @@ class Overrides(Section):
     reconstruct: dict[str, Any] = {}
     decimate: dict[str, Any] = {}
     texture: dict[str, Any] = {}
+    bake: dict[str, Any] = {}
     compress: dict[str, Any] = {}
     evaluate: dict[str, Any] = {}
 
@@ -304,6 +316,7 @@ STAGE_SECTIONS: dict[str, type[Section]] = {
     "reconstruct": ReconstructParams,
     "decimate": DecimateParams,
     "texture": TextureParams,
+    "bake": BakeParams,
     "compress": CompressParams,
     "evaluate": EvaluateParams,
 }
