@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from facefolds_core.asset import AssetSource, write_asset
 from facefolds_core.captures.frames import FrameStore
-from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene
+from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
-from facefolds_core.export.stores import read_meshes, read_windows
+from facefolds_core.export.stores import read_centre, read_meshes, read_windows
 from facefolds_core.params import CompressParams
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
@@ -18,7 +18,8 @@ def compress(folders: SubjectFolders) -> str:
     meshes = read_meshes(folders.meshes / "meshes.npz")
     windows = read_windows(folders.samples / "grids.npz")
     textures = FrameStore(folders.textures / "textures.arrow")
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), SPHERE_CENTRE)
+    centre = read_centre(folders.samples / "grids.npz")
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), centre)
     manifest = write_asset(folders.asset, meshes, windows, textures, source, params)
     mesh_bytes = sum(layer.bytes for layer in manifest.layers)
     video = manifest.texture
