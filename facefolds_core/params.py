@@ -264,6 +264,18 @@ class VideoCodec(Section):
         return value
 
 
+class GlbParams(Section):
+    """The GLB beside the asset: one frame as binary glTF.
+
+    Attributes:
+        frame: index of the frame whose textures it shows.
+        draco: keep the meshes compressed (KHR_draco_mesh_compression, which not every program reads).
+    """
+
+    frame: Annotated[int, Field(ge=0)] = 0
+    draco: bool = False
+
+
 class CompressParams(Section):
     """`compress`.
 
@@ -274,6 +286,7 @@ class CompressParams(Section):
     mesh: MeshCodec = MeshCodec()
     video: VideoCodec = VideoCodec()
     photos: Annotated[int, Field(ge=0)] = 0
+    glb: GlbParams = GlbParams()
 
 
 class EvaluateParams(Section):

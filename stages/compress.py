@@ -1,8 +1,10 @@
-"""The asset that ships: Draco meshes, texture video, manifest."""
+"""The asset that ships (Draco meshes, texture video, manifest), and one frame of it as GLB."""
 
 from __future__ import annotations
 
 from facefolds_core.asset import AssetSource
+from facefolds_core.asset.glb import write_glb
+from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene
 from facefolds_core.config import read_stage
@@ -22,6 +24,7 @@ def compress(folders: SubjectFolders) -> str:
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), SPHERE_CENTRE)
     manifest = package(folders.asset, Export(meshes, windows, textures), scene, source, params)
     level = manifest.full
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame, params.glb.draco)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""

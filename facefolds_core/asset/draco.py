@@ -97,3 +97,9 @@ def decode_mesh(data: bytes) -> TexturedMesh:
     if st.shape != (len(vertices), 2):
         raise DracoError(f"texture coordinates of shape {st.shape} for {len(vertices)} vertices")
     return TexturedMesh(vertices, np.asarray(faces).astype(np.int32), st)
+
+
+def attribute_ids(data: bytes) -> tuple[int, int]:
+    """Draco's unique ids of the positions and of the texture coordinates, as glTF refers to them."""
+    ids = {attribute["attribute_type"]: int(attribute["unique_id"]) for attribute in DracoPy.decode(data).attributes}
+    return ids[DracoPy.AttributeType.POSITION], ids[DracoPy.AttributeType.TEX_COORD]
