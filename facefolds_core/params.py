@@ -280,6 +280,8 @@ class CompressParams(Section):
     """`compress`.
 
     Attributes:
+        view_effects: fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of
+            the full level at most. It needs an asset that stands before the room, not one that has it painted on.
         photos: photos of held-out cameras that ship with the asset, to compare with: at most so many.
     """
 
@@ -287,6 +289,7 @@ class CompressParams(Section):
     video: VideoCodec = VideoCodec()
     photos: Annotated[int, Field(ge=0)] = 0
     glb: GlbParams = GlbParams()
+    view_effects: bool = False
 
 
 class EvaluateParams(Section):

@@ -33,6 +33,7 @@ COST_KEYS = [
     "triangles",
     "mesh_bytes",
     "texture_bytes",
+    "view_effects_bytes",
     "gpu_bytes",
 ]
 TRAINING = {"seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "preset": "quick"}
