@@ -17,7 +17,7 @@ from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS, ImageScore
 
 METRICS_VERSION = 1
-EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "compress")
+EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
 
 VERTEX_BYTES = 20
 """Position (3 float32) and texture coordinates (2 float32)."""

@@ -21,7 +21,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CompressParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
-from tests.assets import WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
@@ -36,7 +36,7 @@ def folders(tmp_path: Path) -> SubjectFolders:
         Scene("caps", (), (), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene), subject.scene
     )
     subject.samples.mkdir()
-    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3))
+    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3), centre=np.array(CENTRE))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(3)]
     arrays = {f"{name}_{i:02d}": getattr(mesh, name) for i, mesh in enumerate(meshes) for name in vars(mesh)}
     subject.meshes.mkdir()
@@ -147,6 +147,6 @@ def test_damaged_input(folders: SubjectFolders, file: str, damage: str) -> None:
 
 
 def test_fewer_meshes_than_windows(folders: SubjectFolders) -> None:
-    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4))
+    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4), centre=np.array(CENTRE))
     with pytest.raises(UserError, match="do not belong together"):
         compress(folders)
