@@ -33,7 +33,7 @@ STEPS = ("model", "sampled", "meshed", "decimated", "resampled", "baked", "shipp
 """The model without its view branch; its sampled textures on its exact surfaces; on the reconstructed surfaces; on the
 decimated meshes; textures resampled to R^t; textures fitted to the meshes; Draco and video."""
 
-Frame = Callable[[int], NDArray[np.uint8]]
+Frame = Callable[[int], Sequence[NDArray[np.uint8]]]
 
 
 @dataclass(frozen=True)
@@ -145,14 +145,15 @@ def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> 
 
 def _of_asset(asset: Asset) -> _Source:
     caster = AssetCaster(asset)
-    files = sum(layer.bytes for layer in asset.manifest.layers)
-    triangles = sum(layer.triangles for layer in asset.manifest.layers)
-    return _Source("shipped", caster.cast, asset.frame, triangles, files, asset.manifest.texture.bytes)
+    level = asset.manifest.full
+    files = sum(layer.bytes for layer in level.layers)
+    triangles = sum(layer.triangles for layer in level.layers)
+    return _Source("shipped", caster.cast, asset.frame, triangles, files, level.texture.videos[0].bytes)
 
 
 def _frame(store: FrameStore) -> Frame:
     layers = sorted({layer for layer, _ in store})
-    return lambda k: np.stack([store.image(layer, k) for layer in layers])
+    return lambda k: [store.image(layer, k) for layer in layers]
 
 
 def exact_hits(model: RadianceManifolds, camera: Camera, window: Window) -> Hits:

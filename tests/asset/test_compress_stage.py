@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import wave
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
+from facefolds_core.asset.draco import encode_mesh
+from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.captures.frames import write_frames
+from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
+from facefolds_core.export.stores import Grids, write_grids, write_surfaces
 from facefolds_core.files import write_text
+from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, DecimateParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
-from tests.assets import WINDOW, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
 
@@ -30,7 +39,7 @@ def folders(tmp_path: Path) -> SubjectFolders:
         Scene("caps", (), (), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene), subject.scene
     )
     subject.samples.mkdir()
-    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3))
+    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3), centre=np.array(CENTRE))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(3)]
     arrays = {f"{name}_{i:02d}": getattr(mesh, name) for i, mesh in enumerate(meshes) for name in vars(mesh)}
     subject.meshes.mkdir()
@@ -41,11 +50,114 @@ def folders(tmp_path: Path) -> SubjectFolders:
 
 def test_makes_a_sound_asset(folders: SubjectFolders) -> None:
     line = compress(folders)
-    assert "3 meshes" in line and "2 frames" in line and str(folders.asset) in line
+    assert "3 of 3 meshes" in line and "2 frames" in line and str(folders.asset) in line
     assert validate_asset(folders.asset) == []
     manifest = read_asset(folders.asset).manifest
-    assert (manifest.subject, manifest.texture.fps) == ("caps", 25.0)
-    assert [layer.uv_window for layer in manifest.layers] == [WINDOW] * 3
+    assert (manifest.subject, manifest.full.texture.fps) == ("caps", 25.0)
+    crops = cap_crops(3, 2, 64)
+    assert [layer.uv_window for layer in manifest.full.layers] == [crop.window for crop in crops]
+
+
+def rig(folders: SubjectFolders, **params: object) -> None:
+    """Give the scene cameras, and `compress` other parameters."""
+    cameras = tuple(look_at_origin(f"cam{i}", azimuth, 5, 48) for i, azimuth in enumerate((-30, 0, 10, 30)))
+    scene = replace(read_scene(folders.scene), cameras=cameras, splits=("train", "holdout", "train", "train"))
+    write_scene(scene, folders.scene)
+    image = np.zeros((48, 48, 3), np.uint8)
+    write_frames(folders.scene / "frames.arrow", image.shape, [(1, 0, image), (1, 1, image), (0, 0, image)])
+    write_text(folders.config / "compress.json", CompressParams.model_validate(params).model_dump_json())
+
+
+def test_quality_by_target(folders: SubjectFolders) -> None:
+    sizes, qualities = [], []
+    for target in (30.0, 38.0):
+        rig(folders, video={"target_psnr": target, "codec": ["h264", "vp9"], "preset": "veryfast"})
+        compress(folders)
+        assert validate_asset(folders.asset) == []
+        level = read_asset(folders.asset).manifest.full
+        assert level.quality is not None
+        qualities.append(level.quality.psnr_to_model - target)
+        sizes.append([video.bytes for video in level.texture.videos])
+    assert all(0 <= over < 1.5 for over in qualities), qualities
+    assert all(coarse < fine for coarse, fine in zip(*sizes, strict=True))
+
+
+def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
+    rig(folders, mesh={"max_error_pixels": 0.05, "compression_level": 7})
+    compress(folders)
+    asset = read_asset(folders.asset)
+    cameras = [camera for camera in read_scene(folders.scene).cameras if camera.name != "cam1"]
+    for crop, layer in zip(cap_crops(3, 2, 64), asset.layers, strict=True):
+        for camera in cameras:
+            ours, theirs = (camera.project(mesh.vertices.astype(float))[0] for mesh in (crop.mesh, layer))
+            assert np.linalg.norm(ours[:, None] - theirs[None], axis=-1).min(1).max() <= 0.05
+    exact = sum(len(encode_mesh(crop.mesh, MeshCodec())[0]) for crop in cap_crops(3, 2, 64))
+    assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
+
+
+def test_view_effects_ship_and_are_scored_apart(folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch) -> None:
+    maps = [np.full((4, 3, 3, 3), 0.01 * (i + 1), np.float32) for i in range(3)]
+    monkeypatch.setattr("facefolds_core.packaging.package.fit_effects", lambda *_: EffectsPicture.of(maps))
+    rig(folders, view_effects=True)
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    asset = read_asset(folders.asset)
+    found = asset.effects()
+    assert found is not None
+    for table, given in zip(found, maps, strict=True):
+        np.testing.assert_allclose(table, given, atol=0.001)
+    assert asset.manifest.full.bytes == sum(size for _, size, _ in asset.manifest.full.files())
+    (folders.asset / "full_effects.png").write_bytes(b"")
+    assert any(problem.startswith("full_effects.png:") for problem in validate_asset(folders.asset))
+
+
+def test_levels_of_detail(folders: SubjectFolders) -> None:
+    levels = [
+        {"name": "small", "mesh_resolution": 5, "texture_resolution": 16, "crf": 34, "max_error_pixels": 0.5},
+        {"name": "medium", "mesh_resolution": 8, "texture_resolution": 32, "crf": 26},
+    ]
+    rig(folders, levels=levels)
+    write_text(folders.config / "decimate.json", DecimateParams(resolution=12).model_dump_json())
+    meshes = [cap_mesh(radius_of(layer), 25) for layer in range(3)]
+    write_surfaces(folders.surfaces / "surfaces.npz", [Surface(mesh.vertices, mesh.faces) for mesh in meshes])
+    n = 12
+    flat = np.zeros((3, n, n, 3), np.float32)
+    grids = Grids(
+        points=flat,
+        normals=flat,
+        valid=np.ones((3, n, n), bool),
+        opacity=np.full((3, n, n), 255, np.uint8),
+        windows=np.array([WINDOW] * 3),
+        centre=np.array(CENTRE),
+    )
+    write_grids(folders.samples / "grids.npz", grids)
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    asset = read_asset(folders.asset)
+    entries = asset.manifest.levels
+    assert [entry.name for entry in entries] == ["small", "medium", "full"]
+    assert all(a.bytes < b.bytes for a, b in pairwise(entries))
+    qualities = [entry.quality.psnr_to_model for entry in entries if entry.quality]
+    assert 15 < qualities[0] < qualities[1] < qualities[2]
+    for entry, level, side in zip(entries, asset.levels, (5, 8, 12), strict=True):
+        assert max(layer.vertices for layer in entry.layers) <= side**2
+        assert len(list(level.frames())) == 2
+
+
+def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
+    rig(folders, photos=3)
+    with wave.open(str(folders.scene / "audio.wav"), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes(bytes(2000))
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    manifest = read_asset(folders.asset).manifest
+    assert manifest.audio is not None and manifest.audio.file == "audio.wav"
+    assert manifest.poster is not None and (manifest.poster.width, manifest.poster.height) == (48, 48)
+    assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
+    camera = read_scene(folders.scene).cameras[1]
+    np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
+    np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
 
 
 def test_to_capture_undoes_the_normalisation(folders: SubjectFolders) -> None:
@@ -71,6 +183,6 @@ def test_damaged_input(folders: SubjectFolders, file: str, damage: str) -> None:
 
 
 def test_fewer_meshes_than_windows(folders: SubjectFolders) -> None:
-    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4))
+    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4), centre=np.array(CENTRE))
     with pytest.raises(UserError, match="do not belong together"):
         compress(folders)
