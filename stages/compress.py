@@ -20,11 +20,13 @@ def compress(folders: SubjectFolders) -> str:
     textures = FrameStore(folders.textures / "textures.arrow")
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), SPHERE_CENTRE)
     manifest = write_asset(folders.asset, meshes, windows, textures, source, params)
-    mesh_bytes = sum(layer.bytes for layer in manifest.layers)
-    video = manifest.texture
+    level = manifest.full
+    mesh_bytes = sum(layer.bytes for layer in level.layers)
+    video = level.texture.videos[0]
     return (
-        f"{len(manifest.layers)} meshes ({mesh_bytes} bytes) and {video.frames} frames "
-        f"in {video.width} x {video.height} H.264 level {video.level} ({video.bytes} bytes) in {folders.asset}"
+        f"{len(level.layers)} of {len(meshes)} meshes ({mesh_bytes} bytes) and {level.texture.frames} frames "
+        f"in {level.texture.width} x {level.texture.height} {video.codec} level {video.level} ({video.bytes} bytes) "
+        f"in {folders.asset}"
     )
 
 

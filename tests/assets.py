@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset import AssetSource, Manifest, write_asset
+from facefolds_core.asset.cropping import CroppedLayer, crop_layers
 from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
@@ -52,7 +53,7 @@ def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:
 
 
 def cap_textures(layers: int, frame: int, resolution: int) -> NDArray[np.uint8]:
-    """(N, R, R, 4): what `Asset.frame` should come near to."""
+    """(N, R, R, 4), before cropping."""
     return np.stack([cap_texture(layer, frame, resolution) for layer in range(layers)])
 
 
@@ -67,6 +68,18 @@ def write_store(path: Path, frames: NDArray[np.uint8]) -> FrameStore:
     resolution = frames.shape[2]
     write_frames(path, (resolution, resolution, 4), rows())
     return FrameStore(path)
+
+
+def cap_crops(layers: int, frames: int, resolution: int) -> tuple[CroppedLayer, ...]:
+    """What the writer makes of the layers of `make_asset`."""
+    textures = [cap_textures(layers, frame, resolution) for frame in range(frames)]
+
+    class Store:
+        def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
+            return np.asarray(textures[frame][layer])
+
+    meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
+    return crop_layers(meshes, [WINDOW] * layers, Store(), frames)
 
 
 def make_asset(

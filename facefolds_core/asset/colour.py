@@ -21,6 +21,7 @@ Float = NDArray[np.float32]
 KR, KG, KB = 0.2126, 0.7152, 0.0722
 CB_SCALE, CR_SCALE = 2 * (1 - KB), 2 * (1 - KR)
 NEUTRAL = 128
+BLACK = 16
 
 
 def rgb_to_yuv420(rgb: NDArray[np.uint8]) -> tuple[Plane, Plane, Plane]:

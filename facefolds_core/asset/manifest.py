@@ -1,4 +1,4 @@
-"""manifest.json of an asset, format version 1 (docs/asset-format.md), as validated models.
+"""manifest.json of an asset, format version 2 (docs/asset-format.md), as validated models.
 
 The JSON schema beside this file, manifest.schema.json, says the same without our code; a test keeps the two in step.
 """
@@ -11,13 +11,13 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 from facefolds_core.geometry.similarity import Similarity
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MANIFEST_NAME = "manifest.json"
 SCHEMA_PATH = Path(__file__).with_name("manifest.schema.json")
 REMEDY = "make the asset again (`dvc repro`), or copy it again from where it is whole"
@@ -33,6 +33,7 @@ Offset = Annotated[int, Field(ge=0)]
 Rect = tuple[Offset, Offset, Count, Count]
 """(x, y, width, height) in pixels from the top left corner of the video."""
 Vector = tuple[float, float, float]
+Row = tuple[float, float, float, float]
 
 
 class Part(BaseModel):
@@ -73,12 +74,21 @@ class Coordinates(Part):
     sphere_centre: Vector
 
 
+class StoredFile(Part):
+    """A file of the asset's folder, with what it must hold."""
+
+    file: FileName
+    bytes: Count
+    sha256: Sha256
+
+
 class Layer(Part):
     """One mesh and its place in the video.
 
     Attributes:
         texture_rect: of its colour, within the colour image; its alpha has the same place within the alpha image.
         uv_window: (u0, u1, v0, v1), what its texture covers of the hemisphere's (u, v).
+        effects_rect: within each plane of the level's view effects; absent where there are none.
     """
 
     mesh: FileName
@@ -88,23 +98,40 @@ class Layer(Part):
     sha256: Sha256
     texture_rect: Rect
     uv_window: tuple[UV, UV, UV, UV]
+    effects_rect: Annotated[Rect | None, Field(exclude_if=lambda rect: rect is None)] = None
+
+    @field_validator("effects_rect")
+    @classmethod
+    def _absent_or_whole(cls, value: Rect | None) -> Rect:
+        if value is None:
+            raise ValueError("a rectangle, or no such key")
+        return value
+
+
+class Video(StoredFile):
+    """One encoding of the textures' pictures.
+
+    Attributes:
+        mime: MIME type with codec string, as browsers take it.
+        level: of the codec, that a decoder must support.
+    """
+
+    container: Literal["mp4", "webm"]
+    codec: Literal["h264", "vp9", "av1"]
+    mime: str
+    level: Annotated[str, Field(pattern=r"^[1-7](\.[0-3])?$")]
+    pixel_format: Literal["yuv420p"] = "yuv420p"
 
 
 class Texture(Part):
-    """The texture video.
+    """The textures of a level: pictures, encoded once or in several ways.
 
     Attributes:
-        level: of H.264 that a decoder must support.
+        width, height: of the decoded picture.
         colour_rect, alpha_rect: in pixels of the decoded picture; of one size.
-        layer_resolution: R^t, texels a side of each layer.
+        videos: the same pictures; a player takes the first that it can decode.
     """
 
-    video: FileName
-    bytes: Count
-    sha256: Sha256
-    codec: Literal["h264"] = "h264"
-    level: Annotated[str, Field(pattern=r"^[1-6](\.[1-3])?$")]
-    pixel_format: Literal["yuv420p"] = "yuv420p"
     width: Count
     height: Count
     colour_rect: Rect
@@ -114,7 +141,78 @@ class Texture(Part):
     colour_space: Literal["bt709"] = "bt709"
     colour_range: Literal["tv"] = "tv"
     chroma_location: Literal["left"] = "left"
-    layer_resolution: Count
+    videos: Annotated[tuple[Video, ...], Field(min_length=1)]
+
+
+class ViewEffects(StoredFile):
+    """A static residual that depends on the direction to the eye; players may ignore it.
+
+    Attributes:
+        basis: "sh1": planes for the x, y and z of the direction.
+        scale: what code 255 means, code 0 being its negative.
+        width, height: of the PNG.
+        planes: of x, y and z, in pixels of the PNG; of one size.
+    """
+
+    basis: Literal["sh1"] = "sh1"
+    scale: Annotated[float, Field(gt=0)]
+    width: Count
+    height: Count
+    planes: tuple[Rect, Rect, Rect]
+
+
+class Quality(Part):
+    """How near the level is to what was trained.
+
+    Attributes:
+        psnr_to_model: of training views rendered from this level, against the textures and meshes before coding, dB.
+    """
+
+    psnr_to_model: float
+
+
+class Level(Part):
+    """One level of detail, complete in itself.
+
+    Attributes:
+        layers: outermost first; their number may differ between levels.
+        bytes: of all its files.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$")]
+    layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
+    texture: Texture
+    view_effects: ViewEffects | None = None
+    bytes: Count
+    quality: Quality | None = None
+
+    def files(self) -> list[tuple[str, int, str]]:
+        """(name, bytes, sha256) of each of its files, the meshes first."""
+        found = [(layer.mesh, layer.bytes, layer.sha256) for layer in self.layers]
+        others: list[StoredFile] = [*self.texture.videos, *([self.view_effects] if self.view_effects else [])]
+        return found + [(other.file, other.bytes, other.sha256) for other in others]
+
+
+class Poster(StoredFile):
+    """A still picture of the asset, shown while it loads."""
+
+    width: Count
+    height: Count
+
+
+class Photo(Poster):
+    """A photo of the capture and the camera that took it, to compare with.
+
+    Attributes:
+        camera, frame: the capture's name of the camera, the index of the frame.
+        K: intrinsics, rows; continuous pixel coordinates.
+        w2c: (R | t), rows: normalised coordinates to OpenCV's camera axes.
+    """
+
+    camera: str
+    frame: Offset
+    K: tuple[Vector, Vector, Vector]
+    w2c: tuple[Row, Row, Row]
 
 
 class Compositing(Part):
@@ -130,25 +228,42 @@ class Manifest(Part):
     """manifest.json.
 
     Attributes:
-        layers: outermost first.
+        levels: coarsest first; the last is the full one.
+        audio: of the sequence; it is in the MP4 files too.
+        photos: for comparison.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
     format: Literal["facefolds"] = "facefolds"
-    version: Literal[1] = 1
+    version: Literal[2] = 2
     generator: str
     subject: str
     coordinates: Coordinates
-    layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
-    texture: Texture
     compositing: Compositing = Compositing()
+    levels: Annotated[tuple[Level, ...], Field(min_length=1)]
+    audio: StoredFile | None = None
+    poster: Poster | None = None
+    photos: tuple[Photo, ...] = ()
     manifest_sha256: Sha256 = _UNSEALED
+
+    @property
+    def full(self) -> Level:
+        return self.levels[-1]
+
+    def files(self) -> list[tuple[str, int, str]]:
+        """(name, bytes, sha256) of every file but the manifest."""
+        others: list[StoredFile] = [*self.photos]
+        others += [one for one in (self.audio, self.poster) if one is not None]
+        found = [entry for level in self.levels for entry in level.files()]
+        return found + [(other.file, other.bytes, other.sha256) for other in others]
 
 
 def manifest_schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of `Manifest`; keys with a default are required all the same in a file."""
     schema = Manifest.model_json_schema(mode="serialization")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 1"} | schema
+    layer = schema["$defs"]["Layer"]
+    layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
 
 
 def write_manifest(manifest: Manifest, path: Path) -> Manifest:

@@ -1,30 +1,40 @@
 """Where the layers' textures lie in the video's picture.
 
-The colour image is a near-square grid of cells, filled by rows, the outermost layer first; the alpha image has the same
-grid below it. A cell is R^t and a gutter of 2 pixels on each side, rounded up to whole macroblocks (16), so that no
-block of the codec spans two layers; what the texture leaves of its cell repeats its border. The gutter is one chroma
-sample wide: without it, interpolated chroma brings the neighbouring layer's hue into a texture's last column and rows
-(off by up to 66 of 255 in the synthetic asset of the tests, before the codec; with the gutter 6).
+The colour image holds one cell a layer, packed by rectangle-packer; the alpha image has the same cells below it. A cell
+is the layer's rectangle and a gutter of GUTTER pixels on each side, rounded up to whole macroblocks (16) and placed on
+multiples of 16; what the texture leaves of its cell repeats its border. So
 
-A reader takes the rectangles from the manifest and does not care how they were chosen.
+- no block of the codec spans two layers, and interpolated chroma brings no neighbour's hue;
+- texels of mip-map levels 1 to MIP_LEVELS (means of 2^m x 2^m pixels, m <= 4) belong to one cell each, and a bilinear
+  look-up at a clamped (s, t), at least GUTTER + 1/2 >= 2^(m-1) pixels inside the cell, reads this cell only if m <= 3.
+
+Pictures are multiples of 16 a side, at least MIN_SIDE, and at most HARDWARE_SIDE where the layers can be placed so:
+beyond, many hardware decoders stop. A reader takes the rectangles from the manifest and does not care how they were
+chosen.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import rpack
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 
 MACROBLOCK = 16
-GUTTER = 2
-MAX_MACROBLOCKS = 139_264
-"""Macroblocks a picture at level 6.2, the highest of H.264 (table A-1)."""
+GUTTER = 4
+MIP_LEVELS = 3
+MIN_SIDE = 128
+"""Pixels a side that every hardware decoder takes (NVDEC's least for VP9 and AV1)."""
+HARDWARE_SIDE = 4096
+MAX_PIXELS = 35_651_584
+"""Pixels a picture at the highest levels: 6.2 of H.264 (139 264 macroblocks), of VP9 and 6.3 of AV1."""
 MAX_SIDE = 16_384
-"""Pixels a side that libx264 takes."""
+"""Pixels a side that the encoders take."""
+WIDTHS_TRIED = 24
 
 Rect = tuple[int, int, int, int]
 """(x, y, width, height), pixels, from the top left corner."""
@@ -32,12 +42,12 @@ Rect = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class AtlasLayout:
-    """Places of N square textures of R x R texels in a picture.
+    """Places of N textures in a picture.
 
     Attributes:
         width, height: of the picture, even.
         colour_rect, alpha_rect: of the two images in the picture, of one size, at even places.
-        rects: of each layer within the colour image and, the same, within the alpha image; R x R.
+        rects: of each layer within the colour image and, the same, within the alpha image.
     """
 
     width: int
@@ -47,36 +57,54 @@ class AtlasLayout:
     rects: tuple[Rect, ...]
 
     @classmethod
-    def grid(cls, layers: int, resolution: int) -> AtlasLayout:
-        """The layout that the writer uses for N layers of R x R texels."""
-        columns = math.isqrt(layers - 1) + 1
-        rows = -(-layers // columns)
-        pitch = cell_size(resolution)
-        width, height = columns * pitch, rows * pitch
-        corners = [(column * pitch, row * pitch) for row in range(rows) for column in range(columns)]
+    def pack(cls, sizes: Sequence[tuple[int, int]]) -> AtlasLayout:
+        """The layout that the writer uses for N textures of (width, height) texels.
+
+        Of the packings for WIDTHS_TRIED greatest widths, the one of least area among those of at most HARDWARE_SIDE
+        a side, if there are any; among equals the one with the shorter long side.
+        """
+        cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
+        narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
+        widths = sorted({round(float(w)) for w in np.geomspace(narrow, wide, WIDTHS_TRIED)})
+        layouts = [cls._placed(sizes, cells, rpack.pack(cells, max_width=width)) for width in widths]
+        return min(layouts, key=lambda layout: (layout.long_side > HARDWARE_SIDE, layout.pixels, layout.long_side))
+
+    @classmethod
+    def _placed(
+        cls, sizes: Sequence[tuple[int, int]], cells: Sequence[tuple[int, int]], places: Sequence[tuple[int, int]]
+    ) -> AtlasLayout:
+        columns = max(x + width for (x, _), (width, _) in zip(places, cells, strict=True))
+        rows = max(y + height for (_, y), (_, height) in zip(places, cells, strict=True))
+        width, height = max(columns * MACROBLOCK, MIN_SIDE), max(rows * MACROBLOCK, MIN_SIDE // 2)
         return cls(
             width=width,
             height=2 * height,
             colour_rect=(0, 0, width, height),
             alpha_rect=(0, height, width, height),
-            rects=tuple((x + GUTTER, y + GUTTER, resolution, resolution) for x, y in corners[:layers]),
+            rects=tuple(
+                (x * MACROBLOCK + GUTTER, y * MACROBLOCK + GUTTER, w, h)
+                for (x, y), (w, h) in zip(places, sizes, strict=True)
+            ),
         )
 
     @property
-    def resolution(self) -> int:
-        return self.rects[0][2]
+    def pixels(self) -> int:
+        return self.width * self.height
+
+    @property
+    def long_side(self) -> int:
+        return max(self.width, self.height)
 
     def fits(self) -> bool:
-        """Whether H.264 allows a picture of this size."""
-        blocks = -(-self.width // MACROBLOCK) * -(-self.height // MACROBLOCK)
-        return blocks <= MAX_MACROBLOCKS and max(self.width, self.height) <= MAX_SIDE
+        """Whether the codecs allow a picture of this size."""
+        return self.pixels <= MAX_PIXELS and self.long_side <= MAX_SIDE
 
     def problems(self) -> list[str]:
         """What is wrong with the rectangles, in words; empty if nothing."""
         found = []
         size = (self.width, self.height)
         for name, rect in (("colour_rect", self.colour_rect), ("alpha_rect", self.alpha_rect)):
-            if not _inside(rect, size):
+            if not inside(rect, size):
                 found.append(f"{name} {list(rect)} is not inside the video of {size[0]} x {size[1]} pixels")
             if any(number % 2 for number in rect):
                 found.append(f"{name} {list(rect)} has odd numbers")
@@ -85,10 +113,8 @@ class AtlasLayout:
         elif _overlap(self.colour_rect, self.alpha_rect):
             found.append("colour_rect and alpha_rect overlap")
         for index, rect in enumerate(self.rects):
-            if not _inside(rect, self.colour_rect[2:]):
+            if not inside(rect, self.colour_rect[2:]):
                 found.append(f"texture_rect {list(rect)} of layer {index} is not inside the colour image")
-            if rect[2:] != (self.resolution, self.resolution):
-                found.append(f"texture_rect {list(rect)} of layer {index} is not {self.resolution} pixels a side")
             found += [
                 f"the texture_rects of layers {other} and {index} overlap"
                 for other in range(index)
@@ -97,43 +123,47 @@ class AtlasLayout:
         return found
 
 
-def cell_size(resolution: int) -> int:
-    """Pixels a side of the cell of a texture: whole macroblocks."""
-    return -(-(resolution + 2 * GUTTER) // MACROBLOCK) * MACROBLOCK
+def cell_size(side: int) -> int:
+    """Pixels along one side of the cell of a texture with `side` texels along it: whole macroblocks."""
+    return -(-(side + 2 * GUTTER) // MACROBLOCK) * MACROBLOCK
 
 
 def fill_cell(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A texture (R, R, C) with its border repeated to fill its cell."""
-    after = cell_size(len(texture)) - len(texture) - GUTTER
-    return np.pad(texture, ((GUTTER, after), (GUTTER, after), (0, 0)), mode="edge")
+    """A texture (h, w, C) with its border repeated to fill its cell."""
+    after = [cell_size(side) - side - GUTTER for side in texture.shape[:2]]
+    return np.pad(texture, ((GUTTER, after[0]), (GUTTER, after[1]), (0, 0)), mode="edge")
 
 
-def check_layout(layout: AtlasLayout) -> None:
-    """Refuse a picture that H.264 cannot hold.
+def check_layout(layout: AtlasLayout, resolution: int) -> None:
+    """Refuse a picture that the codecs cannot hold; `resolution` is R^t, of which the rectangles are parts.
 
     Raises:
-        UserError: naming the largest R^t that fits.
+        UserError: naming an R^t that fits.
     """
     if layout.fits():
         return
-    layers, largest = len(layout.rects), layout.resolution
-    while largest > 1 and not AtlasLayout.grid(layers, largest).fits():
-        largest -= 1
+    smaller = resolution
+    while smaller > MACROBLOCK:
+        smaller -= MACROBLOCK
+        sizes = [(max(1, w * smaller // resolution), max(1, h * smaller // resolution)) for _, _, w, h in layout.rects]
+        if AtlasLayout.pack(sizes).fits():
+            break
     raise UserError(
-        "the textures do not fit into one H.264 video",
-        place=f"{layers} layers of {layout.resolution} x {layout.resolution} texels",
-        expected=f"at most {MAX_SIDE} pixels a side and {MAX_MACROBLOCKS * MACROBLOCK**2} in all (level 6.2)",
+        "the textures do not fit into one video",
+        place=f"{len(layout.rects)} layers of {resolution} x {resolution} texels",
+        expected=f"at most {MAX_SIDE} pixels a side and {MAX_PIXELS} in all",
         found=f"{layout.width} x {layout.height} pixels",
-        remedy=f"set texture.resolution in params.yaml to {largest} or less, or train fewer layers",
+        remedy=f"set texture.resolution in params.yaml to {smaller} or less, or train fewer layers",
     )
 
 
-def cut(image: NDArray[np.uint8], rects: tuple[Rect, ...]) -> NDArray[np.uint8]:
-    """Take the layers out of an image of the atlas: (h, w, C) -> (N, R, R, C)."""
-    return np.stack([image[y : y + h, x : x + w] for x, y, w, h in rects])
+def cut(image: NDArray[np.uint8], rects: Sequence[Rect]) -> tuple[NDArray[np.uint8], ...]:
+    """Take the layers out of an image of the atlas: (H, W, C) -> N textures (h, w, C)."""
+    return tuple(image[y : y + h, x : x + w] for x, y, w, h in rects)
 
 
-def _inside(rect: Rect, size: tuple[int, ...]) -> bool:
+def inside(rect: Rect, size: tuple[int, ...]) -> bool:
+    """Whether a rectangle lies in an image of (width, height)."""
     x, y, width, height = rect
     return x + width <= size[0] and y + height <= size[1]
 

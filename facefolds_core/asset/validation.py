@@ -5,9 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
-from facefolds_core.asset.manifest import MANIFEST_NAME, Layer, Manifest, Texture, parse_manifest
+from facefolds_core.asset.manifest import (
+    MANIFEST_NAME,
+    Layer,
+    Manifest,
+    Poster,
+    Texture,
+    Video,
+    ViewEffects,
+    parse_manifest,
+)
 from facefolds_core.asset.reader import check_file, manifest_problems, mesh_problems
 from facefolds_core.asset.video import decode_video, probe_video
 from facefolds_core.errors import UserError
@@ -32,11 +42,25 @@ def validate_asset(folder: str | Path) -> list[str]:
     except UserError as error:
         return [_in_words(MANIFEST_NAME, error)]
     problems = [f"{MANIFEST_NAME}: {problem}" for problem in manifest_problems(path, manifest)]
-    for layer in manifest.layers:
-        problems += [f"{layer.mesh}: {problem}" for problem in _layer_problems(folder, layer)]
-    video = manifest.texture.video
-    problems += [f"{video}: {problem}" for problem in _video_problems(folder / video, manifest.texture)]
-    expected = {MANIFEST_NAME, video, *(layer.mesh for layer in manifest.layers)}
+    whole = set()
+    for name, size, sha256 in manifest.files():
+        problem = check_file(folder / name, size, sha256)
+        problems += [f"{name}: {problem}"] if problem else []
+        whole |= set() if problem else {name}
+    for level in manifest.levels:
+        for layer in level.layers:
+            if layer.mesh in whole:
+                problems += [f"{layer.mesh}: {problem}" for problem in _layer_problems(folder / layer.mesh, layer)]
+        for video in level.texture.videos:
+            if video.file in whole:
+                found = _video_problems(folder / video.file, video, level.texture)
+                problems += [f"{video.file}: {problem}" for problem in found]
+    pictures: list[Poster | ViewEffects] = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
+    pictures += [level.view_effects for level in manifest.levels if level.view_effects]
+    for picture in pictures:
+        if picture.file in whole:
+            problems += [f"{picture.file}: {problem}" for problem in _picture_problems(folder / picture.file, picture)]
+    expected = {MANIFEST_NAME, *(name for name, _, _ in manifest.files())}
     problems += [
         f"{file.name}: not named in the manifest" for file in sorted(folder.iterdir()) if file.name not in expected
     ]
@@ -45,14 +69,13 @@ def validate_asset(folder: str | Path) -> list[str]:
 
 def summary(manifest: Manifest) -> str:
     """One line about a sound asset."""
-    texture = manifest.texture
-    meshes = sum(layer.bytes for layer in manifest.layers)
-    triangles = sum(layer.triangles for layer in manifest.layers)
-    return (
-        f"{manifest.subject}: {len(manifest.layers)} layers, {triangles} triangles ({meshes} bytes), "
-        f"{texture.frames} frames at {texture.fps:g} fps of {texture.layer_resolution}^2 texels a layer "
-        f"({texture.bytes} bytes; {texture.width} x {texture.height} H.264, level {texture.level})"
+    texture = manifest.full.texture
+    levels = ", ".join(
+        f"{level.name} ({len(level.layers)} layers, {sum(layer.triangles for layer in level.layers)} triangles, "
+        f"{level.texture.width} x {level.texture.height} pixels, {level.bytes} bytes)"
+        for level in manifest.levels
     )
+    return f"{manifest.subject}: {texture.frames} frames at {texture.fps:g} fps; {levels}"
 
 
 def _in_words(name: str, error: UserError) -> str:
@@ -63,11 +86,7 @@ def _in_words(name: str, error: UserError) -> str:
     return ", ".join(parts)
 
 
-def _layer_problems(folder: Path, layer: Layer) -> list[str]:
-    path = folder / layer.mesh
-    problem = check_file(path, layer.bytes, layer.sha256)
-    if problem:
-        return [problem]
+def _layer_problems(path: Path, layer: Layer) -> list[str]:
     try:
         mesh = decode_mesh(path.read_bytes())
     except DracoError as error:
@@ -80,17 +99,15 @@ def _layer_problems(folder: Path, layer: Layer) -> list[str]:
     return problems
 
 
-def _video_problems(path: Path, texture: Texture) -> list[str]:
-    problem = check_file(path, texture.bytes, texture.sha256)
-    if problem:
-        return [problem]
+def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
     problems = []
     try:
         facts = probe_video(path)
         pairs: list[tuple[str, object, object]] = [
-            ("codec", facts.codec, texture.codec),
-            ("H.264 level", facts.level, texture.level),
-            ("pixel format", facts.pixel_format, texture.pixel_format),
+            ("codec", facts.codec, video.codec),
+            ("level", facts.level, video.level),
+            ("MIME type", facts.mime, video.mime),
+            ("pixel format", facts.pixel_format, video.pixel_format),
             ("width and height", (facts.width, facts.height), (texture.width, texture.height)),
             ("frames a second", round(float(facts.rate), 6), round(texture.fps, 6)),
         ]
@@ -105,3 +122,16 @@ def _video_problems(path: Path, texture: Texture) -> list[str]:
     except UserError as error:
         problems.append(f"{error.message}: {error.found}")
     return problems
+
+
+def _picture_problems(path: Path, said: Poster | ViewEffects) -> list[str]:
+    try:
+        with Image.open(path) as picture:
+            picture.load()
+            size, mode = picture.size, picture.mode
+    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises all three for damaged files
+        return [f"not a picture: {error}"]
+    found = [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]
+    if size != (said.width, said.height):
+        found.append(f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}")
+    return found

@@ -7,7 +7,7 @@ One encoder thread and code that does not depend on the processor: the same inpu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,8 +20,8 @@ from av.error import FFmpegError
 from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
-from facefolds_core.asset.colour import NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
-from facefolds_core.asset.packing import GUTTER, AtlasLayout, cell_size, cut, fill_cell
+from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
+from facefolds_core.asset.packing import GUTTER, AtlasLayout, cut, fill_cell
 from facefolds_core.errors import UserError
 from facefolds_core.params import VideoCodec
 
@@ -39,12 +39,14 @@ class VideoFacts:
 
     Attributes:
         level: of H.264, e.g. "5.1".
+        mime: MIME type with codec string (RFC 6381).
         rate: frames a second.
         tags: (matrix, range) codes of H.273 / FFmpeg.
     """
 
     codec: str
     level: str
+    mime: str
     pixel_format: str
     width: int
     height: int
@@ -52,28 +54,28 @@ class VideoFacts:
     tags: tuple[int, int]
 
 
-def pack_frame(textures: NDArray[np.uint8], layout: AtlasLayout) -> Picture:
-    """Layers' textures (N, R, R, 4) RGBA -> the picture that is encoded. Each cell is converted by itself.
+def pack_frame(textures: Sequence[NDArray[np.uint8]], layout: AtlasLayout) -> Picture:
+    """Layers' textures, N of (h, w, 4) RGBA -> the picture that is encoded. Each cell is converted by itself.
 
-    `layout` must be `AtlasLayout.grid`'s.
+    `layout` must be `AtlasLayout.pack`'s.
     """
-    height, width, pitch = layout.height, layout.width, cell_size(layout.resolution)
-    y = np.full((height, width), 16, np.uint8)
+    height, width = layout.height, layout.width
+    y = np.full((height, width), BLACK, np.uint8)
     cb = np.full((height // 2, width // 2), NEUTRAL, np.uint8)
     cr = cb.copy()
     top = layout.alpha_rect[1]
     for texture, (x, y0, _, _) in zip(textures, layout.rects, strict=True):
         cell = fill_cell(texture)
         left, up = x - GUTTER, y0 - GUTTER
-        full = (slice(up, up + pitch), slice(left, left + pitch))
-        half = (slice(up // 2, (up + pitch) // 2), slice(left // 2, (left + pitch) // 2))
-        y[full], cb[half], cr[half] = rgb_to_yuv420(cell[..., :3])
-        y[top + up : top + up + pitch, full[1]] = alpha_to_luma(cell[..., 3])
+        down, right = up + cell.shape[0], left + cell.shape[1]
+        half = (slice(up // 2, down // 2), slice(left // 2, right // 2))
+        y[up:down, left:right], cb[half], cr[half] = rgb_to_yuv420(cell[..., :3])
+        y[top + up : top + down, left:right] = alpha_to_luma(cell[..., 3])
     return np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)])
 
 
-def unpack_picture(picture: Picture, layout: AtlasLayout) -> NDArray[np.uint8]:
-    """A decoded picture -> (N, R, R, 4) RGBA."""
+def unpack_picture(picture: Picture, layout: AtlasLayout) -> tuple[NDArray[np.uint8], ...]:
+    """A decoded picture -> the layers' textures, N of (h, w, 4) RGBA."""
     height, width = layout.height, layout.width
     y = picture[:height]
     cb, cr = picture[height:].reshape(2, height // 2, width // 2)
@@ -179,11 +181,12 @@ def probe_video(path: Path) -> VideoFacts:
     with _opened(path) as (_, stream):
         context = stream.codec_context
         header = bytes(context.extradata or b"")
-        # ISO/IEC 14496-15, AVCDecoderConfigurationRecord: byte 3 is level_idc, ten times the level.
-        level = header[3] if len(header) > 3 else 0
+        # ISO/IEC 14496-15, AVCDecoderConfigurationRecord: bytes 1 to 3 are the profile, its constraints and the level.
+        profile = header[1:4] if len(header) > 3 else bytes(3)
         return VideoFacts(
             codec=context.name,
-            level=f"{level / 10:g}",
+            level=f"{profile[2] / 10:g}",
+            mime=f'video/mp4; codecs="avc1.{profile.hex()}"',
             pixel_format=context.pix_fmt or "unknown",
             width=context.width,
             height=context.height,

@@ -11,17 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core import __version__
+from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Coordinates,
     Layer,
+    Level,
     Manifest,
     Texture,
     Transform,
+    Video,
     write_manifest,
 )
-from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
 from facefolds_core.asset.video import Picture, encode_video, pack_frame, probe_video
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
@@ -33,7 +36,8 @@ from facefolds_core.params import CompressParams
 
 STATIC_FPS = 1.0
 """Written for a static scene, whose one frame has no rate."""
-VIDEO_NAME = "texture.mp4"
+FULL = "full"
+"""Name of the level that holds everything."""
 
 
 @dataclass(frozen=True)
@@ -83,64 +87,86 @@ def write_asset(
         )
     for index, mesh in enumerate(meshes):
         _check_mesh(mesh, f"layer {index}")
-    layout = AtlasLayout.grid(len(meshes), textures.height)
-    check_layout(layout)
+    layers = crop_layers(meshes, windows, textures, frames)
     folder = Path(folder)
     with atomic_folder(folder) as temporary:
-        layers = [
-            _write_layer(temporary, index, mesh, window, layout, params)
-            for index, (mesh, window) in enumerate(zip(meshes, windows, strict=True))
-        ]
+        level = write_level(temporary, FULL, layers, textures, frames, source.fps or STATIC_FPS, params)
         manifest = Manifest(
             generator=f"facefolds {__version__}",
             subject=source.subject,
             coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
-            layers=tuple(layers),
-            texture=_write_video(temporary, textures, frames, source.fps or STATIC_FPS, layout, params),
+            levels=(level,),
         )
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
-def _write_layer(
-    folder: Path, index: int, mesh: TexturedMesh, window: Window, layout: AtlasLayout, params: CompressParams
-) -> Layer:
-    name = f"layer_{index:02d}.drc"
-    data, decoded = encode_mesh(mesh, params.mesh)
-    (folder / name).write_bytes(data)
-    u0, u1, v0, v1 = (float(bound) for bound in window)
-    return Layer(
-        mesh=name,
-        vertices=len(decoded.vertices),
-        triangles=len(decoded.faces),
-        bytes=len(data),
-        sha256=hashlib.sha256(data).hexdigest(),
-        texture_rect=layout.rects[index],
-        uv_window=(u0, u1, v0, v1),
+def write_level(
+    folder: Path,
+    name: str,
+    layers: Sequence[CroppedLayer],
+    textures: Textures,
+    frames: int,
+    fps: float,
+    params: CompressParams,
+) -> Level:
+    """Write the files of one level into `folder`: NAME_00.drc ..., NAME.mp4; returns its part of the manifest.
+
+    Raises:
+        UserError: if the textures do not fit into one video, or the encoder refuses them.
+    """
+    layout = AtlasLayout.pack([layer.crop[2:] for layer in layers])
+    check_layout(layout, textures.image(layers[0].source, 0).shape[0])
+    entries = tuple(
+        _write_layer(folder / f"{name}_{index:02d}.drc", layer, rect, params)
+        for index, (layer, rect) in enumerate(zip(layers, layout.rects, strict=True))
     )
+    rate = Fraction(fps).limit_denominator(1001)
 
-
-def _write_video(
-    folder: Path, textures: FrameStore, frames: int, fps: float, layout: AtlasLayout, params: CompressParams
-) -> Texture:
     def pictures() -> Iterator[Picture]:
         for frame in range(frames):
-            yield pack_frame(np.stack([textures.image(layer, frame) for layer in range(len(layout.rects))]), layout)
+            yield pack_frame([layer.cut(textures.image(layer.source, frame)) for layer in layers], layout)
 
-    path = folder / VIDEO_NAME
-    rate = Fraction(fps).limit_denominator(1001)
+    path = folder / f"{name}.mp4"
     encode_video(path, pictures(), (layout.width, layout.height), rate, params.video)
-    return Texture(
-        video=VIDEO_NAME,
-        bytes=path.stat().st_size,
-        sha256=file_sha256(path),
-        level=probe_video(path).level,
+    video = video_entry(path)
+    texture = Texture(
         width=layout.width,
         height=layout.height,
         colour_rect=layout.colour_rect,
         alpha_rect=layout.alpha_rect,
         frames=frames,
         fps=float(rate),
-        layer_resolution=layout.resolution,
+        videos=(video,),
+    )
+    size = sum(entry.bytes for entry in entries) + video.bytes
+    return Level(name=name, layers=entries, texture=texture, bytes=size)
+
+
+def _write_layer(path: Path, layer: CroppedLayer, rect: Rect, params: CompressParams) -> Layer:
+    data, decoded = encode_mesh(layer.mesh, params.mesh)
+    path.write_bytes(data)
+    return Layer(
+        mesh=path.name,
+        vertices=len(decoded.vertices),
+        triangles=len(decoded.faces),
+        bytes=len(data),
+        sha256=hashlib.sha256(data).hexdigest(),
+        texture_rect=rect,
+        uv_window=layer.window,
+    )
+
+
+def video_entry(path: Path) -> Video:
+    """The manifest's entry for a video file."""
+    facts = probe_video(path)
+    return Video(
+        file=path.name,
+        bytes=path.stat().st_size,
+        sha256=file_sha256(path),
+        container="mp4",
+        codec="h264",
+        mime=facts.mime,
+        level=facts.level,
     )
 
 

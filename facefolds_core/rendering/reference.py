@@ -20,7 +20,8 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 
 Image = NDArray[np.float32]
-Textures = NDArray[np.uint8]
+Texture = NDArray[np.uint8]
+"""(h, w, 4) RGBA, straight alpha; sizes may differ between layers."""
 
 BLACK = (0.0, 0.0, 0.0)
 
@@ -41,8 +42,8 @@ class Layered(Protocol):
 
     @property
     def layers(self) -> Sequence[Mesh]: ...
-    def frame(self, k: int) -> Textures:
-        """(N, R, R, 4) uint8, straight alpha."""
+    def frame(self, k: int, /) -> Sequence[Texture]:
+        """N textures, straight alpha."""
         ...
 
 
@@ -80,7 +81,7 @@ class AssetCaster:
         return Hits(hit.reshape(image), st.reshape(*image, 2))
 
 
-def sample_texture(texture: Textures, st: NDArray[np.float32]) -> Image:
+def sample_texture(texture: Texture, st: NDArray[np.float32]) -> Image:
     """Bilinear look-up, clamped to the edge texels' centres.
 
     Args:
@@ -101,12 +102,12 @@ def sample_texture(texture: Textures, st: NDArray[np.float32]) -> Image:
     return np.asarray(((1 - fy) * upper + fy * lower) / np.float32(255), np.float32)
 
 
-def composite(hits: Hits, textures: Textures, background: ArrayLike = BLACK) -> tuple[Image, Image]:
+def composite(hits: Hits, textures: Sequence[Texture], background: ArrayLike = BLACK) -> tuple[Image, Image]:
     """C = sum_i alpha_i c_i prod_{k<i} (1 - alpha_k) + transmittance * background, in stored values.
 
     Args:
         hits: of one camera.
-        textures: (N, R, R, 4) uint8, one frame of all layers.
+        textures: N textures (h, w, 4) uint8, one frame of all layers.
         background: RGB in [0, 1], (3,) or (H, W, 3).
 
     Returns:

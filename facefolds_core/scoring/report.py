@@ -78,8 +78,9 @@ def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
     """
     training = _read(Training, folders.model / "training.json")
     timings = [_read(Timing, folders.timing(stage)) for stage in EXPORT_STAGES]
-    vertices, triangles = sum(x.vertices for x in manifest.layers), sum(x.triangles for x in manifest.layers)
-    picture = manifest.texture.width * manifest.texture.height
+    level = manifest.full
+    vertices, triangles = sum(x.vertices for x in level.layers), sum(x.triangles for x in level.layers)
+    picture = level.texture.width * level.texture.height
     return {
         "train_seconds": round(training.seconds, 3),
         "iterations": training.iterations,
@@ -87,8 +88,8 @@ def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
         "export_seconds": round(sum(t.seconds for t in timings), 3),
         "vertices": vertices,
         "triangles": triangles,
-        "mesh_bytes": sum(x.bytes for x in manifest.layers),
-        "texture_bytes": manifest.texture.bytes,
+        "mesh_bytes": sum(x.bytes for x in level.layers),
+        "texture_bytes": level.texture.videos[0].bytes,
         "gpu_bytes": VERTEX_BYTES * vertices + 3 * INDEX_BYTES * triangles + PIXEL_BYTES * picture,
     }
 

@@ -16,7 +16,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CompressParams
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
-from tests.assets import WINDOW, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
 
@@ -41,11 +41,12 @@ def folders(tmp_path: Path) -> SubjectFolders:
 
 def test_makes_a_sound_asset(folders: SubjectFolders) -> None:
     line = compress(folders)
-    assert "3 meshes" in line and "2 frames" in line and str(folders.asset) in line
+    assert "3 of 3 meshes" in line and "2 frames" in line and str(folders.asset) in line
     assert validate_asset(folders.asset) == []
     manifest = read_asset(folders.asset).manifest
-    assert (manifest.subject, manifest.texture.fps) == ("caps", 25.0)
-    assert [layer.uv_window for layer in manifest.layers] == [WINDOW] * 3
+    assert (manifest.subject, manifest.full.texture.fps) == ("caps", 25.0)
+    crops = cap_crops(3, 2, 64)
+    assert [layer.uv_window for layer in manifest.full.layers] == [crop.window for crop in crops]
 
 
 def test_to_capture_undoes_the_normalisation(folders: SubjectFolders) -> None:

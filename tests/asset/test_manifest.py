@@ -35,24 +35,42 @@ def test_schema_is_valid_and_accepts_a_manifest(path: Path) -> None:
     jsonschema.Draft202012Validator(schema).validate(json.loads(path.read_text()))
 
 
+EFFECTS: dict[str, Any] = {
+    "file": "full_effects.png",
+    "bytes": 9,
+    "sha256": "0" * 64,
+    "basis": "sh1",
+    "scale": 0.5,
+    "width": 4,
+    "height": 12,
+    "planes": [[0, 0, 4, 4], [0, 4, 4, 4], [0, 8, 4, 4]],
+}
+
+
 def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Manifests that break one rule each."""
     edits: dict[str, tuple[list[Any], Any]] = {
         "format": (["format"], "gltf"),
-        "version": (["version"], 2),
-        "no layers": (["layers"], []),
-        "negative rect": (["layers", 0, "texture_rect", 0], -2),
-        "short rect": (["layers", 0, "texture_rect"], [0, 0, 64]),
-        "window": (["layers", 0, "uv_window", 1], 1.5),
-        "path": (["layers", 0, "mesh"], "../layer_00.drc"),
-        "hash": (["texture", "sha256"], "0" * 63),
-        "count as text": (["texture", "frames"], "5"),
-        "codec": (["texture", "codec"], "vp9"),
-        "fps": (["texture", "fps"], 0),
+        "version": (["version"], 1),
+        "no levels": (["levels"], []),
+        "level name": (["levels", 0, "name"], "Full"),
+        "no layers": (["levels", 0, "layers"], []),
+        "no videos": (["levels", 0, "texture", "videos"], []),
+        "negative rect": (["levels", 0, "layers", 0, "texture_rect", 0], -2),
+        "short rect": (["levels", 0, "layers", 0, "texture_rect"], [0, 0, 64]),
+        "window": (["levels", 0, "layers", 0, "uv_window", 1], 1.5),
+        "path": (["levels", 0, "layers", 0, "mesh"], "../layer_00.drc"),
+        "hash": (["levels", 0, "texture", "videos", 0, "sha256"], "0" * 63),
+        "count as text": (["levels", 0, "texture", "frames"], "5"),
+        "codec": (["levels", 0, "texture", "videos", 0, "codec"], "mpeg2"),
+        "fps": (["levels", 0, "texture", "fps"], 0),
         "culling": (["compositing", "culling"], "back"),
         "rotation": (["coordinates", "to_capture", "rotation"], [[1, 0], [0, 1]]),
         "scale": (["coordinates", "to_capture", "scale"], 0),
-        "unknown key": (["texture", "colour"], 1),
+        "no effects": (["levels", 0, "layers", 0, "effects_rect"], None),
+        "basis": (["levels", 0, "view_effects"], EFFECTS | {"basis": "sh9"}),
+        "planes": (["levels", 0, "view_effects"], EFFECTS | {"planes": [[0, 0, 4, 4]]}),
+        "unknown key": (["levels", 0, "texture", "colour"], 1),
     }
     made = {}
     for name, (place, new) in edits.items():
@@ -62,7 +80,16 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
             inner = inner[key]
         inner[place[-1]] = new
         made[name] = copied
-    for place in (("subject",), ("compositing", "order"), ("texture", "codec"), ("coordinates", "to_capture")):
+    lacking: tuple[tuple[Any, ...], ...] = (
+        ("subject",),
+        ("audio",),
+        ("photos",),
+        ("compositing", "order"),
+        ("levels", 0, "view_effects"),
+        ("levels", 0, "texture", "videos", 0, "codec"),
+        ("coordinates", "to_capture"),
+    )
+    for place in lacking:
         copied = copy.deepcopy(value)
         inner = copied
         for key in place[:-1]:
@@ -79,6 +106,21 @@ def test_schema_and_models_refuse_the_same(path: Path, tmp_path: Path) -> None:
         (tmp_path / "manifest.json").write_text(json.dumps(value))
         with pytest.raises(UserError):
             parse_manifest(tmp_path / "manifest.json")
+
+
+def test_schema_and_models_accept_all_that_may_be_there(path: Path, tmp_path: Path) -> None:
+    value = json.loads(path.read_text())
+    stored = {"file": "a.x", "bytes": 1, "sha256": "0" * 64}
+    poster = stored | {"width": 4, "height": 4}
+    row = [1.0, 0.0, 0.0]
+    photo = poster | {"camera": "a", "frame": 0, "K": [row] * 3, "w2c": [[*row, 0.0]] * 3}
+    value |= {"audio": stored, "poster": poster, "photos": [photo]}
+    level = value["levels"][0] | {"view_effects": EFFECTS, "quality": {"psnr_to_model": 40.0}}
+    level["layers"] = [layer | {"effects_rect": [0, 0, 1, 1]} for layer in level["layers"]]
+    value["levels"] = [level]
+    jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text())).validate(value)
+    (tmp_path / "manifest.json").write_text(json.dumps(value))
+    assert parse_manifest(tmp_path / "manifest.json").model_dump(mode="json") == value
 
 
 def test_checksum_of_the_manifest(path: Path) -> None:
@@ -98,12 +140,19 @@ def test_not_a_manifest(tmp_path: Path, text: str, word: str) -> None:
         parse_manifest(tmp_path / "manifest.json")
 
 
+def test_version_1_is_refused_in_plain_words(path: Path, tmp_path: Path) -> None:
+    (tmp_path / "manifest.json").write_text(json.dumps({"format": "facefolds", "version": 1, "layers": []}))
+    with pytest.raises(UserError, match="another format version") as caught:
+        parse_manifest(tmp_path / "manifest.json")
+    assert (caught.value.expected, caught.value.found) == (2, 1)
+
+
 def test_another_version_is_said_in_plain_words(path: Path, tmp_path: Path) -> None:
     value = json.loads(path.read_text()) | {"version": 7, "something": "new"}
     (tmp_path / "manifest.json").write_text(json.dumps(value))
     with pytest.raises(UserError, match="another format version") as caught:
         parse_manifest(tmp_path / "manifest.json")
-    assert (caught.value.expected, caught.value.found) == (1, 7)
+    assert (caught.value.expected, caught.value.found) == (2, 7)
 
 
 def test_generator_is_the_projects_version() -> None:

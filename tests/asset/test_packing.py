@@ -5,26 +5,59 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.packing import (
+    GUTTER,
+    HARDWARE_SIDE,
+    MIN_SIDE,
+    MIP_LEVELS,
+    AtlasLayout,
+    check_layout,
+    fill_cell,
+)
 from facefolds_core.asset.video import pack_frame, unpack_picture
 from facefolds_core.errors import UserError
 from tests.assets import cap_textures
 
+SIZES = {
+    "one": [(40, 25)],
+    "equal": [(56, 56)] * 12,
+    "narrow": [(9, 200), (200, 9), (31, 33)],
+    "many": [(20 + 7 * (i % 9), 90 - 11 * (i % 5)) for i in range(64)],
+}
 
-@pytest.mark.parametrize(
-    ("layers", "grid"), [(1, (1, 1)), (2, (2, 1)), (3, (2, 2)), (5, (3, 2)), (9, (3, 3)), (12, (4, 3)), (64, (8, 8))]
-)
-def test_grid_is_nearly_square(layers: int, grid: tuple[int, int]) -> None:
-    layout = AtlasLayout.grid(layers, 60)
-    assert layout.colour_rect == (0, 0, 64 * grid[0], 64 * grid[1])
 
-
-@pytest.mark.parametrize("layers", [1, 3, 12])
-@pytest.mark.parametrize("resolution", [8, 37, 60, 64])
-def test_layout_has_no_problems(layers: int, resolution: int) -> None:
-    layout = AtlasLayout.grid(layers, resolution)
+@pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
+def test_layout_has_no_problems(sizes: list[tuple[int, int]]) -> None:
+    layout = AtlasLayout.pack(sizes)
     assert layout.problems() == []
-    assert layout.width % 16 == 0 and layout.colour_rect[3] % 16 == 0
+    assert [rect[2:] for rect in layout.rects] == sizes
+    assert layout.width % 16 == layout.colour_rect[3] % 16 == 0
+    assert min(layout.width, layout.height) >= MIN_SIDE
+
+
+def test_equal_layers_waste_nothing() -> None:
+    layout = AtlasLayout.pack([(56, 56)] * 12)
+    assert layout.pixels == 2 * 12 * 64**2
+    assert layout.long_side <= 512
+
+
+@pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
+def test_mip_maps_do_not_mix_layers(sizes: list[tuple[int, int]]) -> None:
+    """Bilinear look-ups in the box-filtered levels, at the corners of each clamped rectangle, see this layer only."""
+    layout = AtlasLayout.pack(sizes)
+    textures = [np.full((h, w, 1), 3 * i + 1, np.uint8) for i, (w, h) in enumerate(sizes)]
+    image = np.zeros((layout.colour_rect[3], layout.width))
+    for i, ((x, y, _, _), texture) in enumerate(zip(layout.rects, textures, strict=True)):
+        cell = fill_cell(texture)[..., 0]
+        image[y - GUTTER : y - GUTTER + cell.shape[0], x - GUTTER : x - GUTTER + cell.shape[1]] = 3 * i + 1
+    for level in range(1, MIP_LEVELS + 1):
+        n = 2**level
+        small = image.reshape(image.shape[0] // n, n, image.shape[1] // n, n).mean((1, 3))
+        for i, (x, y, w, h) in enumerate(layout.rects):
+            for px in (x + 0.5, x + w - 0.5):
+                for py in (y + 0.5, y + h - 0.5):
+                    j, k = int(np.floor(px / n - 0.5)), int(np.floor(py / n - 0.5))
+                    assert (small[k : k + 2, j : j + 2] == 3 * i + 1).all(), (level, i)
 
 
 @pytest.mark.parametrize("resolution", [37, 60, 64])
@@ -33,8 +66,8 @@ def test_round_trip_of_grey_is_within_rounding(resolution: int) -> None:
     grey = rng.integers(0, 256, (3, resolution, resolution, 1), dtype=np.uint8)
     alpha = rng.integers(0, 256, grey.shape, dtype=np.uint8)
     textures = np.concatenate([grey, grey, grey, alpha], -1)
-    layout = AtlasLayout.grid(3, resolution)
-    back = unpack_picture(pack_frame(textures, layout), layout)
+    layout = AtlasLayout.pack([(resolution, resolution)] * 3)
+    back = np.stack(unpack_picture(pack_frame(list(textures), layout), layout))
     assert np.abs(back.astype(int) - textures).max() <= 2
 
 
@@ -42,16 +75,16 @@ def test_round_trip_of_grey_is_within_rounding(resolution: int) -> None:
 def test_neighbours_do_not_leak(resolution: int) -> None:
     colours = np.array([[255, 0, 0, 255], [0, 255, 0, 0], [0, 0, 255, 255], [255, 255, 0, 0]], np.uint8)
     textures = np.broadcast_to(colours[:, None, None], (4, resolution, resolution, 4))
-    layout = AtlasLayout.grid(4, resolution)
-    back = unpack_picture(pack_frame(textures, layout), layout)
+    layout = AtlasLayout.pack([(resolution, resolution)] * 4)
+    back = np.stack(unpack_picture(pack_frame(list(textures), layout), layout))
     assert np.abs(back.astype(int) - textures).max() <= 2
 
 
 def test_neighbours_do_not_leak_into_chroma_centred_across() -> None:
     # A player that takes chroma for centred reads half a pixel to the side: still within the gutter.
     textures = cap_textures(3, 0, 64)
-    layout = AtlasLayout.grid(3, 64)
-    picture = pack_frame(textures, layout)
+    layout = AtlasLayout.pack([(64, 64)] * 3)
+    picture = pack_frame(list(textures), layout)
     cb = picture[layout.height :].reshape(2, layout.height // 2, layout.width // 2)[0]
     for x, y, w, h in layout.rects:
         inside = cb[y // 2 : (y + h) // 2, x // 2 : (x + w) // 2]
@@ -60,18 +93,22 @@ def test_neighbours_do_not_leak_into_chroma_centred_across() -> None:
 
 
 def test_paper_size_fits() -> None:
-    check_layout(AtlasLayout.grid(12, 1024))
+    check_layout(AtlasLayout.pack([(1024, 1024)] * 12), 1024)
+
+
+def test_hardware_limit_decides_between_shapes() -> None:
+    assert AtlasLayout.pack([(1016, 600)] * 12).long_side <= HARDWARE_SIDE
 
 
 def test_too_large_a_picture_names_the_resolution_that_fits() -> None:
     with pytest.raises(UserError, match="do not fit") as caught:
-        check_layout(AtlasLayout.grid(12, 2048))
-    largest = int(str(caught.value.remedy).split(" to ")[1].split()[0])
-    assert AtlasLayout.grid(12, largest).fits() and not AtlasLayout.grid(12, largest + 1).fits()
+        check_layout(AtlasLayout.pack([(2048, 2048)] * 12), 2048)
+    named = int(str(caught.value.remedy).split(" to ")[1].split()[0])
+    assert named > 1024 and AtlasLayout.pack([(named, named)] * 12).fits()
 
 
 def test_problems_are_found() -> None:
-    good = AtlasLayout.grid(2, 64)
+    good = AtlasLayout.pack([(64, 64)] * 2)
     x, y, w, h = good.rects[1]
     moved = [
         (

@@ -21,7 +21,7 @@ from facefolds_core.asset.writer import file_sha256
 from facefolds_core.errors import UserError
 from tests.assets import cap_mesh, make_asset
 
-FILES = ["manifest.json", "layer_00.drc", "layer_01.drc", "texture.mp4"]
+FILES = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"]
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +52,27 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
     write_manifest(Manifest.model_validate_json(json.dumps(value)), folder / "manifest.json")
 
 
+def video(value: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = value["levels"][0]["texture"]["videos"][0]
+    return found
+
+
+def add_up(value: dict[str, Any]) -> None:
+    """Correct the level's total after a change of a file's size."""
+    level = value["levels"][0]
+    level["bytes"] = sum(entry["bytes"] for entry in [*level["layers"], *level["texture"]["videos"]])
+
+
 def replace_mesh(folder: Path, data: bytes, vertices: int, triangles: int) -> None:
-    path = folder / "layer_01.drc"
+    path = folder / "full_01.drc"
     path.write_bytes(data)
     entry = {"bytes": len(data), "sha256": file_sha256(path), "vertices": vertices, "triangles": triangles}
-    edit(folder, lambda value: value["layers"][1].update(entry))
+
+    def change(value: dict[str, Any]) -> None:
+        value["levels"][0]["layers"][1].update(entry)
+        add_up(value)
+
+    edit(folder, change)
 
 
 def draco(vertices: np.ndarray, faces: np.ndarray, st: np.ndarray | None) -> bytes:
@@ -108,38 +124,63 @@ def test_flipped_bits(asset: Path, file: str) -> None:
 
 @pytest.mark.parametrize("key", ["vertices", "triangles"])
 def test_wrong_mesh_counts(asset: Path, key: str) -> None:
-    edit(asset, lambda value: value["layers"][1].update({key: value["layers"][1][key] + 1}))
-    assert_found(asset, "layer_01.drc", key)
+    edit(asset, lambda value: value["levels"][0]["layers"][1].update({key: value["levels"][0]["layers"][1][key] + 1}))
+    assert_found(asset, "full_01.drc", key)
 
 
 @pytest.mark.parametrize("frames", [2, 4])
 def test_wrong_number_of_frames(asset: Path, frames: int) -> None:
-    edit(asset, lambda value: value["texture"].update(frames=frames))
-    assert_found(asset, "texture.mp4", "3 frames")
+    edit(asset, lambda value: value["levels"][0]["texture"].update(frames=frames))
+    assert_found(asset, "full.mp4", "3 frames")
 
 
 def test_wrong_rate(asset: Path) -> None:
-    edit(asset, lambda value: value["texture"].update(fps=25.0))
+    edit(asset, lambda value: value["levels"][0]["texture"].update(fps=25.0))
     assert any("frames a second" in problem for problem in validate_asset(asset))
 
 
 def test_wrong_video_size(asset: Path) -> None:
-    edit(asset, lambda value: value["texture"].update(width=value["texture"]["width"] + 16))
-    assert_found(asset, "texture.mp4", "width and height")
+    edit(asset, lambda value: value["levels"][0]["texture"].update(width=value["levels"][0]["texture"]["width"] + 16))
+    assert_found(asset, "full.mp4", "width and height")
 
 
 def test_rect_outside(asset: Path) -> None:
-    edit(asset, lambda value: value["layers"][1].update(texture_rect=[130, 2, 64, 64]))
+    edit(asset, lambda value: value["levels"][0]["layers"][1].update(texture_rect=[130, 4, 64, 64]))
     assert_found(asset, "manifest.json", "not inside")
 
 
 def test_rects_overlap(asset: Path) -> None:
-    edit(asset, lambda value: value["layers"][1].update(texture_rect=value["layers"][0]["texture_rect"]))
+    edit(
+        asset,
+        lambda value: value["levels"][0]["layers"][1].update(
+            texture_rect=value["levels"][0]["layers"][0]["texture_rect"]
+        ),
+    )
     assert_found(asset, "manifest.json", "overlap")
 
 
+def test_wrong_total(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][0].update(bytes=value["levels"][0]["bytes"] + 1))
+    assert_found(asset, "manifest.json", "those of its files")
+
+
+def test_two_levels_of_one_name(asset: Path) -> None:
+    edit(asset, lambda value: value.update(levels=value["levels"] * 2))
+    assert_found(asset, "manifest.json", "one name")
+
+
+def test_effects_rect_without_effects(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][0]["layers"][0].update(effects_rect=[0, 0, 4, 4]))
+    assert_found(asset, "manifest.json", "without view_effects")
+
+
+def test_wrong_mime_type(asset: Path) -> None:
+    edit(asset, lambda value: video(value).update(mime='video/mp4; codecs="avc1.42001e"'))
+    assert any("MIME type" in problem for problem in validate_asset(asset))
+
+
 def test_empty_window(asset: Path) -> None:
-    edit(asset, lambda value: value["layers"][0].update(uv_window=[0.5, 0.5, -1.0, 1.0]))
+    edit(asset, lambda value: value["levels"][0]["layers"][0].update(uv_window=[0.5, 0.5, -1.0, 1.0]))
     assert_found(asset, "manifest.json", "uv_window")
 
 
@@ -151,13 +192,13 @@ def test_rotation_that_is_none(asset: Path) -> None:
 def test_texture_coordinates_outside(asset: Path) -> None:
     mesh = cap_mesh(0.3, 4)
     replace_mesh(asset, draco(mesh.vertices, mesh.faces, mesh.st * 1.5), 16, 18)
-    assert_found(asset, "layer_01.drc", "outside [0, 1]")
+    assert_found(asset, "full_01.drc", "outside [0, 1]")
 
 
 def test_no_texture_coordinates(asset: Path) -> None:
     mesh = cap_mesh(0.3, 4)
     replace_mesh(asset, draco(mesh.vertices, mesh.faces, None), 16, 18)
-    assert_found(asset, "layer_01.drc", "no texture coordinates")
+    assert_found(asset, "full_01.drc", "no texture coordinates")
 
 
 def test_vertices_not_finite(asset: Path) -> None:
@@ -165,7 +206,7 @@ def test_vertices_not_finite(asset: Path) -> None:
     vertices = mesh.vertices.copy()
     vertices[5, 2] = np.nan
     replace_mesh(asset, draco(vertices, mesh.faces, mesh.st), 16, 18)
-    assert_found(asset, "layer_01.drc", "not finite")
+    assert_found(asset, "full_01.drc", "not finite")
 
 
 def test_degenerate_face(asset: Path) -> None:
@@ -178,22 +219,22 @@ def test_degenerate_face(asset: Path) -> None:
 
 def test_not_a_mesh(asset: Path) -> None:
     replace_mesh(asset, b"something else" * 9, 16, 18)
-    assert_found(asset, "layer_01.drc", "not a Draco mesh")
+    assert_found(asset, "full_01.drc", "not a Draco mesh")
 
 
 def test_file_that_the_manifest_does_not_name(asset: Path) -> None:
-    (asset / "layer_02.drc").write_bytes(b"")
-    assert validate_asset(asset) == ["layer_02.drc: not named in the manifest"]
+    (asset / "full_02.drc").write_bytes(b"")
+    assert validate_asset(asset) == ["full_02.drc: not named in the manifest"]
 
 
 def test_damaged_video_with_a_matching_checksum_is_no_traceback(asset: Path) -> None:
-    path, rng = asset / "texture.mp4", np.random.default_rng(0)
+    path, rng = asset / "full.mp4", np.random.default_rng(0)
     data, found = path.read_bytes(), 0
     for place in rng.integers(0, 1200, 60):  # the container's header: the most that can be wrong
         flipped = bytearray(data)
         flipped[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(flipped)
-        edit(asset, lambda value: value["texture"].update(sha256=file_sha256(path)))
+        edit(asset, lambda value: video(value).update(sha256=file_sha256(path)))
         found += bool(validate_asset(asset))
     assert found > 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -23,21 +24,21 @@ from facefolds_core.params import VideoCodec
 from tests.assets import cap_textures
 
 FRAMES = 2 * KEYFRAME_INTERVAL + 7
-LAYOUT = AtlasLayout.grid(2, 28)
+LAYOUT = AtlasLayout.pack([(28, 28)] * 2)
 SIZE = (LAYOUT.width, LAYOUT.height)
 
 
-def numbered(frame: int) -> np.ndarray:
-    """(2, 28, 28, 4): six patches, black or white, spell the frame's number in binary; alpha is its complement."""
+def numbered(frame: int) -> list[np.ndarray]:
+    """Two of (28, 28, 4): six patches, black or white, spell the frame's number in binary; alpha is its complement."""
     bits = np.array([frame >> bit & 1 for bit in range(6)]).reshape(2, 3) * 255
     image = np.zeros((28, 28), np.uint8)
     image[:24, :24] = np.kron(bits, np.ones((12, 8)))
     texture = np.stack([image, image, image, 255 - image], -1).astype(np.uint8)
-    return np.stack([texture, texture])
+    return [texture, texture]
 
 
-def number_of(textures: np.ndarray, channel: int) -> int:
-    patches = textures[0, [6, 6, 6, 18, 18, 18], [4, 12, 20, 4, 12, 20], channel]
+def number_of(textures: Sequence[np.ndarray], channel: int) -> int:
+    patches = textures[0][[6, 6, 6, 18, 18, 18], [4, 12, 20, 4, 12, 20], channel]
     bits = patches > 127 if channel < 3 else patches <= 127
     return sum(int(bit) << place for place, bit in enumerate(bits))
 
@@ -97,11 +98,11 @@ def test_header_comes_first(video: Path) -> None:
 
 
 def test_quality_at_the_default_setting(tmp_path: Path) -> None:
-    layout = AtlasLayout.grid(3, 124)
+    layout = AtlasLayout.pack([(124, 124)] * 3)
     frames = np.stack([cap_textures(3, k, 124) for k in range(4)])
     path, size = tmp_path / "texture.mp4", (layout.width, layout.height)
-    encode_video(path, (pack_frame(frame, layout) for frame in frames), size, Fraction(30), VideoCodec())
-    back = np.stack([unpack_picture(picture, layout) for picture in decode_video(path, size, 30.0)])
+    encode_video(path, (pack_frame(list(frame), layout) for frame in frames), size, Fraction(30), VideoCodec())
+    back = np.stack([np.stack(unpack_picture(picture, layout)) for picture in decode_video(path, size, 30.0)])
     error = (back.astype(float) - frames) ** 2
     colour, alpha = 10 * np.log10(255**2 / error[..., :3].mean()), 10 * np.log10(255**2 / error[..., 3].mean())
     assert colour > 40 and alpha > 43, (colour, alpha)
@@ -111,9 +112,9 @@ def test_flat_alpha_extremes_survive(tmp_path: Path) -> None:
     textures = np.full((2, 28, 28, 4), 100, np.uint8)
     textures[0, ..., 3], textures[1, ..., 3] = 0, 255
     path = tmp_path / "texture.mp4"
-    encode_video(path, [pack_frame(textures, LAYOUT)] * 3, SIZE, Fraction(30), VideoCodec())
+    encode_video(path, [pack_frame(list(textures), LAYOUT)] * 3, SIZE, Fraction(30), VideoCodec())
     for picture in decode_video(path, SIZE, 30.0):
-        alpha = unpack_picture(picture, LAYOUT)[..., 3]
+        alpha = np.stack(unpack_picture(picture, LAYOUT))[..., 3]
         assert alpha[0].max() <= 1 and alpha[1].min() >= 254
 
 

@@ -132,8 +132,8 @@ DAMAGE = [
     ("compress", "meshes/meshes.npz"),
     ("compress", "textures/textures.arrow"),
     ("evaluate", "asset/manifest.json"),
-    ("evaluate", "asset/texture.mp4"),
-    ("evaluate", "asset/layer_00.drc"),
+    ("evaluate", "asset/full.mp4"),
+    ("evaluate", "asset/full_00.drc"),
     ("evaluate", "model/training.json"),
 ]
 

@@ -1,0 +1,87 @@
+"""What is cropped and dropped shows in no picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from facefolds_core.asset.cropping import ALPHA_BOUND, crop_layers
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import st_to_uv
+from facefolds_core.rendering.reference import AssetCaster, composite
+from tests.assets import CENTRE, WINDOW, cap_mesh
+from tests.scenes import look_at_origin
+
+SIZE = 48
+
+
+class Store:
+    """Textures (K, N, R, R, 4)."""
+
+    def __init__(self, frames: np.ndarray) -> None:
+        self.frames = frames
+
+    def image(self, layer: int, frame: int, /) -> np.ndarray:
+        return np.asarray(self.frames[frame, layer])
+
+
+class Shown:
+    """What the caster needs."""
+
+    def __init__(self, layers: list[TexturedMesh]) -> None:
+        self.layers = layers
+
+    def frame(self, k: int, /) -> list[np.ndarray]:
+        raise NotImplementedError
+
+
+def patches(boxes: list[tuple[int, int, int, int]], alpha: int = 200) -> np.ndarray:
+    """(1, N, R, R, 4): noise that is opaque within (left, right, top, bottom) only."""
+    frames = np.random.default_rng(0).integers(0, 256, (1, len(boxes), SIZE, SIZE, 4), dtype=np.uint8)
+    frames[..., 3] = 0
+    for layer, (left, right, top, bottom) in enumerate(boxes):
+        frames[0, layer, top:bottom, left:right, 3] = alpha
+    return frames
+
+
+def test_rendering_is_unchanged() -> None:
+    frames = patches([(10, 30, 5, 12), (0, 7, 40, 48), (20, 21, 20, 21)])
+    meshes = [cap_mesh(0.4 - 0.03 * i, vertices_a_side=17) for i in range(3)]
+    crops = crop_layers(meshes, [WINDOW] * 3, Store(frames), 1)
+    assert all(len(crop.mesh.faces) < len(meshes[0].faces) / 3 for crop in crops)
+    camera = look_at_origin("front", 5, 5, 64)
+    before = composite(AssetCaster(Shown(meshes)).cast(camera), list(frames[0]))
+    textures = [crop.cut(frames[0, crop.source]) for crop in crops]
+    after = composite(AssetCaster(Shown([crop.mesh for crop in crops])).cast(camera), textures)
+    assert before[1].max() > 0.5
+    for a, b in zip(before, after, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+
+
+def test_window_belongs_to_the_crop() -> None:
+    (crop,) = crop_layers([cap_mesh(0.4)], [WINDOW], Store(patches([(10, 30, 5, 12)])), 1)
+    uv = st_to_uv(crop.mesh.st.astype(np.float64), crop.window)
+    offset = crop.mesh.vertices - np.array(CENTRE)
+    n = offset / np.linalg.norm(offset, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.arcsin(n[:, 2]) * 2 / np.pi, uv[:, 0], atol=1e-5)
+    np.testing.assert_allclose(np.arctan2(n[:, 1], n[:, 0]) * 2 / np.pi, uv[:, 1], atol=1e-5)
+
+
+def test_a_layer_below_the_bound_goes_and_one_above_stays() -> None:
+    frames = np.concatenate([patches([(0, 48, 0, 48)] * 2, alpha=ALPHA_BOUND)] * 3)
+    frames[2, 1, 7, 9, 3] = ALPHA_BOUND + 1
+    crops = crop_layers([cap_mesh(0.4), cap_mesh(0.37)], [WINDOW] * 2, Store(frames), 3)
+    assert [crop.source for crop in crops] == [1]
+
+
+def test_an_opaque_layer_stays_bit_for_bit() -> None:
+    mesh = cap_mesh(0.4)
+    (crop,) = crop_layers([mesh], [WINDOW], Store(patches([(0, 48, 0, 48)])), 1)
+    assert crop.crop == (0, 0, SIZE, SIZE) and crop.window == WINDOW
+    assert crop.mesh.st.tobytes() == mesh.st.tobytes() and crop.mesh.vertices.tobytes() == mesh.vertices.tobytes()
+
+
+def test_nothing_to_show_is_said() -> None:
+    with pytest.raises(UserError, match="transparent"):
+        crop_layers([cap_mesh(0.4)], [WINDOW], Store(patches([(0, 0, 0, 0)])), 1)
