@@ -96,7 +96,7 @@ export class Player extends EventTarget {
     this.renderer.setVisible(this.visible);
     this.#show(frame, picture);
     if (!old) {
-      this.view.setHome(this.renderer.bounds(), this.size[0] / Math.max(1, this.size[1]));
+      this.view.setHome(this.renderer.bounds());
       this.view.reset();
     }
     this.#draw();

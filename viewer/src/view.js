@@ -4,7 +4,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { orbitOf, positionOf, projectionOf, viewOf } from "./camera.js";
 
 const FIELD_OF_VIEW = 30; // degrees, of the shorter side
-const FILL = 0.82; // radius of what is seen when it fits, in those of its bounding sphere: corners of the sphere are empty
+const HOME_DISTANCE = 1.2; // the subject is at the origin, the capture's cameras about 1 unit from it
 
 export class View {
   /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange */
@@ -26,11 +26,11 @@ export class View {
     if (!this.exact) this.controls.update();
   }
 
-  /** @param {import("three").Sphere} bounds what the first view shows whole, from the front */
-  setHome(bounds, aspect) {
-    const half = Math.tan((FIELD_OF_VIEW / 360) * Math.PI) * Math.min(1, aspect);
-    const distance = (FILL * bounds.radius) / half;
-    this.home = { azimuth: 0, elevation: 0, distance, target: bounds.center.toArray() };
+  /** The first view: the subject from the front; nearer if all there is is small. @param {import("three").Sphere} bounds */
+  setHome(bounds) {
+    const fitting = bounds.radius / Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
+    const home = { azimuth: 0, elevation: 0, distance: HOME_DISTANCE, target: [0, 0, 0] };
+    this.home = fitting < HOME_DISTANCE ? { ...home, distance: fitting, target: bounds.center.toArray() } : home;
   }
 
   reset() {
