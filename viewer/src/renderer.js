@@ -11,7 +11,7 @@ import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, VERTEX, WIRE_FRAGMENT } from "./shader
 
 THREE.ColorManagement.enabled = false;
 
-const SPREAD_STEP = 0.35; // units between the outermost and the innermost layer when fully pulled apart, a layer more each
+const SPREAD = { step: 0.35, all: 2 }; // units from layer to layer when fully pulled apart, and at most from end to end
 
 export class LayerRenderer {
   /** @param {HTMLCanvasElement} canvas @throws {PlayerError} if there is no WebGL 2 */
@@ -125,8 +125,9 @@ export class LayerRenderer {
 
   #place() {
     const middle = (this.layers.length - 1) / 2;
+    const step = this.spread * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1));
     this.layers.forEach((layer, i) => {
-      layer.shared.shift.value.set(this.spread * SPREAD_STEP * (middle - i), 0, 0);
+      layer.shared.shift.value.set(step * (middle - i), 0, 0);
       layer.meshes.forEach((mesh, pass) => (mesh.visible = layer.visible && (pass < 2 || this.wireframe)));
       if (layer.colour.effectsScale) layer.colour.effectsScale.value = this.effectsOn ? this.level.info.effects.scale : 0;
     });

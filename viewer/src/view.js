@@ -4,7 +4,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { orbitOf, positionOf, projectionOf, viewOf } from "./camera.js";
 
 const FIELD_OF_VIEW = 30; // degrees, of the shorter side
-const HOME_DISTANCE = 1.2; // the subject is at the origin, the capture's cameras about 1 unit from it
+const HOME_DISTANCE = 1; // the subject is at the origin, the capture's cameras about 1 unit from it
 
 export class View {
   /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange */
@@ -29,8 +29,9 @@ export class View {
   /** The first view: the subject from the front; nearer if all there is is small. @param {import("three").Sphere} bounds */
   setHome(bounds) {
     const fitting = bounds.radius / Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
-    const home = { azimuth: 0, elevation: 0, distance: HOME_DISTANCE, target: [0, 0, 0] };
-    this.home = fitting < HOME_DISTANCE ? { ...home, distance: fitting, target: bounds.center.toArray() } : home;
+    const distance = HOME_DISTANCE * Math.sqrt(Math.max(0.5, Math.min(1, this.camera.aspect))); // heads are upright
+    const home = { azimuth: 0, elevation: 0, distance, target: [0, 0, 0] };
+    this.home = fitting < distance ? { ...home, distance: fitting, target: bounds.center.toArray() } : home;
   }
 
   reset() {

@@ -21,10 +21,7 @@ export function connectKeys(element) {
     "+": zoom(1 / ZOOM), "=": zoom(1 / ZOOM), "-": zoom(ZOOM), 0: act("reset"), w: flip("wireframe"), e: flip("effects"),
     p: () => (element.spread = element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
     c: () => player.manifest?.photos.length && element.actions.compare(),
-    s: () => {
-      element.overlays.showStatistics(!element.overlays.statistics);
-      player.dispatchEvent(new Event("change"));
-    },
+    s: () => element.overlays.showStatistics(!element.overlays.statistics),
     Escape: () => element.compare(null),
   }; // prettier-ignore
   const shifted = {

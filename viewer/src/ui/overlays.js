@@ -70,6 +70,7 @@ export class Overlays {
     this.statistics = on;
     this.find(".stats").hidden = !on;
     if (on) this.#count(true);
+    this.player.dispatchEvent(new Event("change"));
   }
 
   #count(now = false) {

@@ -62,12 +62,12 @@ export class ElementFrames {
   async #seek() {
     this.seeking = true;
     while (this.wish) {
-      const { k, resolve, reject } = this.wish;
-      const failure = await this.#goTo(k).catch((error) => error);
-      if (this.wish?.k !== k) continue;
+      const { wish } = this;
+      const failure = await this.#goTo(wish.k).catch((error) => error);
+      if (this.wish !== wish) continue;
       this.wish = null;
-      if (failure) reject(failure);
-      else resolve(this.video);
+      if (failure) wish.reject(failure);
+      else wish.resolve(this.video);
     }
     this.seeking = false;
   }
