@@ -121,7 +121,7 @@ export class Player extends EventTarget {
   }
 
   play() {
-    if (this.playback.playing) return;
+    if (this.playback.playing || this.playback.frames < 2) return;
     if (!this.playback.loop && this.playback.frame === this.playback.frames - 1) this.seek(0);
     this.playback.playing = true;
     this.#say("play");

@@ -4,7 +4,7 @@
  * rest it seeks to the middle of a frame's time, where rounding of time stamps cannot reach the neighbours.
  */
 
-const PRESENTED = 250; // ms to wait after a seek for word of the frame that is presented
+const PRESENTED = 1500; // ms to wait at most, after a seek, for word of the frame that is presented
 const STUCK = 4000; // ms after which a seek has failed
 
 export class ElementFrames {
@@ -18,7 +18,7 @@ export class ElementFrames {
     this.video = video;
     this.frames = frames;
     this.fps = fps;
-    this.shown = 0; // number of the frame that the element shows
+    this.shown = -1; // number of the frame that the element shows
     this.wish = null; // the latest frame asked for: {k, resolve, reject}
     this.seeking = false;
     this.#note();
@@ -74,6 +74,7 @@ export class ElementFrames {
 
   async #goTo(k) {
     this.video.pause();
+    if (this.shown === k) return;
     const seeked = new Promise((resolve, reject) => {
       this.video.addEventListener("seeked", resolve, { once: true });
       setTimeout(() => reject(new Error(`the video does not seek to frame ${k}`)), STUCK);
