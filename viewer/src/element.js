@@ -201,7 +201,7 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   set layers(visible) {
-    this.#player?.setVisible(visible);
+    this.#player?.hide(visible.flatMap((on, i) => (on ? [] : [i])));
   }
 
   get level() {
@@ -284,7 +284,7 @@ export class FacefoldsPlayer extends HTMLElement {
     for (const key of ["background", "spread", "wireframe", "effects", "speed", "loop"]) {
       if (state[key] !== undefined) this[key] = state[key];
     }
-    if (hidden) this.layers = this.layers.map((_, i) => !hidden.includes(i));
+    if (hidden) this.#player.hide(hidden);
     if (view) this.#player.view.set(view);
     if (level && level !== this.level && this.levels.includes(level)) this.level = level;
     if (photo !== undefined) this.compare(photo);

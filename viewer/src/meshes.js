@@ -25,11 +25,12 @@ export function preloadDecoder() {
  * @returns {Promise<import("three").BufferGeometry>} with index, position and uv
  */
 export async function decodeMesh(buffer, layer, file) {
+  if (new TextDecoder().decode(buffer.slice(0, 5)) !== "DRACO") throw damaged(layer, file, "it is not a Draco mesh");
   let geometry;
   try {
     geometry = await new Promise((resolve, reject) => theDecoder().parse(buffer, resolve, reject));
   } catch (cause) {
-    throw damaged(layer, file, "it is not a Draco mesh", cause);
+    throw damaged(layer, file, "its Draco data cannot be decoded", cause);
   }
   const { position, uv } = geometry.attributes;
   if (!geometry.index || !position || !uv) throw damaged(layer, file, "it lacks triangles or texture coordinates");

@@ -31,6 +31,7 @@ export class Player extends EventTarget {
     this.shown = -1; // the frame in the texture
     this.stale = false; // the canvas needs drawing
     this.lost = false; // the graphics context
+    this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
     this.refused = new Set(); // videos that broke down
@@ -92,8 +93,7 @@ export class Player extends EventTarget {
     const old = this.level;
     this.level = level;
     this.renderer.setLevel(level);
-    if (this.visible.length !== info.layers.length) this.visible = info.layers.map(() => true);
-    this.renderer.setVisible(this.visible);
+    this.#showLayers();
     this.#show(frame, picture);
     if (!old) {
       this.view.setHome(this.renderer.bounds());
@@ -159,10 +159,16 @@ export class Player extends EventTarget {
     return this.seek(this.playback.frame);
   }
 
-  setVisible(visible) {
-    this.visible = visible.slice();
-    this.renderer.setVisible(this.visible);
+  /** @param {number[]} indices of the layers not to draw, outermost first */
+  hide(indices) {
+    this.hidden = new Set(indices);
+    this.#showLayers();
     this.#changed();
+  }
+
+  #showLayers() {
+    this.visible = this.level.info.layers.map((_, i) => !this.hidden.has(i));
+    this.renderer.setVisible(this.visible);
   }
 
   /** @param {"spread" | "wireframe" | "effects" | "background"} name */
@@ -295,6 +301,7 @@ export class Player extends EventTarget {
     });
     this.canvas.addEventListener("webglcontextrestored", async () => {
       this.lost = false;
+      this.renderer.restore();
       if (this.level && !(await this.seek(this.playback.frame))) return;
       this.#say("restored");
     });
@@ -306,6 +313,7 @@ export class Player extends EventTarget {
   }
 
   #fail(error) {
+    if (this.closed) return;
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   }
 

@@ -45,7 +45,13 @@ export class LayerRenderer {
 
   /** @param {number[]} rgba in [0, 1]; alpha 0 lets the page shine through */
   setBackground([r, g, b, a]) {
+    this.background = [r, g, b, a];
     this.three.setClearColor(new THREE.Color(r, g, b), a);
+  }
+
+  /** After a lost context came back: three uploads all again by itself, but forgets the background. */
+  restore() {
+    this.setBackground(this.background);
   }
 
   /**

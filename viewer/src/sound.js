@@ -29,7 +29,10 @@ export class Sound {
   }
 
   close() {
+    const { src } = this.audio;
     this.audio.pause();
-    URL.revokeObjectURL(this.audio.src);
+    this.audio.removeAttribute("src");
+    this.audio.load(); // lets go of what it was still reading, before that is revoked
+    URL.revokeObjectURL(src);
   }
 }

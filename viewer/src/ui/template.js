@@ -60,9 +60,9 @@ export const TEMPLATE = `<style>${style}</style>
   <div class="toast" role="status" aria-live="polite" hidden></div>
   <div class="bar" role="group" aria-label="Playback">
     <div class="buttons">${button("play", "Play", "Space")}${button("back", "Previous frame", "←")}${button("next", "Next frame", "→")}</div>
-    <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><output></output></div>
+    <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><output></output>
+      <select name="speed" aria-label="Speed" title="Speed">${SPEEDS.map((speed) => `<option value="${speed}" ${speed === 1 ? "selected" : ""}>${speed}×</option>`).join("")}</select></div>
     <div class="buttons">
-      <select name="speed" aria-label="Speed" title="Speed">${SPEEDS.map((speed) => `<option value="${speed}" ${speed === 1 ? "selected" : ""}>${speed}×</option>`).join("")}</select>
       ${button("loop", "Loop", "L", 'aria-pressed="true"')}${button("sound", "Sound", "M", 'aria-pressed="false" hidden')}
       ${button("compare", "Compare with a photo", "C", "hidden")}${button("settings", "Settings", "", 'aria-expanded="false"')}
       ${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}

@@ -97,8 +97,9 @@ export class ElementFrames {
   }
 
   close() {
-    URL.revokeObjectURL(this.video.src);
+    const { src } = this.video;
     this.video.removeAttribute("src");
-    this.video.load();
+    this.video.load(); // lets go of what it was still reading, before that is revoked
+    URL.revokeObjectURL(src);
   }
 }
