@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from facefolds_core.errors import UserError
 from facefolds_core.presets import PRESETS
@@ -213,33 +213,80 @@ class MeshCodec(Section):
     Attributes:
         quantization_bits: of positions; 0 stores all floats exactly (the paper's setting).
         texture_coordinate_bits: of texture coordinates, where positions are quantised.
-        compression_level: 0 (fastest, the paper's) to 10.
+        compression_level: 0 (fastest, the paper's, keeps the order of vertices) to 10.
+        max_error_pixels: instead of numbers of bits: the fewest with which, in every training camera, no vertex moves
+            by more than so many pixels, and no texture coordinate by more than so many texels.
     """
+
+    max_error_pixels: Annotated[float, Field(gt=0)] | None = None
 
     quantization_bits: Annotated[int, Field(ge=0, le=24)] = 0
     texture_coordinate_bits: Annotated[int, Field(ge=1, le=24)] = 12
     compression_level: Annotated[int, Field(ge=0, le=10)] = 0
 
 
+CodecName = Literal["h264", "vp9", "av1"]
+
+
 class VideoCodec(Section):
     """Texture video.
 
     Attributes:
-        codec: "h264".
-        crf: constant rate factor; smaller is better and larger.
+        codec: "h264", "vp9" or "av1", or a list of them: one file each with the same pictures, the first one first.
+        crf: constant rate factor on x264's scale (smaller is better and larger); other codecs take the factor of about
+            the same quality on theirs.
+        target_psnr: instead of crf, the quality of rendered training views, dB against those of the textures before
+            the codec; the coarsest factor that reaches it is searched.
+        lossless: no loss beyond 8 bits and 4:2:0. In H.264 that is a profile which few hardware decoders know.
         preset: of libx264: slower ones make smaller files.
+        keyframe_interval: frames between key frames: fewer make smaller files, more make scrubbing faster.
     """
 
-    codec: Literal["h264"] = "h264"
+    codec: tuple[CodecName, ...] = ("h264",)
     crf: Annotated[int, Field(ge=0, le=51)] = 18
+    target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = None
+    lossless: bool = False
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
-        "medium"
+        "slow"
     )
+    keyframe_interval: Positive = 30
+
+    @field_validator("codec", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+    @field_validator("codec")
+    @classmethod
+    def _each_once(cls, value: tuple[CodecName, ...]) -> tuple[CodecName, ...]:
+        if not value or len(set(value)) != len(value):
+            raise ValueError("each codec once, at least one")
+        return value
+
+
+class GlbParams(Section):
+    """The GLB beside the asset: one frame as binary glTF.
+
+    Attributes:
+        frame: index of the frame whose textures it shows.
+        draco: keep the meshes compressed (KHR_draco_mesh_compression, which not every program reads).
+    """
+
+    frame: Annotated[int, Field(ge=0)] = 0
+    draco: bool = False
 
 
 class CompressParams(Section):
+    """`compress`.
+
+    Attributes:
+        photos: photos of held-out cameras that ship with the asset, to compare with: at most so many.
+    """
+
     mesh: MeshCodec = MeshCodec()
     video: VideoCodec = VideoCodec()
+    photos: Annotated[int, Field(ge=0)] = 0
+    glb: GlbParams = GlbParams()
 
 
 class EvaluateParams(Section):

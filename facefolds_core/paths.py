@@ -72,6 +72,11 @@ class SubjectFolders:
         return self.root / "asset"
 
     @property
+    def glb(self) -> Path:
+        """compress: one frame of the asset as binary glTF."""
+        return self.root / "asset.glb"
+
+    @property
     def evaluation(self) -> Path:
         """evaluate: `per_image.parquet`, `contact_sheet.png`."""
         return self.root / "evaluation"

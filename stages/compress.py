@@ -1,12 +1,15 @@
-"""The asset that ships: Draco meshes, texture video, manifest."""
+"""The asset that ships (Draco meshes, texture video, manifest), and one frame of it as GLB."""
 
 from __future__ import annotations
 
-from facefolds_core.asset import AssetSource, write_asset
+from facefolds_core.asset import AssetSource
+from facefolds_core.asset.glb import write_glb
+from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.export.stores import read_meshes, read_windows
+from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
@@ -19,14 +22,15 @@ def compress(folders: SubjectFolders) -> str:
     windows = read_windows(folders.samples / "grids.npz")
     textures = FrameStore(folders.textures / "textures.arrow")
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), SPHERE_CENTRE)
-    manifest = write_asset(folders.asset, meshes, windows, textures, source, params)
+    manifest = package(folders.asset, Export(meshes, windows, textures), scene, source, params)
     level = manifest.full
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame, params.glb.draco)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
-    video = level.texture.videos[0]
+    videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
+    quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
     return (
         f"{len(level.layers)} of {len(meshes)} meshes ({mesh_bytes} bytes) and {level.texture.frames} frames "
-        f"in {level.texture.width} x {level.texture.height} {video.codec} level {video.level} ({video.bytes} bytes) "
-        f"in {folders.asset}"
+        f"in {level.texture.width} x {level.texture.height} ({videos}){quality}; {folders.asset}"
     )
 
 

@@ -1,11 +1,12 @@
 """Layer meshes as Draco files (github.com/google/draco), through DracoPy.
 
-Order of vertices and faces is always kept. With quantization_bits = 0 the floats come back bit for bit (the paper's
-setting, with compression level 0). With b > 0 bits a position is off by at most range / (2^b - 1) / 2 along each
+With quantization_bits = 0 the floats come back bit for bit (the paper's setting, with compression level 0, which also
+keeps the order of vertices and faces). With b > 0 bits a position is off by at most range / (2^b - 1) / 2 along each
 axis (and float32 rounding), range being the largest side of the layer's bounding box; a texture coordinate likewise,
 with its own number of bits and the larger extent of the layer's (s, t), at most 1, as range.
 
-Keeping the order costs space where values are quantised (400 vertices, 14/12 bits: 6.3 kB against 2.4 kB).
+Above compression level 0 Draco chooses the order of vertices and faces, and merges vertices that are equal: keeping the
+order would cost more than half of the bytes of a quantised mesh.
 """
 
 from __future__ import annotations
@@ -36,21 +37,30 @@ def degenerate_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32]) ->
 def encode_mesh(mesh: TexturedMesh, codec: MeshCodec) -> tuple[bytes, TexturedMesh]:
     """Encode a layer.
 
-    Faces that have no area, or lose it by quantisation, are left out: they cover no pixel. Vertices all stay.
+    Faces that have no area, or lose it by quantisation, are left out: they cover no pixel. In order (level 0) vertices
+    all stay.
 
     Returns:
         the file's bytes, and the mesh that a reader gets from them.
     """
-    data = _encode(mesh, codec)
-    decoded = decode_mesh(data)
-    flat = degenerate_faces(decoded.vertices, decoded.faces)
+    ordered = _encode(mesh, codec, True)
+    flat = _flat(ordered)
     if flat.any() and not flat.all():
-        data = _encode(TexturedMesh(mesh.vertices, mesh.faces[~flat], mesh.st), codec)
-        decoded = decode_mesh(data)
-    return data, decoded
+        mesh = TexturedMesh(mesh.vertices, mesh.faces[~flat], mesh.st)
+        ordered = _encode(mesh, codec, True)
+    if codec.compression_level > 0:
+        data = _encode(mesh, codec, False)
+        if not _flat(data).any():  # without unused vertices the box, and so the rounding, may differ
+            return data, decode_mesh(data)
+    return ordered, decode_mesh(ordered)
 
 
-def _encode(mesh: TexturedMesh, codec: MeshCodec) -> bytes:
+def _flat(data: bytes) -> NDArray[np.bool_]:
+    mesh = decode_mesh(data)
+    return degenerate_faces(mesh.vertices, mesh.faces)
+
+
+def _encode(mesh: TexturedMesh, codec: MeshCodec, keep_order: bool) -> bytes:
     quantized = codec.quantization_bits > 0
     return bytes(
         DracoPy.encode(
@@ -62,7 +72,7 @@ def _encode(mesh: TexturedMesh, codec: MeshCodec) -> bytes:
             tex_coord=np.ascontiguousarray(mesh.st, np.float64),
             tex_coord_quantization_bits=codec.texture_coordinate_bits if quantized else None,
             # Without it even level 0 merges vertices that are equal.
-            preserve_order=True,
+            preserve_order=keep_order,
         )
     )
 
@@ -87,3 +97,9 @@ def decode_mesh(data: bytes) -> TexturedMesh:
     if st.shape != (len(vertices), 2):
         raise DracoError(f"texture coordinates of shape {st.shape} for {len(vertices)} vertices")
     return TexturedMesh(vertices, np.asarray(faces).astype(np.int32), st)
+
+
+def attribute_ids(data: bytes) -> tuple[int, int]:
+    """Draco's unique ids of the positions and of the texture coordinates, as glTF refers to them."""
+    ids = {attribute["attribute_type"]: int(attribute["unique_id"]) for attribute in DracoPy.decode(data).attributes}
+    return ids[DracoPy.AttributeType.POSITION], ids[DracoPy.AttributeType.TEX_COORD]

@@ -231,11 +231,16 @@ def read_asset(folder: str | Path) -> Asset:
         problem = check_file(folder / name, size, sha256)
         if problem:
             raise UserError("damaged asset", file=folder / name, found=problem, remedy=REMEDY)
-    levels = [
-        AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers))
-        for level in manifest.levels
-    ]
-    return Asset(folder, manifest, tuple(levels))
+    return Asset(folder, manifest, tuple(read_level(folder, level) for level in manifest.levels))
+
+
+def read_level(folder: Path, level: Level) -> AssetLevel:
+    """One level of an asset, its meshes decoded.
+
+    Raises:
+        UserError: if a mesh is damaged.
+    """
+    return AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers))
 
 
 def _read_layer(folder: Path, layer: Layer) -> TexturedMesh:

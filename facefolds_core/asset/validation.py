@@ -105,6 +105,7 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
         facts = probe_video(path)
         pairs: list[tuple[str, object, object]] = [
             ("codec", facts.codec, video.codec),
+            ("container", facts.container, video.container),
             ("level", facts.level, video.level),
             ("MIME type", facts.mime, video.mime),
             ("pixel format", facts.pixel_format, video.pixel_format),

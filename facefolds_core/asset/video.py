@@ -1,12 +1,13 @@
-"""The texture video: H.264 in MP4 through PyAV, so that frame k of the file is frame k of the sequence.
+"""The texture videos through PyAV, so that frame k of the file is frame k of the sequence.
 
-There are no B-frames, and every KEYFRAME_INTERVAL frames an IDR picture starts a closed group of pictures: decoding
-order is presentation order, the file needs no edit list, and a player that scrubs decodes at most that many pictures.
-One encoder thread and code that does not depend on the processor: the same input gives the same bytes.
+Decoding order is presentation order, and every `keyframe_interval` frames a key frame starts a closed group: the file
+needs no edit list, and a player that scrubs decodes at most that many pictures. See codecs.py for what differs between
+codecs.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,12 +21,12 @@ from av.error import FFmpegError
 from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
+from facefolds_core.asset.audio import SoundTrack
+from facefolds_core.asset.codecs import Codec, level_and_mime
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
 from facefolds_core.asset.packing import GUTTER, AtlasLayout, cut, fill_cell
 from facefolds_core.errors import UserError
-from facefolds_core.params import VideoCodec
 
-KEYFRAME_INTERVAL = 15
 _PRIMARIES_BT709 = 1
 _TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273
 
@@ -38,13 +39,14 @@ class VideoFacts:
     """What a video file says of itself.
 
     Attributes:
-        level: of H.264, e.g. "5.1".
+        level: of the codec, e.g. "5.1".
         mime: MIME type with codec string (RFC 6381).
         rate: frames a second.
         tags: (matrix, range) codes of H.273 / FFmpeg.
     """
 
     codec: str
+    container: str
     level: str
     mime: str
     pixel_format: str
@@ -88,31 +90,39 @@ def unpack_picture(picture: Picture, layout: AtlasLayout) -> tuple[NDArray[np.ui
 
 
 def encode_video(
-    path: Path, pictures: Iterable[Picture], size: tuple[int, int], fps: Fraction, codec: VideoCodec
+    path: Path,
+    pictures: Iterable[Picture],
+    size: tuple[int, int],
+    fps: Fraction,
+    codec: Codec,
+    options: dict[str, str],
+    audio: Path | None = None,
 ) -> int:
     """Encode planar pictures of `size` (width, height); returns how many.
 
+    Args:
+        options: of the encoder, `codec.options(...)`.
+        audio: a sound file; the sound goes into an MP4, from the first picture on.
+
     Raises:
-        UserError: if the encoder refuses.
+        UserError: if the encoder refuses, or the sound cannot be read.
     """
     count = 0
-    muxer = {"movflags": "faststart", "fflags": "bitexact"}
+    os.environ.setdefault("SVT_LOG", "1")  # SVT-AV1 writes to stderr by itself; 1: errors only
+    muxer = {"fflags": "bitexact"} | ({"movflags": "faststart"} if codec.container == "mp4" else {})
     try:
-        with av.open(str(path), "w", format="mp4", options=muxer) as container:
-            stream: Any = container.add_stream("libx264", rate=fps, options=_x264_options(codec))
-            stream.width, stream.height = size
-            stream.pix_fmt = "yuv420p"
-            context = stream.codec_context
-            context.time_base = 1 / fps
-            context.thread_count = 1
-            context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
-            context.color_primaries, context.color_trc = _PRIMARIES_BT709, _TRANSFER_SRGB
+        with av.open(str(path), "w", format=codec.container, options=muxer) as container:
+            stream: Any = container.add_stream(codec.encoder, rate=fps, options=options)
+            _describe(stream, size, fps)
+            sound = None if audio is None or codec.container != "mp4" else SoundTrack(container, audio)
             for picture in pictures:
                 frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
                 frame.colorspace, frame.color_range = Colorspace.ITU709, ColorRange.MPEG
                 frame.pts, frame.time_base = count, 1 / fps
                 container.mux(stream.encode(frame))
                 count += 1
+                if sound:
+                    sound.mux_until(count / fps)
             container.mux(stream.encode(None))
     except FFmpegError as error:
         if error.errno in (28, 122):  # disk full, quota: reported as such by the stage
@@ -120,30 +130,21 @@ def encode_video(
         raise UserError(
             "the video encoder refused the textures",
             file=path,
-            place=f"frame {count}, {size[0]} x {size[1]} pixels",
+            place=f"{codec.name}, frame {count}, {size[0]} x {size[1]} pixels",
             found=str(error),
-            remedy="use a smaller texture.resolution, or another compress.video.preset",
+            remedy="use a smaller texture.resolution, or another compress.video.codec",
         ) from None
     return count
 
 
-def _x264_options(codec: VideoCodec) -> dict[str, str]:
-    fixed = {
-        "keyint": KEYFRAME_INTERVAL,
-        "min-keyint": KEYFRAME_INTERVAL,
-        "scenecut": 0,
-        "open-gop": 0,
-        "bframes": 0,
-        "chromaloc": 0,
-        "psy": 0,  # a texture is warped and blended before it is seen: +0.25 dB at equal size
-        "threads": 1,
-        "cpu-independent": 1,
-    }
-    return {
-        "crf": str(codec.crf),
-        "preset": codec.preset,
-        "x264-params": ":".join(f"{key}={value}" for key, value in fixed.items()),
-    }
+def _describe(stream: Any, size: tuple[int, int], fps: Fraction) -> None:
+    stream.width, stream.height = size
+    stream.pix_fmt = "yuv420p"
+    context = stream.codec_context
+    context.time_base = 1 / fps
+    context.thread_count = 1
+    context.colorspace, context.color_range = Colorspace.ITU709, ColorRange.MPEG
+    context.color_primaries, context.color_trc = _PRIMARIES_BT709, _TRANSFER_SRGB
 
 
 @contextmanager
@@ -178,19 +179,22 @@ def probe_video(path: Path) -> VideoFacts:
     Raises:
         UserError: if it cannot be opened.
     """
-    with _opened(path) as (_, stream):
+    with _opened(path) as (container, stream):
         context = stream.codec_context
-        header = bytes(context.extradata or b"")
-        # ISO/IEC 14496-15, AVCDecoderConfigurationRecord: bytes 1 to 3 are the profile, its constraints and the level.
-        profile = header[1:4] if len(header) > 3 else bytes(3)
+        codec, size = context.codec.canonical_name, (context.width, context.height)
+        rate = stream.average_rate or Fraction(0)
+        seconds = (container.duration or 0) / av.time_base
+        bits = 8 * path.stat().st_size / seconds if seconds else 0.0
+        level, mime = level_and_mime(codec, bytes(context.extradata or b""), size, rate, bits)
         return VideoFacts(
-            codec=context.name,
-            level=f"{profile[2] / 10:g}",
-            mime=f'video/mp4; codecs="avc1.{profile.hex()}"',
+            codec=codec,
+            container="webm" if "webm" in container.format.name else "mp4",
+            level=level,
+            mime=mime,
             pixel_format=context.pix_fmt or "unknown",
             width=context.width,
             height=context.height,
-            rate=stream.average_rate or Fraction(0),
+            rate=rate,
             tags=(int(context.colorspace), int(context.color_range)),
         )
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facefolds_core import __version__
+from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.manifest import (
@@ -25,14 +28,14 @@ from facefolds_core.asset.manifest import (
     write_manifest,
 )
 from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
-from facefolds_core.asset.video import Picture, encode_video, pack_frame, probe_video
+from facefolds_core.asset.video import encode_video, pack_frame, probe_video
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CodecName, CompressParams, VideoCodec
 
 STATIC_FPS = 1.0
 """Written for a static scene, whose one frame has no rate."""
@@ -77,68 +80,97 @@ def write_asset(
     Raises:
         UserError: if a mesh or the store cannot be an asset's, or the textures do not fit into one video.
     """
-    frames = _check_textures(textures, len(meshes))
-    if len(windows) != len(meshes):
-        raise UserError(
-            "the meshes and the texture windows do not belong together",
-            expected=f"{len(meshes)} windows",
-            found=len(windows),
-            remedy="run `dvc repro` to make both again",
-        )
-    for index, mesh in enumerate(meshes):
-        _check_mesh(mesh, f"layer {index}")
+    frames = check_inputs(meshes, windows, textures)
     layers = crop_layers(meshes, windows, textures, frames)
     folder = Path(folder)
     with atomic_folder(folder) as temporary:
-        level = write_level(temporary, FULL, layers, textures, frames, source.fps or STATIC_FPS, params)
-        manifest = Manifest(
-            generator=f"facefolds {__version__}",
-            subject=source.subject,
-            coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
-            levels=(level,),
-        )
-        return write_manifest(manifest, temporary / MANIFEST_NAME)
+        level = write_level(temporary, FULL, LevelContent(layers, textures, frames, source.fps), params)
+        return write_manifest(manifest_of(source, [level]), temporary / MANIFEST_NAME)
+
+
+def manifest_of(source: AssetSource, levels: Sequence[Level]) -> Manifest:
+    """A manifest without sound and pictures."""
+    return Manifest(
+        generator=f"facefolds {__version__}",
+        subject=source.subject,
+        coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
+        levels=tuple(levels),
+    )
+
+
+@dataclass(frozen=True)
+class LevelContent:
+    """What a level shows, before coding.
+
+    Attributes:
+        layers: outermost first.
+        textures: of which the layers' crops ship.
+        frames: K.
+        fps: frames a second; 0 for a static scene.
+        audio: a sound file for the MP4s.
+    """
+
+    layers: Sequence[CroppedLayer]
+    textures: Textures
+    frames: int
+    fps: float
+    audio: Path | None = None
+
+    @cached_property
+    def layout(self) -> AtlasLayout:
+        return AtlasLayout.pack([layer.crop[2:] for layer in self.layers])
+
+    @property
+    def rate(self) -> Fraction:
+        return Fraction(self.fps or STATIC_FPS).limit_denominator(1001)
+
+    def frame(self, index: int) -> list[NDArray[np.uint8]]:
+        """The layers' textures, N of (h, w, 4)."""
+        return [layer.cut(self.textures.image(layer.source, index)) for layer in self.layers]
+
+    def encode(self, path: Path, codec: Codec, params: VideoCodec, crf: int, frames: int | None = None) -> None:
+        """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
+        count, layout = self.frames if frames is None else frames, self.layout
+        pictures = (pack_frame(self.frame(index), layout) for index in range(count))
+        size = (layout.width, layout.height)
+        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf), self.audio)
 
 
 def write_level(
-    folder: Path,
-    name: str,
-    layers: Sequence[CroppedLayer],
-    textures: Textures,
-    frames: int,
-    fps: float,
-    params: CompressParams,
+    folder: Path, name: str, content: LevelContent, params: CompressParams, crfs: Mapping[CodecName, int] | None = None
 ) -> Level:
-    """Write the files of one level into `folder`: NAME_00.drc ..., NAME.mp4; returns its part of the manifest.
+    """Write the files of one level into `folder`: NAME_00.drc ..., NAME.mp4 ...; returns its part of the manifest.
+
+    Args:
+        crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
 
     Raises:
-        UserError: if the textures do not fit into one video, or the encoder refuses them.
+        UserError: if the textures do not fit into one video, or an encoder refuses them.
     """
-    layout = AtlasLayout.pack([layer.crop[2:] for layer in layers])
-    check_layout(layout, textures.image(layers[0].source, 0).shape[0])
+    layout = content.layout
+    check_layout(layout, content.textures.image(content.layers[0].source, 0).shape[0])
     entries = tuple(
         _write_layer(folder / f"{name}_{index:02d}.drc", layer, rect, params)
-        for index, (layer, rect) in enumerate(zip(layers, layout.rects, strict=True))
+        for index, (layer, rect) in enumerate(zip(content.layers, layout.rects, strict=True))
     )
-    rate = Fraction(fps).limit_denominator(1001)
-
-    def pictures() -> Iterator[Picture]:
-        for frame in range(frames):
-            yield pack_frame([layer.cut(textures.image(layer.source, frame)) for layer in layers], layout)
-
-    path = folder / f"{name}.mp4"
-    encode_video(path, pictures(), (layout.width, layout.height), rate, params.video)
-    video = video_entry(path)
+    videos = []
+    for codec in (CODECS[codec] for codec in params.video.codec):
+        path = folder / f"{name}.{codec.container}"
+        # Two codecs may share a container: the first has the plain name.
+        path = path if not path.exists() else path.with_name(f"{name}_{codec.name}.{codec.container}")
+        crf = codec.crf(params.video.crf) if crfs is None else crfs[codec.name]
+        content.encode(path, codec, params.video, crf)
+        videos.append(_video_entry(path, codec))
     texture = Texture(
         width=layout.width,
         height=layout.height,
         colour_rect=layout.colour_rect,
         alpha_rect=layout.alpha_rect,
-        frames=frames,
-        fps=float(rate),
-        videos=(video,),
+        frames=content.frames,
+        fps=float(content.rate),
+        videos=tuple(videos),
     )
-    size = sum(entry.bytes for entry in entries) + video.bytes
+    size = sum(entry.bytes for entry in entries) + sum(video.bytes for video in videos)
     return Level(name=name, layers=entries, texture=texture, bytes=size)
 
 
@@ -156,15 +188,14 @@ def _write_layer(path: Path, layer: CroppedLayer, rect: Rect, params: CompressPa
     )
 
 
-def video_entry(path: Path) -> Video:
-    """The manifest's entry for a video file."""
+def _video_entry(path: Path, codec: Codec) -> Video:
     facts = probe_video(path)
     return Video(
         file=path.name,
         bytes=path.stat().st_size,
         sha256=file_sha256(path),
-        container="mp4",
-        codec="h264",
+        container=codec.container,
+        codec=codec.name,
         mime=facts.mime,
         level=facts.level,
     )
@@ -174,6 +205,25 @@ def file_sha256(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def check_inputs(meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: FrameStore) -> int:
+    """The number K of frames of layers that can be an asset's.
+
+    Raises:
+        UserError: if they cannot, or do not belong together.
+    """
+    frames = _check_textures(textures, len(meshes))
+    if len(windows) != len(meshes):
+        raise UserError(
+            "the meshes and the texture windows do not belong together",
+            expected=f"{len(meshes)} windows",
+            found=len(windows),
+            remedy="run `dvc repro` to make both again",
+        )
+    for index, mesh in enumerate(meshes):
+        _check_mesh(mesh, f"layer {index}")
+    return frames
 
 
 def _check_textures(textures: FrameStore, layers: int) -> int:

@@ -5,7 +5,8 @@ A folder with
 - `frames.arrow`: all images, one row per (camera, frame) (`frames.FrameStore`);
 - `masks.arrow`: true opacity of held-out images, where the capture has it (same format, one channel);
 - `surface.npz`: tracked mesh in normalised coordinates, where the capture has one: `vertices` (K, V, 3) float32 and
-  `faces` (F, 3) int32.
+  `faces` (F, 3) int32;
+- `audio.wav`: the sound from the first frame on, where the capture has it.
 
 Normalised world: the subject is at the origin, faces +x, up is +z, its left is +y; camera centres are about 1 unit
 away.
@@ -71,6 +72,12 @@ class Scene:
     @property
     def num_frames(self) -> int:
         return len(self.frame_ids)
+
+    @property
+    def audio(self) -> Path | None:
+        """The sound from the first frame on, or None where the capture has none."""
+        path = self.folder / "audio.wav"
+        return path if path.is_file() else None
 
     def indices(self, split: Split) -> list[int]:
         """Indices of the cameras of one split."""

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import wave
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
+from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.captures.frames import write_frames
+from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_text
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
 from tests.assets import WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
 
@@ -47,6 +52,59 @@ def test_makes_a_sound_asset(folders: SubjectFolders) -> None:
     assert (manifest.subject, manifest.full.texture.fps) == ("caps", 25.0)
     crops = cap_crops(3, 2, 64)
     assert [layer.uv_window for layer in manifest.full.layers] == [crop.window for crop in crops]
+
+
+def rig(folders: SubjectFolders, **params: object) -> None:
+    """Give the scene cameras, and `compress` other parameters."""
+    cameras = tuple(look_at_origin(f"cam{i}", azimuth, 5, 48) for i, azimuth in enumerate((-30, 0, 10, 30)))
+    scene = replace(read_scene(folders.scene), cameras=cameras, splits=("train", "holdout", "train", "train"))
+    write_scene(scene, folders.scene)
+    image = np.zeros((48, 48, 3), np.uint8)
+    write_frames(folders.scene / "frames.arrow", image.shape, [(1, 0, image), (1, 1, image), (0, 0, image)])
+    write_text(folders.config / "compress.json", CompressParams.model_validate(params).model_dump_json())
+
+
+def test_quality_by_target(folders: SubjectFolders) -> None:
+    sizes, qualities = [], []
+    for target in (30.0, 38.0):
+        rig(folders, video={"target_psnr": target, "codec": ["h264", "vp9"], "preset": "veryfast"})
+        compress(folders)
+        assert validate_asset(folders.asset) == []
+        level = read_asset(folders.asset).manifest.full
+        assert level.quality is not None
+        qualities.append(level.quality.psnr_to_model - target)
+        sizes.append([video.bytes for video in level.texture.videos])
+    assert all(0 <= over < 1.5 for over in qualities), qualities
+    assert all(coarse < fine for coarse, fine in zip(*sizes, strict=True))
+
+
+def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
+    rig(folders, mesh={"max_error_pixels": 0.05, "compression_level": 7})
+    compress(folders)
+    asset = read_asset(folders.asset)
+    cameras = [camera for camera in read_scene(folders.scene).cameras if camera.name != "cam1"]
+    for crop, layer in zip(cap_crops(3, 2, 64), asset.layers, strict=True):
+        for camera in cameras:
+            ours, theirs = (camera.project(mesh.vertices.astype(float))[0] for mesh in (crop.mesh, layer))
+            assert np.linalg.norm(ours[:, None] - theirs[None], axis=-1).min(1).max() <= 0.05
+    exact = sum(len(encode_mesh(crop.mesh, MeshCodec())[0]) for crop in cap_crops(3, 2, 64))
+    assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
+
+
+def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
+    rig(folders, photos=3)
+    with wave.open(str(folders.scene / "audio.wav"), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes(bytes(2000))
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    manifest = read_asset(folders.asset).manifest
+    assert manifest.audio is not None and manifest.audio.file == "audio.wav"
+    assert manifest.poster is not None and (manifest.poster.width, manifest.poster.height) == (48, 48)
+    assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
+    camera = read_scene(folders.scene).cameras[1]
+    np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
+    np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
 
 
 def test_to_capture_undoes_the_normalisation(folders: SubjectFolders) -> None:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import wave
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 import pytest
 
+from facefolds_core.asset.codecs import CODECS, level_and_mime
 from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.asset.video import (
-    KEYFRAME_INTERVAL,
+    Picture,
     decode_video,
     encode_video,
     pack_frame,
@@ -23,9 +26,24 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import VideoCodec
 from tests.assets import cap_textures
 
+KEYFRAME_INTERVAL = 15
 FRAMES = 2 * KEYFRAME_INTERVAL + 7
 LAYOUT = AtlasLayout.pack([(28, 28)] * 2)
 SIZE = (LAYOUT.width, LAYOUT.height)
+
+
+def encode(
+    path: Path,
+    pictures: Iterable[Picture],
+    size: tuple[int, int] = SIZE,
+    fps: Fraction = Fraction(30),
+    codec: str = "h264",
+    crf: int = 18,
+    **params: Any,
+) -> int:
+    video = VideoCodec(codec=codec, preset="medium", keyframe_interval=KEYFRAME_INTERVAL, **params)
+    chosen = CODECS[codec]
+    return encode_video(path, pictures, size, fps, chosen, chosen.options(video, chosen.crf(crf)))
 
 
 def numbered(frame: int) -> list[np.ndarray]:
@@ -47,7 +65,7 @@ def number_of(textures: Sequence[np.ndarray], channel: int) -> int:
 def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("video") / "texture.mp4"
     pictures = (pack_frame(numbered(frame), LAYOUT) for frame in range(FRAMES))
-    assert encode_video(path, pictures, SIZE, Fraction(30), VideoCodec()) == FRAMES
+    assert encode(path, pictures) == FRAMES
     return path
 
 
@@ -69,7 +87,7 @@ def test_random_access_gives_the_same_pictures(video: Path) -> None:
 )
 def test_any_rate_keeps_frame_numbers(tmp_path: Path, fps: Fraction) -> None:
     path = tmp_path / "texture.mp4"
-    encode_video(path, (pack_frame(numbered(k), LAYOUT) for k in range(20)), SIZE, fps, VideoCodec(preset="ultrafast"))
+    encode(path, (pack_frame(numbered(k), LAYOUT) for k in range(20)), fps=fps)
     assert probe_video(path).rate == fps
     for start in (0, 14, 15, 16, 19):
         first = next(decode_video(path, SIZE, float(fps), start))
@@ -92,6 +110,75 @@ def test_key_frames_and_no_reordering(video: Path) -> None:
     assert all(packet.pts == packet.dts for packet in packets)
 
 
+@pytest.fixture(scope="module", params=["vp9", "av1"])
+def other(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    path = tmp_path_factory.mktemp("video") / f"texture.{CODECS[request.param].container}"
+    pictures = (pack_frame(numbered(frame), LAYOUT) for frame in range(FRAMES))
+    assert encode(path, pictures, codec=request.param) == FRAMES
+    return request.param, path
+
+
+def test_other_codecs_keep_the_order_and_the_tags(other: tuple[str, Path]) -> None:
+    codec, path = other
+    numbers = [number_of(unpack_picture(p, LAYOUT), 0) for p in decode_video(path, SIZE, 30.0)]
+    assert numbers == list(range(FRAMES))
+    facts = probe_video(path)
+    assert (facts.codec, facts.container) == (codec, CODECS[codec].container)
+    assert (facts.pixel_format, facts.width, facts.height, facts.rate) == ("yuv420p", *SIZE, 30)
+    assert facts.tags == (1, 1)
+    assert facts.mime.startswith(f"video/{facts.container}")
+
+
+def test_other_codecs_random_access(other: tuple[str, Path]) -> None:
+    for frame in (0, 14, 15, 16, 29, 30, FRAMES - 1):
+        first = next(decode_video(other[1], SIZE, 30.0, start=frame))
+        assert number_of(unpack_picture(first, LAYOUT), 0) == frame
+
+
+def test_other_codecs_key_frames(other: tuple[str, Path]) -> None:
+    with av.open(str(other[1])) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+    assert [k for k, packet in enumerate(packets) if packet.is_keyframe] == list(range(0, FRAMES, KEYFRAME_INTERVAL))
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_lossless(tmp_path: Path, codec: str) -> None:
+    path = tmp_path / f"texture.{CODECS[codec].container}"
+    layout = AtlasLayout.pack([(60, 40), (50, 70)])
+    noise = np.random.default_rng(0).integers(0, 256, (3, 70, 60, 4), dtype=np.uint8)
+    pictures = [pack_frame([frame[:40], frame[:, :50]], layout) for frame in noise]
+    size = (layout.width, layout.height)
+    encode(path, pictures, size, codec=codec, lossless=True)
+    for found, given in zip(decode_video(path, size, 30.0), pictures, strict=True):
+        np.testing.assert_array_equal(found, given)
+
+
+def test_level_and_codec_string_of_vp9() -> None:
+    # 2064 x 3104 at 30 frames a second: 192 M samples a second, 6.4 M a picture: level 5.
+    level, mime = level_and_mime("vp9", b"", (2064, 3104), Fraction(30), 5e6)
+    assert (level, mime) == ("5", 'video/webm; codecs="vp09.00.50.08.00.01.13.01.00"')
+    assert level_and_mime("vp9", b"", (256, 128), Fraction(30), 1e5)[0] == "1.1"
+
+
+def test_sound_goes_into_the_mp4_and_leaves_the_pictures(tmp_path: Path) -> None:
+    sound = tmp_path / "tone.wav"
+    with wave.open(str(sound), "wb") as file:
+        file.setparams((1, 2, 48_000, 0, "NONE", ""))
+        tone = 8000 * np.sin(2 * np.pi * 440 * np.arange(48_000 * 20 // 30) / 48_000)
+        file.writeframes(tone.astype("<i2").tobytes())
+    path, codec = tmp_path / "texture.mp4", CODECS["h264"]
+    pictures = (pack_frame(numbered(frame), LAYOUT) for frame in range(20))
+    encode_video(path, pictures, SIZE, Fraction(30), codec, codec.options(VideoCodec(), 18), sound)
+    numbers = [number_of(unpack_picture(p, LAYOUT), 0) for p in decode_video(path, SIZE, 30.0)]
+    assert numbers == list(range(20))
+    assert number_of(unpack_picture(next(decode_video(path, SIZE, 30.0, start=17)), LAYOUT), 0) == 17
+    with av.open(str(path)) as container:
+        heard = np.concatenate([frame.to_ndarray()[0] for frame in container.decode(audio=0)])
+    spectrum = np.abs(np.fft.rfft(heard))
+    assert abs(spectrum.argmax() * 48_000 / len(heard) - 440) < 3
+    assert len(heard) / 48_000 == pytest.approx(20 / 30, abs=0.05)
+
+
 def test_header_comes_first(video: Path) -> None:
     data = video.read_bytes()
     assert data.index(b"moov") < data.index(b"mdat")
@@ -101,7 +188,7 @@ def test_quality_at_the_default_setting(tmp_path: Path) -> None:
     layout = AtlasLayout.pack([(124, 124)] * 3)
     frames = np.stack([cap_textures(3, k, 124) for k in range(4)])
     path, size = tmp_path / "texture.mp4", (layout.width, layout.height)
-    encode_video(path, (pack_frame(list(frame), layout) for frame in frames), size, Fraction(30), VideoCodec())
+    encode(path, (pack_frame(list(frame), layout) for frame in frames), size)
     back = np.stack([np.stack(unpack_picture(picture, layout)) for picture in decode_video(path, size, 30.0)])
     error = (back.astype(float) - frames) ** 2
     colour, alpha = 10 * np.log10(255**2 / error[..., :3].mean()), 10 * np.log10(255**2 / error[..., 3].mean())
@@ -112,7 +199,7 @@ def test_flat_alpha_extremes_survive(tmp_path: Path) -> None:
     textures = np.full((2, 28, 28, 4), 100, np.uint8)
     textures[0, ..., 3], textures[1, ..., 3] = 0, 255
     path = tmp_path / "texture.mp4"
-    encode_video(path, [pack_frame(list(textures), LAYOUT)] * 3, SIZE, Fraction(30), VideoCodec())
+    encode(path, [pack_frame(list(textures), LAYOUT)] * 3)
     for picture in decode_video(path, SIZE, 30.0):
         alpha = np.stack(unpack_picture(picture, LAYOUT))[..., 3]
         assert alpha[0].max() <= 1 and alpha[1].min() >= 254
@@ -120,7 +207,7 @@ def test_flat_alpha_extremes_survive(tmp_path: Path) -> None:
 
 def test_same_input_same_bytes(video: Path, tmp_path: Path) -> None:
     path = tmp_path / "again.mp4"
-    encode_video(path, (pack_frame(numbered(k), LAYOUT) for k in range(FRAMES)), SIZE, Fraction(30), VideoCodec())
+    encode(path, (pack_frame(numbered(k), LAYOUT) for k in range(FRAMES)))
     assert path.read_bytes() == video.read_bytes()
 
 

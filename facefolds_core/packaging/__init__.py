@@ -1,0 +1,1 @@
+"""From what training and export made to the asset that ships: quality by target, levels, extras."""

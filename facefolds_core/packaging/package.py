@@ -1,0 +1,183 @@
+"""Package a sequence: choose the codecs' settings by what shows, write the levels, the sound and the pictures."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset.codecs import CODECS, Codec
+from facefolds_core.asset.cropping import crop_layers
+from facefolds_core.asset.manifest import (
+    MANIFEST_NAME,
+    Level,
+    Manifest,
+    Photo,
+    Poster,
+    Quality,
+    StoredFile,
+    write_manifest,
+)
+from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.video import decode_video, unpack_picture
+from facefolds_core.asset.writer import (
+    FULL,
+    AssetSource,
+    LevelContent,
+    check_inputs,
+    file_sha256,
+    manifest_of,
+    write_level,
+)
+from facefolds_core.captures.frames import FrameStore
+from facefolds_core.captures.scene import Scene
+from facefolds_core.files import atomic_folder
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.packaging.meshbits import resolved
+from facefolds_core.packaging.rate import search_crf
+from facefolds_core.packaging.views import FRAMES, ViewMeter, spread, training_cameras
+from facefolds_core.params import CompressParams, VideoCodec
+from facefolds_core.rendering.reference import AssetCaster, composite
+
+SEARCH_FRAMES = 30
+"""A search for a quality encodes at most so many frames, from the first on."""
+JPEG_QUALITY = 92
+
+
+@dataclass(frozen=True)
+class Export:
+    """What the export's earlier stages made.
+
+    Attributes:
+        meshes: N layers, outermost first.
+        windows: of each layer's texture.
+        textures: layered store, N layers x K frames of (R, R, 4).
+    """
+
+    meshes: Sequence[TexturedMesh]
+    windows: Sequence[Window]
+    textures: FrameStore
+
+
+def package(folder: Path, export: Export, scene: Scene, source: AssetSource, params: CompressParams) -> Manifest:
+    """Write the folder of an asset, whole or not at all; an older one is replaced.
+
+    Raises:
+        UserError: if the export cannot be an asset.
+    """
+    frames = check_inputs(export.meshes, export.windows, export.textures)
+    layers = crop_layers(export.meshes, export.windows, export.textures, frames)
+    audio = scene.audio
+    content = LevelContent(layers, export.textures, frames, source.fps, audio)
+    cameras = training_cameras(scene)
+    meter = make_meter(content, cameras)
+    params = params.model_copy(update={"mesh": resolved(params.mesh, layers, cameras)})
+    with atomic_folder(folder) as temporary:
+        level = _level(temporary, FULL, content, params, meter)
+        manifest = manifest_of(source, [level])
+        manifest = _with_extras(temporary, manifest, scene, params.photos)
+        return write_manifest(manifest, temporary / MANIFEST_NAME)
+
+
+def make_meter(content: LevelContent, cameras: Sequence[Camera]) -> ViewMeter | None:
+    """The yardstick of the content's own textures and meshes; None without cameras."""
+    if not cameras:
+        return None
+    frames = {*spread(content.frames, FRAMES), *spread(min(content.frames, SEARCH_FRAMES), FRAMES)}
+    meshes = [layer.mesh for layer in content.layers]
+    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames})
+
+
+def _level(folder: Path, name: str, content: LevelContent, params: CompressParams, meter: ViewMeter | None) -> Level:
+    video = params.video
+    crfs = None
+    if meter is not None and video.target_psnr is not None and not video.lossless:
+        crfs = {codec: _crf(content, CODECS[codec], video, meter, video.target_psnr) for codec in video.codec}
+    level = write_level(folder, name, content, params, crfs)
+    if meter is None:
+        return level
+    shown = read_level(folder, level)
+    psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
+    return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3))})
+
+
+def _crf(content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMeter, target: float) -> int:
+    layout = content.layout
+    with TemporaryDirectory() as scratch:
+        path = Path(scratch) / f"trial.{codec.container}"
+
+        def quality(crf: int) -> float:
+            content.encode(path, codec, video, crf, min(content.frames, SEARCH_FRAMES))
+            pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
+            wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
+            return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
+
+        return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf
+
+
+def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: int) -> Manifest:
+    """Add sound, a poster and photos."""
+    update: dict[str, object] = {}
+    if scene.audio is not None:
+        path = folder / f"audio{scene.audio.suffix}"
+        shutil.copyfile(scene.audio, path)
+        update["audio"] = StoredFile(**_stored(path))
+    cameras = training_cameras(scene)
+    if cameras:
+        update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras))
+    update["photos"] = tuple(_photos(folder, scene, photos))
+    return manifest.model_copy(update=update)
+
+
+def _frontal(cameras: Sequence[Camera]) -> Camera:
+    """The camera that sees the subject most from its front, +x."""
+    return max(cameras, key=lambda camera: camera.centre[0] / np.linalg.norm(camera.centre))
+
+
+def _poster(path: Path, level: Level, camera: Camera) -> Poster:
+    shown = read_level(path.parent, level)
+    rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
+    pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
+    Image.fromarray(pixels).save(path, quality=JPEG_QUALITY)
+    return Poster(**_stored(path), width=camera.width, height=camera.height)
+
+
+def _photos(folder: Path, scene: Scene, wanted: int) -> list[Photo]:
+    """Photos of held-out cameras, each with its own frame, spread over the sequence."""
+    if wanted == 0:
+        return []
+    store, found = scene.open_frames(), []
+    keys = [key for key in store if key[0] in scene.indices("holdout")]
+    for index, key in enumerate(keys[i] for i in spread(len(keys), wanted)) if keys else ():
+        path = folder / f"photo_{index:02d}.jpg"
+        Image.fromarray(store.image(*key)).save(path, quality=JPEG_QUALITY)
+        camera = scene.cameras[key[0]]
+        found.append(
+            Photo(
+                **_stored(path),
+                width=camera.width,
+                height=camera.height,
+                camera=camera.name,
+                frame=key[1],
+                K=_rows(camera.K),
+                w2c=_rows(camera.w2c),
+            )
+        )
+    return found
+
+
+def _rows(matrix: NDArray[np.float64]) -> Any:
+    return tuple(tuple(float(x) for x in row) for row in matrix)
+
+
+def _stored(path: Path) -> dict[str, Any]:
+    return {"file": path.name, "bytes": path.stat().st_size, "sha256": file_sha256(path)}

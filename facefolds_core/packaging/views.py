@@ -1,0 +1,112 @@
+"""The yardstick of packaging: rendered training views of what ships against those of what came in.
+
+Quality is counted where an eye sees it, not on texels: rays of some training cameras, in some frames, through the
+reference renderer. Held-out cameras are never looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.rendering.reference import AssetCaster, Hits, Texture, composite
+
+Image = NDArray[np.float32]
+
+CAMERAS = 6
+FRAMES = 3
+RAYS_A_CAMERA = 16_000
+MAX_PSNR = 100.0
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Meshes as the renderer takes them."""
+
+    layers: Sequence[TexturedMesh]
+
+    def frame(self, k: int, /) -> Sequence[Texture]:
+        raise NotImplementedError
+
+
+def spread(count: int, wanted: int) -> list[int]:
+    """At most `wanted` of `count` indices, evenly spaced, the first and the last among them."""
+    return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(wanted, count))})
+
+
+def training_cameras(scene: Scene) -> list[Camera]:
+    return [scene.cameras[index] for index in scene.indices("train")]
+
+
+class ViewMeter:
+    """Measures renderings against a reference along fixed rays.
+
+    Args:
+        meshes: of the reference, outermost first.
+        cameras: of which CAMERAS evenly spaced ones are used.
+        references: frame -> N textures of the reference.
+        seed: of the choice of rays among those that hit anything.
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[TexturedMesh],
+        cameras: Sequence[Camera],
+        references: Mapping[int, Sequence[Texture]],
+        seed: int = 0,
+    ) -> None:
+        self._cameras = [cameras[i] for i in spread(len(cameras), CAMERAS)]
+        rng = np.random.default_rng(seed)
+        self._pixels: list[NDArray[np.intp]] = []
+        caster = AssetCaster(Shown(meshes))
+        hits = []
+        for camera in self._cameras:
+            cast = caster.cast(camera)
+            seen = np.flatnonzero(cast.hit.any(2))
+            chosen = np.sort(rng.choice(seen, min(RAYS_A_CAMERA, len(seen)), replace=False))
+            self._pixels.append(chosen)
+            hits.append(_subset(cast, chosen))
+        self._hits = _joined(hits)
+        self.frames = sorted(references)
+        self._reference = {frame: composite(self._hits, references[frame]) for frame in self.frames}
+
+    def hits(self, meshes: Sequence[TexturedMesh]) -> Hits:
+        """Where the meter's rays hit other meshes."""
+        caster = AssetCaster(Shown(meshes))
+        parts = zip(self._cameras, self._pixels, strict=True)
+        return _joined([_subset(caster.cast(camera), pixels) for camera, pixels in parts])
+
+    def psnr(self, textures: Iterable[tuple[int, Sequence[Texture]]], hits: Hits | None = None) -> float:
+        """dB over all rays and the meter's frames, each ray weighted with the reference's opacity; black background.
+
+        Args:
+            textures: (frame, N textures); frames that the meter does not use are passed over.
+            hits: of the meshes that carry the textures; by default the reference's.
+        """
+        error, weight = 0.0, 0.0
+        for frame, layers in textures:
+            if frame in self._reference:
+                rgb, _ = composite(self._hits if hits is None else hits, layers)
+                truth, alpha = self._reference[frame]
+                difference = ((rgb.astype(np.float64) - truth) ** 2).mean(-1)
+                error += float((alpha * difference).sum())
+                weight += float(alpha.sum())
+        if weight == 0 or error == 0:
+            return MAX_PSNR
+        return min(MAX_PSNR, -10 * float(np.log10(error / weight)))
+
+
+def _subset(hits: Hits, pixels: NDArray[np.intp]) -> Hits:
+    """(1, M, N) of (H, W, N)."""
+    count = hits.hit.shape[2]
+    return Hits(hits.hit.reshape(-1, count)[None, pixels], hits.st.reshape(-1, count, 2)[None, pixels])
+
+
+def _joined(parts: Sequence[Hits]) -> Hits:
+    return Hits(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))

@@ -1,0 +1,37 @@
+"""The search for a quality finds the coarsest factor that has it, with few encodings."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from facefolds_core.packaging.rate import CLOSE_ENOUGH, MAX_ENCODES, search_crf
+
+CURVES = {
+    "line": lambda crf: 52 - 0.5 * crf,
+    "bent": lambda crf: 60 - 4 * math.sqrt(crf),
+    "steps": lambda crf: 50 - 3.0 * (crf // 6),
+    "steep": lambda crf: 80 - 1.6 * crf,
+}
+
+
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
+@pytest.mark.parametrize("target", [31.0, 38.0, 44.0])
+@pytest.mark.parametrize("start", [1, 18, 51])
+def test_target_is_reached_and_no_factor_far_better_is_missed(curve: object, target: float, start: int) -> None:
+    assert callable(curve)
+    found = search_crf(curve, target, start, 51)
+    assert found.encodes <= MAX_ENCODES
+    assert found.psnr == curve(found.crf) >= target
+    best = max(crf for crf in range(1, 52) if curve(crf) >= target)
+    assert found.psnr - target < CLOSE_ENOUGH or best - found.crf <= 6
+
+
+def test_a_target_out_of_reach_gives_the_best_that_was_tried() -> None:
+    found = search_crf(lambda crf: 40 - crf, 60, 18, 51)
+    assert found.crf == 1 and found.psnr == 39
+
+
+def test_a_target_that_everything_reaches_gives_the_coarsest() -> None:
+    assert search_crf(lambda crf: 90 - crf, 20, 18, 51).crf == 51
