@@ -17,7 +17,7 @@ HOST = "127.0.0.1"
 
 
 def player_app(player: Path, assets: Mapping[str, Path]) -> web.Application:
-    """The player at `/`, each asset's folder at `/NAME/`. Files are revalidated: an asset made again is seen at once."""
+    """The player at `/`, each asset's folder at `/NAME/`. Files are revalidated: what is made anew is seen at once."""
 
     @web.middleware
     async def revalidated(

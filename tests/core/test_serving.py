@@ -42,8 +42,13 @@ def test_it_listens_on_the_loopback_only(address: str) -> None:
 
 @pytest.mark.parametrize(
     ("path", "kind"),
-    [("/", "text/html"), ("/page.js", "application/javascript"), ("/draco/decoder.wasm", "application/wasm"), ("/asset/full.mp4", "video/mp4")],
-)  # fmt: skip
+    [
+        ("/", "text/html"),
+        ("/page.js", "application/javascript"),
+        ("/draco/decoder.wasm", "application/wasm"),
+        ("/asset/full.mp4", "video/mp4"),
+    ],
+)
 def test_files_have_their_types(address: str, path: str, kind: str) -> None:
     response, _ = get(address, path)
     assert response.status == 200

@@ -1,4 +1,4 @@
-"""The web player in headless Chromium: what its tests share. They skip, aloud, where there is no browser or no Node.js."""
+"""The web player in headless Chromium: what its tests share. Without a browser or Node.js they skip, aloud."""
 
 from __future__ import annotations
 
@@ -113,10 +113,10 @@ class Player:
         if camera:
             size = {"width": camera.width, "height": camera.height}
             given = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), **size}
-        code = """const image = e.capture(v ?? undefined);
+        code = """const { data, height, width } = e.capture(v ?? undefined);
             let text = '';
-            for (let i = 0; i < image.data.length; i += 8192) text += String.fromCharCode(...image.data.subarray(i, i + 8192));
-            return JSON.stringify([image.height, image.width, btoa(text)]);"""
+            for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+            return JSON.stringify([height, width, btoa(text)]);"""
         height, width, data = json.loads(str(self.run(code, given)))
         return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255
 
@@ -148,7 +148,7 @@ def fresh_context(browser: Browser, **options: object) -> Iterator[BrowserContex
 
 @pytest.fixture
 def new_player(browser: Browser, serve: Callable[[dict[str, Path]], str]) -> Iterator[NewPlayer]:
-    """A page with the player; the test fails if the page's console holds an error or a warning that it does not allow."""
+    """A page with the player; fails if the console holds an error or a warning that is not allowed."""
     players: list[tuple[Player, tuple[str, ...]]] = []
     contexts = []
 

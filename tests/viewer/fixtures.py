@@ -79,7 +79,7 @@ def write_png(path: Path, image: NDArray[np.uint8]) -> dict[str, Any]:
 
 
 def rich_asset(folder: Path) -> Path:
-    """An asset with all that the format knows: two levels, two videos, view effects, poster, photos, sound; 6 frames."""
+    """All that the format knows: two levels, two videos, view effects, poster, photos, sound; 6 frames."""
     make_asset(folder, layers=3, frames=6, resolution=96)
     coarse = folder.with_name(f"{folder.name}-coarse")
     make_asset(coarse, layers=2, frames=6, resolution=32)
@@ -113,7 +113,13 @@ def rich_asset(folder: Path) -> Path:
 
 def webm_entry(path: Path) -> dict[str, Any]:
     mime = 'video/webm; codecs="vp09.00.10.08.01.01.13.01.00"'
-    return file_entry(path) | {"container": "webm", "codec": "vp9", "mime": mime, "level": "1", "pixel_format": "yuv420p"}
+    return file_entry(path) | {
+        "container": "webm",
+        "codec": "vp9",
+        "mime": mime,
+        "level": "1",
+        "pixel_format": "yuv420p",
+    }
 
 
 def add_effects(folder: Path, level: dict[str, Any]) -> None:

@@ -19,7 +19,9 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
-    player = new_player({"asset": rich}, viewport={"width": 900, "height": 700}, permissions=["clipboard-write", "clipboard-read"])
+    player = new_player(
+        {"asset": rich}, viewport={"width": 900, "height": 700}, permissions=["clipboard-write", "clipboard-read"]
+    )
     player.open("asset")
     player.wait("e.level === 'full'")
     return player
@@ -75,7 +77,8 @@ def test_keys(player: Player) -> None:
     press = player.page.keyboard.press
     player.page.locator("canvas").focus()
     steps = [
-        ("ArrowRight", "e.frame === 1"), ("ArrowLeft", "e.frame === 0"), ("End", "e.frame === 5"), ("Home", "e.frame === 0"),
+        ("ArrowRight", "e.frame === 1"), ("ArrowLeft", "e.frame === 0"),
+        ("End", "e.frame === 5"), ("Home", "e.frame === 0"),
         (" ", "e.playing"), (" ", "!e.playing"), ("l", "!e.loop"), (">", "e.speed === 1.5"), ("<", "e.speed === 1"),
         ("w", "e.wireframe"), ("e", "!e.effects"), ("p", "e.spread === 1"), ("p", "e.spread === 0"),
         ("2", "!e.layers[1]"), ("2", "e.layers[1]"), ("s", "e.overlays.statistics"), ("m", "!e.player.sound.muted"),

@@ -53,7 +53,11 @@ def test_an_asset_of_version_1(new_player: NewPlayer, asset: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("{", "not JSON"), ("[]", "not a facefolds asset"), ('{"format": "facefolds", "version": 2}', "levels is not a list")],
+    [
+        ("{", "not JSON"),
+        ("[]", "not a facefolds asset"),
+        ('{"format": "facefolds", "version": 2}', "levels is not a list"),
+    ],
 )
 def test_a_garbled_manifest(new_player: NewPlayer, asset: Path, text: str, said: str) -> None:
     (asset / "manifest.json").write_text(text)
@@ -110,7 +114,9 @@ def spoil_codec(asset: Path) -> str:
 
 
 @pytest.mark.parametrize(
-    "spoil", [spoil_missing, spoil_short, spoil_changed, spoil_mesh, spoil_video, spoil_codec], ids=lambda f: f.__name__[6:]
+    "spoil",
+    [spoil_missing, spoil_short, spoil_changed, spoil_mesh, spoil_video, spoil_codec],
+    ids=lambda f: f.__name__[6:],
 )
 def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, asset: Path, spoil: object) -> None:
     said = spoil(asset)  # type: ignore[operator]

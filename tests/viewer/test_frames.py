@@ -1,7 +1,8 @@
-"""Frame k means frame k: after any seek, while playing, over the end of a loop, with either codec and either decoder."""
+"""Frame k means frame k: after any seek, while playing, round the end of a loop, with any codec and decoder."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -94,7 +95,7 @@ def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Asset, sc
         return seen.slice(0, 15);"""
     )
     assert isinstance(frames, list)
-    steps = {(after - before) % 6 for before, after in zip(frames, frames[1:], strict=False)}
+    steps = {(after - before) % 6 for before, after in pairwise(frames)}
     assert steps <= {0, 1, 2}
     assert set(frames) == set(range(6))
 

@@ -18,7 +18,7 @@ from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, referenc
 
 SIZE = 160
 AGREE = 40.0
-"""dB. Seen: 47 and more with these assets; the canvas rounds to 8 bits after each layer, browsers place chroma otherwise."""
+"""dB. Seen: 47 and more; the canvas rounds to 8 bits after each layer, and browsers place chroma otherwise."""
 
 
 @pytest.fixture(scope="module")
