@@ -43,7 +43,7 @@ export class Overlays {
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
     this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded)}`;
-    if (player.level) {
+    if (player.level && player.level.info !== wanted) {
       this.find(".pill").hidden = false;
       this.find(".pill").textContent = `Loading detail, ${Math.round(100 * part)} %`;
     }
