@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving import serving
+from tests.viewer.fixtures import rich_asset
 
 BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
 FLAGS = (
@@ -49,6 +50,18 @@ def player_folder(project_root: Path) -> Path:
         subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=source, check=True)
     subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
     return source / "dist"
+
+
+@pytest.fixture(scope="session")
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An asset with all that the format knows, not to be changed."""
+    return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
+
+
+@pytest.fixture
+def rich_copy(rich: Path, tmp_path: Path) -> Path:
+    """The same, to spoil."""
+    return Path(shutil.copytree(rich, tmp_path / "asset"))
 
 
 @pytest.fixture(scope="session")

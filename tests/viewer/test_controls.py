@@ -9,18 +9,12 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from tests.viewer.conftest import NewPlayer, Player
-from tests.viewer.fixtures import rich_asset
-
-
-@pytest.fixture(scope="module")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rich_asset(tmp_path_factory.mktemp("controls") / "asset")
 
 
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player(
-        {"asset": rich}, viewport={"width": 900, "height": 700}, permissions=["clipboard-write", "clipboard-read"]
+        {"asset": rich}, viewport={"width": 760, "height": 500}, permissions=["clipboard-write", "clipboard-read"]
     )
     player.open("asset")
     player.wait("e.level === 'full'")

@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.viewer.conftest import NewPlayer
-from tests.viewer.fixtures import change_manifest, file_entry, rich_asset
+from tests.viewer.fixtures import change_manifest, file_entry
 
 NOT_FOUND = "Failed to load resource"  # the browser's own line about an answer of 404
 GONE = "net::ERR_"
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rich_asset(tmp_path_factory.mktemp("failures") / "asset")
-
-
 @pytest.fixture
-def asset(whole: Path, tmp_path: Path) -> Path:
-    """A copy to spoil."""
-    return Path(shutil.copytree(whole, tmp_path / "asset"))
+def asset(rich_copy: Path) -> Path:
+    return rich_copy
 
 
 def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:

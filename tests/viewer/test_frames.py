@@ -8,26 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import read_asset
 from facefolds_core.rendering import AssetCaster, composite
 from tests.assets import make_asset
 from tests.viewer.conftest import NewPlayer, Player
-from tests.viewer.fixtures import GREY, GREY_VALUE, change_manifest, five_cameras, psnr, rich_asset
+from tests.viewer.fixtures import GREY, GREY_VALUE, change_manifest, five_cameras, psnr
 
 CAMERA = five_cameras(64)[0]
 NO_WEBCODECS = "delete globalThis.VideoDecoder"
 
 
 @pytest.fixture(scope="module")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    return read_asset(rich_asset(tmp_path_factory.mktemp("frames") / "asset"))
-
-
-@pytest.fixture(scope="module")
-def pictures(rich: Asset) -> list[np.ndarray]:
+def pictures(rich: Path) -> list[np.ndarray]:
     """What each frame looks like."""
-    hits = AssetCaster(rich).cast(CAMERA)
-    return [composite(hits, textures, (GREY_VALUE,) * 3)[0] for textures in rich.frames()]
+    asset = read_asset(rich)
+    hits = AssetCaster(asset).cast(CAMERA)
+    return [composite(hits, textures, (GREY_VALUE,) * 3)[0] for textures in asset.frames()]
 
 
 def opened(player: Player) -> Player:
@@ -48,9 +44,9 @@ def nearest(player: Player, pictures: list[np.ndarray]) -> int:
 
 @pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "video element"])
 def test_every_seek_shows_the_frame_asked_for(
-    new_player: NewPlayer, rich: Asset, pictures: list[np.ndarray], script: str
+    new_player: NewPlayer, rich: Path, pictures: list[np.ndarray], script: str
 ) -> None:
-    player = opened(new_player({"asset": rich.folder}, script=script))
+    player = opened(new_player({"asset": rich}, script=script))
     for frame in (5, 0, 3, 2, 4, 1, 5, 5):
         assert player.run("return await e.seek(v)", frame)
         assert player.run("return e.frame") == frame
@@ -59,26 +55,25 @@ def test_every_seek_shows_the_frame_asked_for(
 
 @pytest.mark.parametrize("codec", ["vp9", "av1"])
 def test_the_other_videos_have_the_same_frames(
-    new_player: NewPlayer, pictures: list[np.ndarray], tmp_path: Path, codec: str
+    new_player: NewPlayer, pictures: list[np.ndarray], rich_copy: Path, codec: str
 ) -> None:
     """The videos before it are of a codec that no browser knows: the next one plays."""
-    folder = rich_asset(tmp_path / "asset")
 
     def change(value: dict) -> None:
         for video in value["levels"][1]["texture"]["videos"]:
             if video["codec"] != codec:
                 video["mime"] = 'video/mp4; codecs="hvc9.1.6.L93.B0"'
 
-    change_manifest(folder, change)
-    player = opened(new_player({"asset": folder}))
+    change_manifest(rich_copy, change)
+    player = opened(new_player({"asset": rich_copy}))
     assert player.run("return e.statistics.video") == codec
     for frame in (5, 2, 0, 3):
         player.run("await e.seek(v)", frame)
         assert nearest(player, pictures) == frame
 
 
-def test_of_many_seeks_the_last_wins(new_player: NewPlayer, rich: Asset, pictures: list[np.ndarray]) -> None:
-    player = opened(new_player({"asset": rich.folder}))
+def test_of_many_seeks_the_last_wins(new_player: NewPlayer, rich: Path, pictures: list[np.ndarray]) -> None:
+    player = opened(new_player({"asset": rich}))
     done = player.run("const all = [5, 1, 4, 2, 3].map((k) => e.seek(k)); return Promise.all(all)")
     assert isinstance(done, list)
     assert done[-1] is True
@@ -86,9 +81,9 @@ def test_of_many_seeks_the_last_wins(new_player: NewPlayer, rich: Asset, picture
 
 
 @pytest.mark.parametrize("script", ["", NO_WEBCODECS], ids=["WebCodecs", "video element"])
-def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Asset, script: str) -> None:
+def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Path, script: str) -> None:
     """Frames come in order and wrap round; slowly enough that software rendering need not leave any out."""
-    player = opened(new_player({"asset": rich.folder}, script=script))
+    player = opened(new_player({"asset": rich}, script=script))
     frames = player.run(
         """const seen = [];
         e.addEventListener('frame', () => seen.push(e.frame));
@@ -104,10 +99,10 @@ def test_playing_goes_round_without_a_gap(new_player: NewPlayer, rich: Asset, sc
 
 
 def test_while_playing_the_picture_is_that_of_the_frame_named(
-    new_player: NewPlayer, rich: Asset, pictures: list[np.ndarray]
+    new_player: NewPlayer, rich: Path, pictures: list[np.ndarray]
 ) -> None:
     """Colour and alpha come from one frame, and `frame` says which; looked at in the middle of playing."""
-    player = opened(new_player({"asset": rich.folder}))
+    player = opened(new_player({"asset": rich}))
     player.run("e.speed = 0.1; e.play()")
     for _ in range(4):
         player.page.wait_for_timeout(170)
@@ -116,8 +111,8 @@ def test_while_playing_the_picture_is_that_of_the_frame_named(
         player.run("e.player.playback.speed = 0.1")
 
 
-def test_without_loop_it_stops_at_the_end_and_starts_again(new_player: NewPlayer, rich: Asset) -> None:
-    player = opened(new_player({"asset": rich.folder}))
+def test_without_loop_it_stops_at_the_end_and_starts_again(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player({"asset": rich}))
     player.run("e.loop = false; await e.seek(3); e.play()")
     player.wait("!e.playing && e.frame === 5")
     player.run("e.speed = 0.1; e.play()")

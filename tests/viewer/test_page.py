@@ -7,15 +7,7 @@ import subprocess
 from pathlib import Path
 from urllib.parse import urlsplit
 
-import pytest
-
 from tests.viewer.conftest import NewPlayer
-from tests.viewer.fixtures import rich_asset
-
-
-@pytest.fixture(scope="module")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rich_asset(tmp_path_factory.mktemp("page") / "asset")
 
 
 def test_the_coarse_level_comes_first_and_the_full_one_follows(new_player: NewPlayer, rich: Path) -> None:

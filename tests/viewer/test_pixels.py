@@ -14,7 +14,7 @@ from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reference import sample_texture
 from tests.assets import make_asset
 from tests.viewer.conftest import NewPlayer
-from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, reference, rich_asset
+from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, reference
 
 SIZE = 160
 AGREE = 40.0
@@ -74,9 +74,9 @@ def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps:
     assert psnr(found[..., :3], rgb) >= AGREE  # premultiplied: the composite over black
 
 
-def test_view_effects_follow_the_format(new_player: NewPlayer, tmp_path: Path) -> None:
+def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:
     """Each layer's colour, shifted by the direction to the eye as docs/asset-format.md says, in plain numpy."""
-    asset = read_asset(rich_asset(tmp_path / "asset"))
+    asset = read_asset(rich)
     player = new_player({"asset": asset.folder})
     player.open("asset")
     player.wait("e.level === 'full'")
