@@ -167,17 +167,18 @@ class SampleParams(Section):
 
 
 class ReconstructParams(Section):
-    """`reconstruct`: screened Poisson, trimmed to the sampled sheet.
+    """`reconstruct`.
 
     Attributes:
-        method: "poisson".
-        resolution: samples a side that Poisson sees (the R x R grid is thinned to it); null takes all.
-        depth: of the octree: 2^depth cells along the longest side of the layer's bounding box and a tenth.
-        point_weight: of the samples (screening).
-        trim: vertices farther than this many local sample spacings from the samples are removed.
+        method: "grid" takes the samples themselves as vertices; "poisson" is the paper's screened Poisson surface of
+            each layer, trimmed to the sampled sheet.
+        resolution: samples a side that are used (the R x R grid is thinned to it); null takes all.
+        depth: poisson: of the octree, 2^depth cells along the longest side of the layer's bounding box and a tenth.
+        point_weight: poisson: of the samples (screening).
+        trim: poisson: vertices farther than this many local sample spacings from the samples are removed.
     """
 
-    method: Literal["poisson"] = "poisson"
+    method: Literal["grid", "poisson"] = "grid"
     resolution: Annotated[int, Field(ge=8)] | None = None
     depth: Annotated[int, Field(ge=4, le=12)] = 7
     point_weight: Annotated[float, Field(ge=0)] = 4.0
@@ -189,8 +190,8 @@ class DecimateParams(Section):
 
     Attributes:
         resolution: R^m; each layer keeps at most R^m x R^m vertices.
-        uv: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper), "exact" those of its own
-            direction from the sphere centre.
+        uv: of Poisson surfaces: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper),
+            "exact" those of its own direction from the sphere centre. Vertices of `grid` are samples and keep theirs.
     """
 
     resolution: Annotated[int, Field(ge=8, le=2048)] = 64
@@ -205,6 +206,17 @@ class TextureParams(Section):
     """
 
     resolution: Annotated[int, Field(ge=8, le=4096)] = 512
+
+
+class BakeParams(Section):
+    """`bake`: textures are fitted to the meshes that ship.
+
+    Attributes:
+        iterations: passes over the training cameras' rays in the first frame; later frames start from its result and
+            take a quarter of them. 0 leaves the textures as `texture` made them.
+    """
+
+    iterations: Annotated[int, Field(ge=0)] = 2
 
 
 class MeshCodec(Section):
@@ -280,6 +292,8 @@ class CompressParams(Section):
     """`compress`.
 
     Attributes:
+        view_effects: fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of
+            the full level at most. It needs an asset that stands before the room, not one that has it painted on.
         photos: photos of held-out cameras that ship with the asset, to compare with: at most so many.
     """
 
@@ -287,6 +301,7 @@ class CompressParams(Section):
     video: VideoCodec = VideoCodec()
     photos: Annotated[int, Field(ge=0)] = 0
     glb: GlbParams = GlbParams()
+    view_effects: bool = False
 
 
 class EvaluateParams(Section):
@@ -311,6 +326,7 @@ class Overrides(Section):
     reconstruct: dict[str, Any] = {}
     decimate: dict[str, Any] = {}
     texture: dict[str, Any] = {}
+    bake: dict[str, Any] = {}
     compress: dict[str, Any] = {}
     evaluate: dict[str, Any] = {}
 
@@ -350,6 +366,7 @@ STAGE_SECTIONS: dict[str, type[Section]] = {
     "reconstruct": ReconstructParams,
     "decimate": DecimateParams,
     "texture": TextureParams,
+    "bake": BakeParams,
     "compress": CompressParams,
     "evaluate": EvaluateParams,
 }

@@ -62,8 +62,13 @@ class SubjectFolders:
         return self.root / "meshes"
 
     @property
-    def textures(self) -> Path:
+    def resampled(self) -> Path:
         """texture: `textures.arrow`."""
+        return self.root / "resampled"
+
+    @property
+    def textures(self) -> Path:
+        """bake: `textures.arrow`, which ship."""
         return self.root / "textures"
 
     @property

@@ -6,9 +6,9 @@ from facefolds_core.asset import AssetSource
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.frames import FrameStore
-from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene
+from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
-from facefolds_core.export.stores import read_meshes, read_windows
+from facefolds_core.export.stores import read_centre, read_meshes, read_windows
 from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams
 from facefolds_core.paths import SubjectFolders
@@ -21,7 +21,8 @@ def compress(folders: SubjectFolders) -> str:
     meshes = read_meshes(folders.meshes / "meshes.npz")
     windows = read_windows(folders.samples / "grids.npz")
     textures = FrameStore(folders.textures / "textures.arrow")
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), SPHERE_CENTRE)
+    centre = read_centre(folders.samples / "grids.npz")
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), centre)
     manifest = package(folders.asset, Export(meshes, windows, textures), scene, source, params)
     level = manifest.full
     write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame, params.glb.draco)

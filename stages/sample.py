@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
@@ -27,8 +29,8 @@ def sample(folders: SubjectFolders) -> str:
         window = visible_window(model, [scene.cameras[i] for i in scene.indices("train")])
     grids = sample_grids(model, params.resolution, window)
     with atomic_folder(folders.samples) as temporary:
-        write_grids(temporary / "grids.npz", grids)
-        write_textures(temporary / "textures.arrow", model, grids)
+        opacity = write_textures(temporary / "textures.arrow", model, grids)
+        write_grids(temporary / "grids.npz", replace(grids, opacity=opacity))
     u0, u1, v0, v1 = window
     return (
         f"{grids.num_layers} layers of {params.resolution} x {params.resolution} samples ({grids.valid.mean():.1%} "

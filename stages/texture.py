@@ -1,4 +1,4 @@
-"""Texture frames at R^t x R^t: data/<subject>/textures."""
+"""Texture frames at R^t x R^t: data/<subject>/resampled."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stages.common import run_stage
 
 def texture(folders: SubjectFolders) -> str:
     size = read_stage(TextureParams, folders.config).resolution
-    with atomic_folder(folders.textures) as temporary:
+    with atomic_folder(folders.resampled) as temporary:
         source = resample_store(folders.samples / "textures.arrow", temporary / "textures.arrow", size)
     if size > source.height:
         typer.echo(
@@ -22,7 +22,7 @@ def texture(folders: SubjectFolders) -> str:
             "enlarging adds texels but no detail",
             err=True,
         )
-    return f"{len(source.keys())} textures, {source.height} x {source.width} to {size} x {size}, in {folders.textures}"
+    return f"{len(source.keys())} textures, {source.height} x {source.width} to {size} x {size}, in {folders.resampled}"
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """One frame of an asset as a binary glTF 2.0 file (GLB), for programs that know nothing of the asset format.
 
 A node, mesh, material and PNG for each layer: KHR_materials_unlit, alphaMode BLEND, double-sided, edges clamped. The
-root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x, y, z) -> (y, z, x). Nodes are listed from
-the innermost layer to the outermost, because viewers draw blended objects at one distance in that order.
+root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x, y, z) -> (y, z, x). Nodes are listed
+from the innermost layer to the outermost: viewers draw blended objects at one distance in that order.
 
 glTF's viewers decode colours to linear light before they blend, the asset's players do not: half-transparent parts look
 slightly different (docs/asset-format.md).

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.draco import DracoError, decode_mesh
+from facefolds_core.asset.effects import Map, read_effects
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     REMEDY,
@@ -53,6 +54,14 @@ class AssetLevel:
     @property
     def num_frames(self) -> int:
         return self.entry.texture.frames
+
+    def effects(self) -> tuple[Map, ...] | None:
+        """The view effects, one map (h, w, 3, 3) a layer; None where the level has none.
+
+        Raises:
+            UserError: if their picture is damaged.
+        """
+        return read_effects(self.folder, self.entry)
 
     def frames(self) -> Iterator[Frame]:
         """All frames in order, decoded as they are asked for.
@@ -131,6 +140,10 @@ class Asset:
     @property
     def num_frames(self) -> int:
         return self.full.num_frames
+
+    def effects(self) -> tuple[Map, ...] | None:
+        """As `AssetLevel.effects`."""
+        return self.full.effects()
 
     def frames(self) -> Iterator[Frame]:
         """As `AssetLevel.frames`."""

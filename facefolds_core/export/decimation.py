@@ -1,4 +1,4 @@
-"""Decimation of each layer to at most R^m x R^m vertices, and its texture coordinates.
+"""Decimation of Poisson surfaces, each by itself, to at most R^m x R^m vertices, and their texture coordinates.
 
 Quadric edge collapse (Garland and Heckbert 1997) by fast_simplification with aggressiveness 3. Measured
 (docs/export.md) against its default, which errs two to three times more, and against pymeshlab's, which with its border
@@ -41,11 +41,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Order:
-    """Neighbouring layers compared along rays from c through the inner one's vertices.
+    """Neighbouring layers compared along rays from c through the vertices of both.
 
     Attributes:
-        compared: vertices of inner layers whose ray meets the layer outside.
-        crossed: those that lie beyond it.
+        compared: vertices whose ray meets the other layer.
+        crossed: those of the inner layer that lie beyond the outer one, and of the outer one that lie below the inner.
         deepest: by how much at most, units.
     """
 
@@ -148,17 +148,22 @@ def exact_st(vertices: NDArray[np.float32], window: Window, centre: Array) -> ND
 
 
 def layer_order(meshes: Sequence[Surface], centre: Array) -> Order:
-    """Count the vertices of each layer that lie outside the layer around it."""
+    """Count the vertices of each layer that lie on the wrong side of a neighbouring layer."""
     compared, crossed, deepest = 0, 0, 0.0
     for outer, inner in pairwise(meshes):
-        offset = inner.vertices.astype(np.float64) - centre
-        radius = np.linalg.norm(offset, axis=-1)
-        caster = RayMeshIntersector(Trimesh(outer.vertices, outer.faces, process=False))
-        _, ray, points = caster.intersects_id(
-            np.tile(centre, (len(offset), 1)), offset / radius[:, None], multiple_hits=False, return_locations=True
-        )
-        beyond = radius[ray] - np.linalg.norm(points - centre, axis=-1)
-        compared += len(ray)
-        crossed += int((beyond > CROSSING_TOLERANCE).sum())
-        deepest = max(deepest, float(beyond.max(initial=0.0)))
+        for beyond in (_heights(inner, outer, centre), -_heights(outer, inner, centre)):
+            compared += len(beyond)
+            crossed += int((beyond > CROSSING_TOLERANCE).sum())
+            deepest = max(deepest, float(beyond.max(initial=0.0)))
     return Order(compared, crossed, deepest)
+
+
+def _heights(mesh: Surface, other: Surface, centre: Array) -> Array:
+    """By how much the vertices of `mesh` lie farther from c than `other`, of those whose ray meets it."""
+    offset = mesh.vertices.astype(np.float64) - centre
+    radius = np.linalg.norm(offset, axis=-1)
+    caster = RayMeshIntersector(Trimesh(other.vertices, other.faces, process=False))
+    _, ray, points = caster.intersects_id(
+        np.tile(centre, (len(offset), 1)), offset / radius[:, None], multiple_hits=False, return_locations=True
+    )
+    return np.asarray(radius[ray] - np.linalg.norm(points - centre, axis=-1))

@@ -37,6 +37,9 @@ def sample_grids(model: LayeredModel, resolution: int, window: Window, progress:
 
     Raises:
         UserError: if the model gives a point that is not finite, or a layer has no point at all.
+
+    Returns:
+        the grids, opaque wherever they are valid: `write_textures` finds out what is not.
     """
     centre = model.centre.detach()
     uv = torch.as_tensor(texel_uv(resolution, resolution, window).reshape(-1, 2)).to(centre)
@@ -54,7 +57,7 @@ def sample_grids(model: LayeredModel, resolution: int, window: Window, progress:
     c = centre.cpu().numpy().astype(np.float64)
     normals = np.stack([grid_normals(p, v, c, window) for p, v in zip(points, valid, strict=True)])
     windows = np.tile(np.array(window, np.float64), (model.num_layers, 1))
-    return Grids(points, normals.astype(np.float32), valid, windows)
+    return Grids(points, normals.astype(np.float32), valid, valid.astype(np.uint8) * 255, windows, c)
 
 
 def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None:
@@ -166,6 +169,18 @@ def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[
     return np.asarray((rgba.clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
 
 
-def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool = True) -> None:
-    """Write all texture images to a layered frame store (camera := layer), holding one in memory."""
-    write_frames(path, (grids.resolution, grids.resolution, 4), texture_rows(model, grids, progress))
+def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool = True) -> NDArray[np.uint8]:
+    """Write all texture images to a layered frame store (camera := layer), holding one in memory.
+
+    Returns:
+        (N, R, R) largest alpha of any frame.
+    """
+    opacity = np.zeros(grids.valid.shape, np.uint8)
+
+    def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+        for layer, frame, image in texture_rows(model, grids, progress):
+            np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
+            yield layer, frame, image
+
+    write_frames(path, (grids.resolution, grids.resolution, 4), rows())
+    return opacity

@@ -1,8 +1,10 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
-- `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, windows (N, 4) float64;
-- `surfaces/surfaces.npz`: vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer;
-- `meshes/meshes.npz`: the same and st_00 (V, 2) float32, layer-local texture coordinates.
+- `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, opacity (N, R, R) uint8,
+  windows (N, 4) float64, centre (3,) float64;
+- `surfaces/surfaces.npz`: of `poisson` vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer; of
+  `grid` the arrays of `Sheets`;
+- `meshes/meshes.npz`: such pairs and st_00 (V, 2) float32, layer-local texture coordinates.
 
 Layers are outermost first. Every array is checked when it is read: shape, type, finite numbers, indices in range.
 """
@@ -12,7 +14,7 @@ from __future__ import annotations
 import zipfile
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +37,17 @@ class Grids:
         points: (N, R, R, 3) float32; where a sample is not valid, anything finite.
         normals: (N, R, R, 3) float32, unit length, outward.
         valid: (N, R, R) bool: the layer has a point in this direction.
+        opacity: (N, R, R) uint8: no frame's alpha is larger, as a code of 8 bits; 0 where not valid.
         windows: (N, 4) float64, (u0, u1, v0, v1) of each layer's grid.
+        centre: (3,) float64, the model's c.
     """
 
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
     valid: NDArray[np.bool_]
+    opacity: NDArray[np.uint8]
     windows: NDArray[np.float64]
+    centre: NDArray[np.float64]
 
     @property
     def num_layers(self) -> int:
@@ -56,19 +62,48 @@ class Grids:
         return u0, u1, v0, v1
 
 
+@dataclass(frozen=True)
+class Sheets:
+    """All layers as radii over one grid of n x n directions, nested: radii never grow from a layer to the next.
+
+    Attributes:
+        st: (n, n, 2) float64, texture coordinates of the grid's vertices: rows down, columns right.
+        radii: (N, n, n) float32, distance from c, outermost layer first; defined everywhere.
+        valid: (N, n, n) bool: the layer has a point there.
+        opacity: (N, n, n) uint8, as in `Grids`.
+        falling: (n - 1, n - 1) bool: the cell's diagonal goes from its top left to its bottom right corner.
+        window: (4,) float64, (u0, u1, v0, v1) of the texture coordinates.
+        centre: (3,) float64, c.
+    """
+
+    st: NDArray[np.float64]
+    radii: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+    opacity: NDArray[np.uint8]
+    falling: NDArray[np.bool_]
+    window: NDArray[np.float64]
+    centre: NDArray[np.float64]
+
+    @property
+    def num_layers(self) -> int:
+        return len(self.radii)
+
+
 def write_grids(path: Path, grids: Grids) -> None:
-    _write(path, {"points": grids.points, "normals": grids.normals, "valid": grids.valid, "windows": grids.windows})
+    _write(path, {field.name: getattr(grids, field.name) for field in fields(grids)})
 
 
 def read_grids(path: Path) -> Grids:
     """Raises UserError if the file is missing, damaged or not what `write_grids` writes."""
     arrays = _read(path)
-    n, r = _shape(arrays, path, "points")[:2]
+    n, r = _shape(arrays, path, "points", 2)[:2]
     grids = Grids(
         points=_take(arrays, path, "points", (n, r, r, 3), np.float32),
         normals=_take(arrays, path, "normals", (n, r, r, 3), np.float32),
         valid=_take(arrays, path, "valid", (n, r, r), np.bool_),
+        opacity=_take(arrays, path, "opacity", (n, r, r), np.uint8),
         windows=_take(arrays, path, "windows", (n, 4), np.float64),
+        centre=_take(arrays, path, "centre", (3,), np.float64),
     )
     _check_windows(grids.windows, path)
     return grids
@@ -80,6 +115,12 @@ def read_windows(path: Path) -> list[Window]:
     windows = _take(arrays, path, "windows", (len(arrays.get("windows", ())), 4), np.float64)
     _check_windows(windows, path)
     return [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
+
+
+def read_centre(path: Path) -> tuple[float, float, float]:
+    """Only the sphere centre c in a file of `write_grids`; raises as `read_grids` does."""
+    x, y, z = (float(value) for value in _take(_read(path, {"centre"}), path, "centre", (3,), np.float64))
+    return x, y, z
 
 
 def _check_windows(windows: NDArray[np.float64], path: Path) -> None:
@@ -100,6 +141,34 @@ def read_surfaces(path: Path) -> list[Surface]:
     """Raises UserError if the file is missing, damaged or not what `write_surfaces` writes."""
     arrays = _read(path)
     return [_surface(arrays, path, i) for i in range(_count(arrays, path))]
+
+
+def write_sheets(path: Path, sheets: Sheets) -> None:
+    _write(path, {field.name: getattr(sheets, field.name) for field in fields(sheets)})
+
+
+def holds_sheets(path: Path) -> bool:
+    """Whether a file of surfaces was written by `write_sheets`; raises as `read_sheets` does."""
+    return "radii" in _read(path, {"radii"})
+
+
+def read_sheets(path: Path) -> Sheets:
+    """Raises UserError if the file is missing, damaged or not what `write_sheets` writes."""
+    arrays = _read(path)
+    layers, n = _shape(arrays, path, "radii", 2)[:2]
+    sheets = Sheets(
+        st=_take(arrays, path, "st", (n, n, 2), np.float64),
+        radii=_take(arrays, path, "radii", (layers, n, n), np.float32),
+        valid=_take(arrays, path, "valid", (layers, n, n), np.bool_),
+        opacity=_take(arrays, path, "opacity", (layers, n, n), np.uint8),
+        falling=_take(arrays, path, "falling", (n - 1, n - 1), np.bool_),
+        window=_take(arrays, path, "window", (4,), np.float64),
+        centre=_take(arrays, path, "centre", (3,), np.float64),
+    )
+    _check_windows(sheets.window[None], path)
+    if not ((sheets.radii > 0).all() and (np.diff(sheets.radii, axis=0) <= 0).all()):
+        raise _damaged(path, "radii", "positive radii that fall from layer to layer", "others")
+    return sheets
 
 
 def write_meshes(path: Path, meshes: Sequence[TexturedMesh]) -> None:
@@ -143,10 +212,10 @@ def _damaged(path: Path, name: str, expected: object, found: object) -> UserErro
     return UserError("a damaged geometry file", file=path, place=name, expected=expected, found=found, remedy=_REMEDY)
 
 
-def _shape(arrays: dict[str, NDArray[Any]], path: Path, name: str) -> tuple[int, ...]:
+def _shape(arrays: dict[str, NDArray[Any]], path: Path, name: str, axes: int = 1) -> tuple[int, ...]:
     if name not in arrays:
         raise _damaged(path, name, "an array of this name", ", ".join(sorted(arrays)) or "nothing")
-    if arrays[name].ndim < 2 or 0 in arrays[name].shape:
+    if arrays[name].ndim < axes or 0 in arrays[name].shape:
         raise _damaged(path, name, "an array that is not empty", arrays[name].shape)
     return arrays[name].shape
 

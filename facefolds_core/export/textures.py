@@ -31,17 +31,29 @@ def resample(image: Image, size: int) -> Image:
     Returns:
         (size, size, 4) uint8 RGBA, straight alpha, no alpha-0 texel without a colour (unless all are).
     """
-    premultiplied: Float = np.asarray(image / np.float32(255), np.float32)
-    premultiplied[..., :3] *= premultiplied[..., 3:]
+    premultiplied = premultiply(image)
     if size != len(image):
         method = cv2.INTER_AREA if size < len(image) else cv2.INTER_LINEAR
         premultiplied = np.asarray(cv2.resize(premultiplied, (size, size), interpolation=method), np.float32)
+    result = straight(premultiplied)
+    if size == len(image):  # exactly what was there, where it shows
+        shown = result[..., 3] > 0
+        result[shown] = image[shown]
+    return result
+
+
+def premultiply(image: Image) -> Float:
+    """(H, W, 4) uint8 RGBA, straight -> float32 in [0, 1], colour times alpha."""
+    premultiplied: Float = np.asarray(image / np.float32(255), np.float32)
+    premultiplied[..., :3] *= premultiplied[..., 3:]
+    return premultiplied
+
+
+def straight(premultiplied: Float) -> Image:
+    """The way back, to 8 bits; no alpha-0 texel is left without a colour (unless all are)."""
     alpha = np.rint(premultiplied[..., 3] * 255).clip(0, 255).astype(np.uint8)
     colour = fill_colour(premultiplied, alpha > 0)
-    result = np.concatenate([np.rint(colour * 255).clip(0, 255).astype(np.uint8), alpha[..., None]], -1)
-    if size == len(image):  # exactly what was there, where it shows
-        result[alpha > 0] = image[alpha > 0]
-    return result
+    return np.concatenate([np.rint(colour * 255).clip(0, 255).astype(np.uint8), alpha[..., None]], -1)
 
 
 def fill_colour(premultiplied: Float, shown: NDArray[np.bool_]) -> Float:

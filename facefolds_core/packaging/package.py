@@ -15,6 +15,7 @@ from PIL import Image
 
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
+from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Level,
@@ -23,6 +24,7 @@ from facefolds_core.asset.manifest import (
     Poster,
     Quality,
     StoredFile,
+    ViewEffects,
     write_manifest,
 )
 from facefolds_core.asset.reader import read_level
@@ -42,12 +44,14 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.packaging.effects import fit_effects
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import FRAMES, ViewMeter, spread, training_cameras
 from facefolds_core.params import CompressParams, VideoCodec
 from facefolds_core.rendering.reference import AssetCaster, composite
 
+EFFECTS_SHARE = 0.1
 SEARCH_FRAMES = 30
 """A search for a quality encodes at most so many frames, from the first on."""
 JPEG_QUALITY = 92
@@ -83,6 +87,8 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
     params = params.model_copy(update={"mesh": resolved(params.mesh, layers, cameras)})
     with atomic_folder(folder) as temporary:
         level = _level(temporary, FULL, content, params, meter)
+        if params.view_effects:
+            level = _with_effects(temporary, level, fit_effects(content, scene, EFFECTS_SHARE * level.bytes))
         manifest = manifest_of(source, [level])
         manifest = _with_extras(temporary, manifest, scene, params.photos)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
@@ -108,6 +114,21 @@ def _level(folder: Path, name: str, content: LevelContent, params: CompressParam
     shown = read_level(folder, level)
     psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
     return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3))})
+
+
+def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) -> Level:
+    """Add view effects to a level, where there are any."""
+    if picture is None:
+        return level
+    path = folder / f"{level.name}_effects.png"
+    path.write_bytes(picture.png())
+    height, width = picture.codes.shape[:2]
+    effects = ViewEffects(**_stored(path), scale=picture.scale, width=width, height=height, planes=picture.planes)
+    layers = [
+        layer.model_copy(update={"effects_rect": rect}) for layer, rect in zip(level.layers, picture.rects, strict=True)
+    ]
+    update = {"layers": tuple(layers), "view_effects": effects, "bytes": level.bytes + effects.bytes}
+    return level.model_copy(update=update)
 
 
 def _crf(content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMeter, target: float) -> int:

@@ -8,6 +8,7 @@ alone, then its colour where depth is equal, so that its folds count once.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.effects import Map
 from facefolds_core.rendering.reference import BLACK, Image, Layered
 
 VERTEX = """
@@ -26,9 +28,11 @@ uniform vec2 slice; // of the depth range [-1, 1]: half its size, its middle
 in vec3 position;
 in vec2 corner_st;
 out vec2 st;
+out vec3 point;
 invariant gl_Position; // the same depth in both passes
 void main() {
   st = corner_st;
+  point = position;
   gl_Position = projection * vec4(position, 1.0);
   gl_Position.z = slice.x * gl_Position.z + slice.y * gl_Position.w;
 }
@@ -39,6 +43,21 @@ uniform sampler2D picture;
 in vec2 st;
 out vec4 colour;
 void main() { colour = texture(picture, st); }
+"""
+FRAGMENT_WITH_EFFECTS = """
+#version 330
+uniform sampler2D picture;
+uniform sampler2DArray effects; // what to add for each unit of x, y and z of the direction to the eye
+uniform vec3 eye;
+in vec2 st;
+in vec3 point;
+out vec4 colour;
+void main() {
+  colour = texture(picture, st);
+  vec3 to_eye = normalize(eye - point);
+  for (int k = 0; k < 3; ++k) colour.rgb += to_eye[k] * texture(effects, vec3(st, k)).rgb;
+  colour.rgb = clamp(colour.rgb, 0.0, 1.0);
+}
 """
 NOTHING = """
 #version 330
@@ -57,17 +76,19 @@ class OpenGLRenderer:
 
     Args:
         asset: its meshes go to the card at once, textures as frames are asked for.
+        effects: one map of view effects a layer, such as `asset.effects()`; None for none.
 
     Raises:
         UserError: if there is no OpenGL here.
     """
 
-    def __init__(self, asset: Layered) -> None:
+    def __init__(self, asset: Layered, effects: Sequence[Map] | None = None) -> None:
         self._asset = asset
         self._context = _make_context()
-        self._colour = self._context.program(VERTEX, FRAGMENT)
+        self._colour = self._context.program(VERTEX, FRAGMENT if effects is None else FRAGMENT_WITH_EFFECTS)
         self._depth = self._context.program(VERTEX, NOTHING)
         self._layers = [self._upload(layer) for layer in asset.layers]
+        self._effects = [self._effect(table) for table in effects or ()]
         self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
         self._frame = -1
         self._textures: list[moderngl.Texture] = []
@@ -102,12 +123,17 @@ class OpenGLRenderer:
         projection = _projection(camera, self._vertices).T.astype("f4").tobytes()
         for program in (self._depth, self._colour):
             _uniform(program, "projection").write(projection)
+        if self._effects:
+            _uniform(self._colour, "effects").value = 1
+            _uniform(self._colour, "eye").write(camera.centre.astype("f4").tobytes())
         count = len(self._layers)
         for index in reversed(range(count)):
             # NDC depth from -1 (outermost layer) to 1; a little is left free between slices.
             slice_ = np.array([0.99 / count, (2 * index + 1) / count - 1], "f4").tobytes()
             for program in (self._depth, self._colour):
                 _uniform(program, "slice").write(slice_)
+            if self._effects:
+                self._effects[index].use(1)
             self._draw_layer(target, *self._layers[index], self._textures[index])
         data = np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
         rgba = data.reshape(camera.height, camera.width, 4)[::-1]
@@ -154,6 +180,15 @@ class OpenGLRenderer:
         """Stored values as they are: no sRGB format. Row 0 is the top, as t runs."""
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels).tobytes(), alignment=1)
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        texture.repeat_x = texture.repeat_y = False
+        return texture
+
+    def _effect(self, table: Map) -> moderngl.TextureArray:
+        """(h, w, k, rgb) -> three pictures."""
+        height, width = table.shape[:2]
+        pictures = np.ascontiguousarray(table.transpose(2, 0, 1, 3), np.float32)
+        texture = self._context.texture_array((width, height, 3), 3, pictures.tobytes(), alignment=1, dtype="f4")
         texture.filter = moderngl.LINEAR, moderngl.LINEAR
         texture.repeat_x = texture.repeat_y = False
         return texture

@@ -102,13 +102,19 @@ def sample_texture(texture: Texture, st: NDArray[np.float32]) -> Image:
     return np.asarray(((1 - fy) * upper + fy * lower) / np.float32(255), np.float32)
 
 
-def composite(hits: Hits, textures: Sequence[Texture], background: ArrayLike = BLACK) -> tuple[Image, Image]:
+def composite(
+    hits: Hits,
+    textures: Sequence[Texture],
+    background: ArrayLike = BLACK,
+    added: Sequence[Image] | None = None,
+) -> tuple[Image, Image]:
     """C = sum_i alpha_i c_i prod_{k<i} (1 - alpha_k) + transmittance * background, in stored values.
 
     Args:
         hits: of one camera.
         textures: N textures (h, w, 4) uint8, one frame of all layers.
         background: RGB in [0, 1], (3,) or (H, W, 3).
+        added: for each layer (M, 3), what to add to the colours of its M hits before blending: view effects.
 
     Returns:
         rgb (H, W, 3) and alpha (H, W), float32 in [0, 1].
@@ -121,7 +127,8 @@ def composite(hits: Hits, textures: Sequence[Texture], background: ArrayLike = B
         hit = hits.hit[..., i]
         rgba = sample_texture(texture, hits.st[..., i, :][hit])
         through = transmittance[hit]
-        rgb[hit] += (through * rgba[:, 3])[:, None] * rgba[:, :3]
+        colour = rgba[:, :3] if added is None else np.clip(rgba[:, :3] + added[i], 0, 1)
+        rgb[hit] += (through * rgba[:, 3])[:, None] * colour
         transmittance[hit] = through * (1 - rgba[:, 3])
     rgb += transmittance[..., None] * np.asarray(background, np.float32)
     return rgb, 1 - transmittance

@@ -20,11 +20,14 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
 
 VARIANTS = ("model", "diffuse", "asset")
+WITH_EFFECTS = "asset_view"
+"""A further variant, where the asset has view effects: the asset with them."""
 METRICS = ("psnr", "ssim", "lpips", "st_lpips")
 SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
 
@@ -40,7 +43,7 @@ class ImageScore:
 
     Attributes:
         camera, frame: their names in the capture.
-        variant: one of VARIANTS.
+        variant: one of VARIANTS, or WITH_EFFECTS.
         values: METRICS and SUBJECT_METRICS; None where a value cannot be had.
     """
 
@@ -167,12 +170,17 @@ def _rendered(
 ) -> Iterator[tuple[int, dict[str, NDArray[np.float32]]]]:
     """The variants' images (H, W, 3) over `background`, frame by frame."""
     view, hits = ModelView(model, camera), caster.cast(camera)
+    maps = asset.effects()
+    added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     whole = len(frames) == asset.num_frames
     for k, textures in enumerate(asset.frames()) if whole else ((k, asset.frame(k)) for k in frames):
         with_view, without_view, alpha = view.render(float(k))
         behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
         shipped, _ = composite(hits, textures, background)
-        yield k, {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
+        images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
+        if added is not None:
+            images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
+        yield k, images
 
 
 def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:

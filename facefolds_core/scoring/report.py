@@ -14,10 +14,10 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file, read_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
+from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS, ImageScore
 
 METRICS_VERSION = 1
-EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "compress")
+EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
 
 VERTEX_BYTES = 20
 """Position (3 float32) and texture coordinates (2 float32)."""
@@ -56,9 +56,13 @@ def metrics_json(subject: str, scores: Sequence[ImageScore], cost: dict[str, Any
         "subject": subject,
         "images": len(images),
         "images_with_mask": sum(s.values["psnr_subject"] is not None for s in images),
-        **{variant: averages(scores, variant) for variant in VARIANTS},
+        **{variant: averages(scores, variant) for variant in _variants(scores)},
         "cost": cost,
     }
+
+
+def _variants(scores: Sequence[ImageScore]) -> tuple[str, ...]:
+    return (*VARIANTS, WITH_EFFECTS) if any(s.variant == WITH_EFFECTS for s in scores) else VARIANTS
 
 
 def averages(scores: Sequence[ImageScore], variant: str) -> dict[str, float | None]:
@@ -90,6 +94,7 @@ def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
         "triangles": triangles,
         "mesh_bytes": sum(x.bytes for x in level.layers),
         "texture_bytes": level.texture.videos[0].bytes,
+        "view_effects_bytes": level.view_effects.bytes if level.view_effects else 0,
         "gpu_bytes": VERTEX_BYTES * vertices + 3 * INDEX_BYTES * triangles + PIXEL_BYTES * picture,
     }
 
@@ -108,13 +113,14 @@ def write_per_image(scores: Sequence[ImageScore], path: Path) -> None:
 
 def text_table(metrics: dict[str, Any]) -> str:
     """The averages as a small table, one line a variant; metrics that nothing has are left out."""
-    names = [n for n in (*METRICS, *SUBJECT_METRICS) if any(metrics[v][n] is not None for v in VARIANTS)]
-    lines = ["".join([f"{'':<8}", *(f"{name:>18}" for name in names)])]
-    for variant in VARIANTS:
+    variants = [v for v in (*VARIANTS, WITH_EFFECTS) if v in metrics]
+    names = [n for n in (*METRICS, *SUBJECT_METRICS) if any(metrics[v][n] is not None for v in variants)]
+    lines = ["".join([f"{'':<11}", *(f"{name:>18}" for name in names)])]
+    for variant in variants:
         cells = [
             "-" if (v := metrics[variant][n]) is None else f"{v:.2f}" if "psnr" in n else f"{v:.4f}" for n in names
         ]
-        lines.append("".join([f"{variant:<8}", *(f"{cell:>18}" for cell in cells)]))
+        lines.append("".join([f"{variant:<11}", *(f"{cell:>18}" for cell in cells)]))
     return "\n".join(lines)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.draco import encode_mesh
+from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
@@ -20,7 +21,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CompressParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
-from tests.assets import WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
@@ -35,7 +36,7 @@ def folders(tmp_path: Path) -> SubjectFolders:
         Scene("caps", (), (), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene), subject.scene
     )
     subject.samples.mkdir()
-    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3))
+    np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3), centre=np.array(CENTRE))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(3)]
     arrays = {f"{name}_{i:02d}": getattr(mesh, name) for i, mesh in enumerate(meshes) for name in vars(mesh)}
     subject.meshes.mkdir()
@@ -91,6 +92,22 @@ def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
     assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
 
 
+def test_view_effects_ship_and_are_scored_apart(folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch) -> None:
+    maps = [np.full((4, 3, 3, 3), 0.01 * (i + 1), np.float32) for i in range(3)]
+    monkeypatch.setattr("facefolds_core.packaging.package.fit_effects", lambda *_: EffectsPicture.of(maps))
+    rig(folders, view_effects=True)
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    asset = read_asset(folders.asset)
+    found = asset.effects()
+    assert found is not None
+    for table, given in zip(found, maps, strict=True):
+        np.testing.assert_allclose(table, given, atol=0.001)
+    assert asset.manifest.full.bytes == sum(size for _, size, _ in asset.manifest.full.files())
+    (folders.asset / "full_effects.png").write_bytes(b"")
+    assert any(problem.startswith("full_effects.png:") for problem in validate_asset(folders.asset))
+
+
 def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     rig(folders, photos=3)
     with wave.open(str(folders.scene / "audio.wav"), "wb") as file:
@@ -130,6 +147,6 @@ def test_damaged_input(folders: SubjectFolders, file: str, damage: str) -> None:
 
 
 def test_fewer_meshes_than_windows(folders: SubjectFolders) -> None:
-    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4))
+    np.savez(folders.samples / "grids.npz", windows=np.array([WINDOW] * 4), centre=np.array(CENTRE))
     with pytest.raises(UserError, match="do not belong together"):
         compress(folders)

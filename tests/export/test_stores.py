@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +11,18 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
     Grids,
+    holds_sheets,
+    read_centre,
     read_grids,
     read_meshes,
+    read_sheets,
     read_surfaces,
     write_grids,
     write_meshes,
+    write_sheets,
     write_surfaces,
 )
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
@@ -36,7 +41,7 @@ def grids() -> Grids:
 def test_grids_round_trip(tmp_path: Path, grids: Grids) -> None:
     write_grids(tmp_path / "grids.npz", grids)
     back = read_grids(tmp_path / "grids.npz")
-    for name in ("points", "normals", "valid", "windows"):
+    for name in ("points", "normals", "valid", "opacity", "windows", "centre"):
         assert np.array_equal(getattr(back, name), getattr(grids, name))
 
 
@@ -51,6 +56,22 @@ def test_surfaces_round_trip(tmp_path: Path) -> None:
     write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
     (back,) = read_surfaces(tmp_path / "surfaces.npz")
     assert np.array_equal(back.vertices, TRIANGLE.vertices)
+
+
+def test_sheets_round_trip_and_are_told_from_surfaces(tmp_path: Path, grids: Grids) -> None:
+    sheets = grid_sheets(grids, None).sheets
+    write_sheets(tmp_path / "sheets.npz", sheets)
+    write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
+    back = read_sheets(tmp_path / "sheets.npz")
+    for field in fields(sheets):
+        assert np.array_equal(getattr(back, field.name), getattr(sheets, field.name))
+    assert holds_sheets(tmp_path / "sheets.npz")
+    assert not holds_sheets(tmp_path / "surfaces.npz")
+
+
+def test_the_centre_can_be_read_alone(tmp_path: Path, grids: Grids) -> None:
+    write_grids(tmp_path / "grids.npz", replace(grids, centre=np.array([0.1, 0.2, 0.3])))
+    assert read_centre(tmp_path / "grids.npz") == (0.1, 0.2, 0.3)
 
 
 def test_the_same_meshes_make_the_same_file(tmp_path: Path) -> None:
@@ -106,6 +127,8 @@ def test_pickled_objects_are_refused(tmp_path: Path) -> None:
         ({"points": np.zeros((2, 8, 8, 2), np.float32)}, "points"),
         ({"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
         ({"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
+        ({"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
+        ({"centre": np.array([0.0, np.nan, 0.0])}, "centre"),
         ({"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
     ],
 )
@@ -113,6 +136,22 @@ def test_wrong_grids_are_errors(tmp_path: Path, grids: Grids, change: dict[str, 
     write_grids(tmp_path / "grids.npz", replace(grids, **change))
     with pytest.raises(UserError, match=place):
         read_grids(tmp_path / "grids.npz")
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"radii": np.ones((2, 8, 7), np.float32)}, "radii"),
+        ({"radii": np.zeros((2, 8, 8), np.float32)}, "radii"),
+        ({"radii": np.array([1, 2], np.float32)[:, None, None] * np.ones((8, 8), np.float32)}, "radii"),
+        ({"st": np.full((8, 8, 2), np.inf)}, "st"),
+        ({"falling": np.ones((8, 8), bool)}, "falling"),
+    ],
+)
+def test_wrong_sheets_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
+    write_sheets(tmp_path / "surfaces.npz", replace(grid_sheets(grids, None).sheets, **change))
+    with pytest.raises(UserError, match=place):
+        read_sheets(tmp_path / "surfaces.npz")
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ STAGES = [
     "reconstruct",
     "decimate",
     "texture",
+    "bake",
     "compress",
     "evaluate",
 ]
@@ -73,4 +74,4 @@ def test_a_change_of_texture_resolution_reruns_three_stages(pipeline: dict[str, 
         ):
             rerun.append(name)
             changed |= set(stage["outs"]) | set(stage.get("metrics", []))
-    assert rerun == ["texture", "compress", "evaluate"]
+    assert rerun == ["texture", "bake", "compress", "evaluate"]

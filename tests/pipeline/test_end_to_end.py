@@ -13,7 +13,7 @@ import pytest
 
 from tests.pipeline.tiny import PARAMS, TinyProject
 
-EXPORT_OF_TEXTURES = ["texture@actor", "compress@actor", "evaluate@actor"]
+EXPORT_OF_TEXTURES = ["texture@actor", "bake@actor", "compress@actor", "evaluate@actor"]
 
 
 def stages_run(output: str) -> list[str]:
@@ -129,6 +129,8 @@ DAMAGE = [
     ("reconstruct", "samples/grids.npz"),
     ("decimate", "surfaces/surfaces.npz"),
     ("texture", "samples/textures.arrow"),
+    ("bake", "resampled/textures.arrow"),
+    ("bake", "meshes/meshes.npz"),
     ("compress", "meshes/meshes.npz"),
     ("compress", "textures/textures.arrow"),
     ("evaluate", "asset/manifest.json"),

@@ -33,9 +33,10 @@ subjects:
 capture: {cameras: 8, frames: 2, height: 48, width: 32}
 train: {preset: quick, iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
 sample: {resolution: 64}
-reconstruct: {depth: 6}
+reconstruct: {}
 decimate: {resolution: 12}
 texture: {resolution: 32}
+bake: {}
 normalize: {}
 compress: {}
 evaluate: {}

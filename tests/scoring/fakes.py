@@ -79,6 +79,9 @@ class FlatAsset:
         vertices = np.stack([np.zeros(4), 0.7 * st[:, 0] - 0.35, 0.35 - 0.7 * st[:, 1]], 1).astype(np.float32)
         return (TexturedMesh(vertices, np.array([[0, 2, 1], [1, 2, 3]], np.int32), st),)
 
+    def effects(self) -> None:
+        return None
+
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         for frame in self.frames_:
             yield np.concatenate([frame, np.full((*frame.shape[:2], 1), 255, np.uint8)], -1)[None]

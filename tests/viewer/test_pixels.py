@@ -11,7 +11,7 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.rendering.reference import sample_texture
+from facefolds_core.rendering.effects import added_colours, to_eye
 from tests.assets import make_asset
 from tests.viewer.conftest import NewPlayer
 from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, reference
@@ -75,39 +75,17 @@ def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps:
 
 
 def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:
-    """Each layer's colour, shifted by the direction to the eye as docs/asset-format.md says, in plain numpy."""
     asset = read_asset(rich)
     player = new_player({"asset": asset.folder})
     player.open("asset")
     player.wait("e.level === 'full'")
     player.run("e.background = v", GREY)
     camera = five_cameras(SIZE)[1]
-    expected = with_effects(asset, camera)
+    maps, hits = asset.effects(), AssetCaster(asset).cast(camera)
+    assert maps is not None
+    expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added_colours(hits, to_eye(camera), maps))
     assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
     player.run("e.effects = false")
     plain = reference(asset, camera, 0)
     assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
     assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test
-
-
-def with_effects(asset: Asset, camera: object) -> np.ndarray:
-    level = asset.full.entry
-    effects = level.view_effects
-    assert effects is not None
-    picture = np.asarray(Image.open(asset.folder / effects.file))
-    hits = AssetCaster(asset).cast(camera)  # type: ignore[arg-type]
-    to_eye = -camera.rays()[1]  # type: ignore[attr-defined]
-    rgb, through = np.zeros((SIZE, SIZE, 3)), np.ones((SIZE, SIZE))
-    for i, texture in enumerate(asset.frame(0)):
-        hit = hits.hit[..., i]
-        st = hits.st[..., i, :][hit]
-        rgba = sample_texture(texture, st)
-        x, y, w, h = level.layers[i].effects_rect or (0, 0, 0, 0)
-        shift = np.zeros((len(st), 3))
-        for k, (left, top, _, _) in enumerate(effects.planes):
-            code = sample_texture(picture[top + y : top + y + h, left + x : left + x + w], st) * 255
-            shift += to_eye[hit][:, k : k + 1] * effects.scale * (code / 127.5 - 1)
-        colour = np.clip(rgba[:, :3] + shift, 0, 1)
-        rgb[hit] += (through[hit] * rgba[:, 3])[:, None] * colour
-        through[hit] *= 1 - rgba[:, 3]
-    return rgb + through[..., None] * GREY_VALUE

@@ -1,0 +1,87 @@
+"""Decimation of nested sheets: one triangulation of at most R^m x R^m vertices for all layers.
+
+Edges collapse in the order of the quadric error (`collapse_kernel`), summed over layers. It measures the distance from
+the surface and the shift of the texture together, in units of length, weighted by how much a place shows. Layers stay
+nested (see `sheets`), vertices keep the directions and texture coordinates of samples, and the window's border stays
+straight. Then each layer's radii at the vertices are fitted to all samples (`refit`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from facefolds_core.export.collapse_kernel import build_quadrics, collapse, covers
+from facefolds_core.export.refit import refit_radii
+from facefolds_core.export.sheets import Array, directions, sheet_faces, sheet_mesh
+from facefolds_core.export.stores import Sheets
+from facefolds_core.geometry.meshes import TexturedMesh
+
+MEASURED_LAYERS = 3
+"""Layers that the error is measured on, each for its share of all: neighbours are nearly parallel."""
+
+HIDDEN = 0.05
+"""Share of its opacity that a place counts with at least, however much lies before it."""
+
+EMPTY = 1e-3
+"""What a place without opacity counts: it orders the collapses there."""
+
+LEAST_AREA = 1e-3
+"""A triangle keeps this share of a grid cell's half: it must not degenerate."""
+
+MARGIN = 2
+"""A triangle is kept if it comes this near, in samples, to one that is not transparent in all frames: filters reach
+across a texel."""
+
+
+def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
+    """Meshes of all layers, outermost first, over one triangulation.
+
+    A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
+    frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
+    """
+    st, towards, faces = sheets.st.reshape(-1, 2), directions(sheets), sheet_faces(sheets)
+    groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
+    shows = contribution(sheets.opacity)
+    weights = np.stack([shows[group].sum(0).reshape(-1) for group in groups], -1)
+    points = np.stack([_positions(sheets, int(group[len(group) // 2]), towards) for group in groups], 1)
+    quadrics = build_quadrics(points, faces, weights[faces].max(1) + EMPTY)
+    cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
+    alive = collapse(st, towards, _borders(len(sheets.st)), points, faces, quadrics, max_vertices, LEAST_AREA * cell)
+    faces = faces[alive]
+    fitted = refit_radii(sheets, shows, faces, towards)
+    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
+    kept = covers(faces, len(sheets.st), np.ascontiguousarray(opaque.transpose(1, 2, 0)))
+    meshes = []
+    for layer in range(sheets.num_layers):
+        own = kept[:, layer] if kept[:, layer].any() else np.ones(len(faces), bool)
+        meshes.append(sheet_mesh(fitted, layer, faces[own], towards))
+    return meshes
+
+
+def contribution(opacity: NDArray[np.uint8]) -> Array:
+    """(N, n, n) compositing weights of the layers seen from outside towards c, at least `HIDDEN` times the opacity."""
+    alpha = opacity / 255.0
+    through = np.concatenate([np.ones_like(alpha[:1]), np.cumprod(1 - alpha, 0)[:-1]])
+    return np.asarray(alpha * np.maximum(through, HIDDEN))
+
+
+def _positions(sheets: Sheets, layer: int, towards: Array) -> Array:
+    """(n n, 5): a layer's points relative to c, and texture coordinates as lengths on a sphere of its median radius."""
+    radii = sheets.radii[layer].reshape(-1).astype(np.float64)
+    u0, u1, v0, v1 = sheets.window
+    scale = np.median(radii) * math.pi / 2 * np.array([v1 - v0, u1 - u0])
+    return np.concatenate([radii[:, None] * towards, sheets.st.reshape(-1, 2) * scale], -1)
+
+
+def _borders(n: int) -> NDArray[np.uint8]:
+    """(n n,) bits of the grid's four borders that each vertex lies on."""
+    borders = np.zeros((n, n), np.uint8)
+    borders[0] |= 1
+    borders[-1] |= 2
+    borders[:, 0] |= 4
+    borders[:, -1] |= 8
+    return borders.reshape(-1)

@@ -1,0 +1,111 @@
+"""Nested sheets: all layers as radii on one grid of directions from c, and as meshes that share one triangulation.
+
+A layer is star-shaped around c: over a direction it has one radius. So a mesh of a layer is a triangulation of the
+window of directions with a radius at each vertex, and one triangulation serves all layers.
+
+*Nested by construction.* Let d = sum_k a_k d_k, a_k >= 0, be a direction inside the cone of a triangle with vertices
+rho_k d_k. It meets the triangle's plane at the distance t with t d = sum_k b_k rho_k d_k, sum b_k = 1, that is
+1/t = sum_k a_k / rho_k. This grows when any rho_k falls: if no vertex of a layer lies farther out than that of the
+layer around it, then no point of it does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from facefolds_core.export.stores import Grids, Sheets
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_directions, uv_to_st
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gridded:
+    """Sheets, and what had to be mended.
+
+    Attributes:
+        sheets: of all layers.
+        crossed: samples that lay beyond the layer around them, and were moved onto it.
+        deepest: by how much at most, units.
+    """
+
+    sheets: Sheets
+    crossed: int
+    deepest: float
+
+
+def grid_sheets(grids: Grids, resolution: int | None) -> Gridded:
+    """The samples themselves as vertices.
+
+    Where a layer has no point its radius is that of the nearest direction in which it has one; no face of it lies
+    there. A sample beyond the layer around it is moved onto it. Each cell's diagonal joins the two corners whose radii,
+    over all layers, differ less: along a jump of the radius, not across it.
+
+    Args:
+        grids: with one window for all layers.
+        resolution: samples a side, about; None keeps all.
+    """
+    step = 1 if resolution is None else max(1, round(grids.resolution / resolution))
+    along = slice((grids.resolution - 1) % step // 2, None, step)
+    thin = (slice(None), along, along)
+    valid = grids.valid[thin]
+    radii = np.linalg.norm(grids.points[thin].astype(np.float64) - grids.centre, axis=-1)
+    for layer, known in enumerate(valid):
+        nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+        radii[layer] = radii[layer][tuple(nearest)]
+    beyond = np.zeros_like(radii)
+    beyond[1:] = radii[1:] - np.minimum.accumulate(radii, 0)[:-1]
+    beyond[1:][~(valid[1:] & valid[:-1])] = 0
+    radii = np.minimum.accumulate(radii, 0)
+    falling = np.abs(radii[:, :-1, :-1] - radii[:, 1:, 1:]).sum(0) <= np.abs(radii[:, :-1, 1:] - radii[:, 1:, :-1]).sum(
+        0
+    )
+    window = grids.window(0)
+    st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
+    sheets = Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.centre)
+    return Gridded(sheets, int((beyond > 0).sum()), float(beyond.max(initial=0.0)))
+
+
+def directions(sheets: Sheets) -> Array:
+    """(n n, 3) unit directions of the grid's vertices."""
+    u0, u1, v0, v1 = (float(x) for x in sheets.window)
+    return np.asarray(uv_to_directions(st_to_uv(sheets.st.reshape(-1, 2), (u0, u1, v0, v1))))
+
+
+def sheet_faces(sheets: Sheets) -> NDArray[np.int64]:
+    """(2 (n - 1)^2, 3) faces over the grid's vertices, row by row; counter-clockwise seen from outside."""
+    n = len(sheets.st)
+    index = np.arange(n * n, dtype=np.int64).reshape(n, n)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    falling = sheets.falling[..., None]
+    first = np.where(falling, np.stack([a, c, d], -1), np.stack([a, c, b], -1))
+    second = np.where(falling, np.stack([a, d, b], -1), np.stack([b, c, d], -1))
+    return np.stack([first, second], 2).reshape(-1, 3)
+
+
+def sheet_mesh(sheets: Sheets, layer: int, faces: NDArray[np.int64], towards: Array) -> TexturedMesh:
+    """Mesh of one layer from faces over the grid's vertices; vertices that no face uses are dropped.
+
+    Args:
+        faces: (F, 3).
+        towards: of `directions`.
+    """
+    used, index = np.unique(faces, return_inverse=True)
+    radii = sheets.radii[layer].reshape(-1)[used].astype(np.float64)
+    vertices = sheets.centre + radii[:, None] * towards[used]
+    st = sheets.st.reshape(-1, 2)[used].astype(np.float32)
+    return TexturedMesh(vertices.astype(np.float32), index.reshape(-1, 3).astype(np.int32), st)
+
+
+def full_meshes(sheets: Sheets) -> list[TexturedMesh]:
+    """All layers at the grid's resolution; no face where a sample is not valid."""
+    faces, towards = sheet_faces(sheets), directions(sheets)
+    return [
+        sheet_mesh(sheets, layer, faces[known.reshape(-1)[faces].all(1)], towards)
+        for layer, known in enumerate(sheets.valid)
+    ]

@@ -1,0 +1,174 @@
+"""Decimation over one triangulation for all layers: bounds, borders, order, exact texture coordinates, trimming."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from facefolds_core.export.collapse import contribution, decimate_sheets
+from facefolds_core.export.decimation import exact_st, layer_order
+from facefolds_core.export.poisson import boundary_loops
+from facefolds_core.export.refit import radial_cosines, refit_radii
+from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.sheets import directions, grid_sheets, sheet_mesh
+from facefolds_core.export.stores import Sheets
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.rendering.intersection import EmbreeMesh
+from tests.ellipsoids import Ellipsoids
+
+WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
+N = 64
+
+
+@pytest.fixture(scope="module")
+def sheets() -> Sheets:
+    return grid_sheets(sample_grids(Ellipsoids(), N, WINDOW, progress=False), None).sheets
+
+
+def rough(sheets: Sheets, seed: int) -> Sheets:
+    """Radii that jump by up to a half from vertex to vertex, all layers within 1e-4 of each other."""
+    rng = np.random.default_rng(seed)
+    outer = rng.uniform(0.2, 0.4, sheets.radii.shape[1:])
+    radii = np.stack([outer, outer - rng.uniform(0, 1e-4, outer.shape)])
+    return replace(sheets, radii=radii.astype(np.float32))
+
+
+@pytest.mark.parametrize("target", [64, 256, 1024])
+def test_the_bound_on_the_vertices_is_met(sheets: Sheets, target: int) -> None:
+    for mesh in decimate_sheets(sheets, target):
+        assert len(mesh.vertices) == target
+        assert np.array_equal(np.unique(mesh.faces), np.arange(target))
+
+
+def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
+    for mesh, axes in zip(decimate_sheets(sheets, 256), Ellipsoids().axes, strict=True):
+        middle = mesh.vertices[mesh.faces].mean(1)
+        assert np.abs(np.linalg.norm((middle - sheets.centre) / np.array(axes), axis=-1) - 1).max() < 0.01
+        assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.centre)).max() < 1e-5
+        drift = mesh.st[mesh.faces].mean(1) - exact_st(middle.astype(np.float32), WINDOW, sheets.centre)
+        assert np.abs(drift).max() < 0.005
+
+
+def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
+    towards = directions(sheets)
+    faces = coarse_faces()
+    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, towards)
+    for layer in range(sheets.num_layers):
+        before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
+        assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both
+    assert (np.diff(fitted.radii, axis=0) <= 0).all()
+
+
+def coarse_faces() -> NDArray[np.int64]:
+    """Two triangles for each square of 21 x 21 cells of the grid."""
+    index = np.arange(N * N).reshape(N, N)[::21, ::21]
+    a, b, c, d = (x.reshape(-1) for x in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
+    return np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
+
+
+def radial_errors(coarse: Sheets, sheets: Sheets, layer: int, faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Radius of a coarse mesh, by casting rays from c, minus that of the samples."""
+    towards = directions(sheets)
+    mesh = sheet_mesh(coarse, layer, faces, towards)
+    origins = np.tile(sheets.centre, (len(towards), 1))
+    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, towards)
+    found = hits.triangle >= 0
+    corners = mesh.vertices[mesh.faces[hits.triangle[found]]].astype(np.float64)
+    points = (hits.barycentric[found][..., None] * corners).sum(1)
+    return np.linalg.norm(points - sheets.centre, axis=-1) - sheets.radii[layer].reshape(-1)[found]
+
+
+def test_cosines_are_those_of_the_normals(sheets: Sheets) -> None:
+    for layer, axes in enumerate(Ellipsoids().axes):
+        points = sheets.radii[layer].reshape(-1, 1) * directions(sheets)
+        normals = points / np.array(axes) ** 2
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        cosines = (normals * directions(sheets)).sum(-1).reshape(N, N)
+        inside = (slice(1, -1), slice(1, -1))  # differences are one-sided at the border
+        assert np.abs(radial_cosines(sheets, layer) - cosines)[inside].max() < 1e-3
+
+
+def test_the_border_stays_where_it_was(sheets: Sheets) -> None:
+    for mesh in decimate_sheets(sheets, 100):
+        assert boundary_loops(mesh.faces) == 1
+        assert mesh.st.min() == pytest.approx(0.5 / N)
+        assert mesh.st.max() == pytest.approx(1 - 0.5 / N)
+        assert covered_area(mesh) == pytest.approx((1 - 1 / N) ** 2, rel=1e-5)
+
+
+def covered_area(mesh: TexturedMesh) -> float:
+    a, b, c = mesh.st[mesh.faces].astype(np.float64).transpose(1, 0, 2)
+    areas = -0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    assert (areas > 0).all()
+    return float(areas.sum())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_layers_never_cross_and_faces_never_turn_over(sheets: Sheets, seed: int) -> None:
+    meshes = decimate_sheets(rough(sheets, seed), 300)
+    order = layer_order(meshes, sheets.centre)
+    assert order.compared > 500
+    assert order.deepest < 1e-7  # rounding of the vertices to float32
+    for mesh in meshes:
+        assert covered_area(mesh) == pytest.approx((1 - 1 / N) ** 2, rel=1e-5)
+
+
+def test_between_the_vertices_a_layer_stays_below_the_one_around_it() -> None:
+    # 1 / t = sum a_k / rho_k: along any direction in a triangle's cone, closed form against the planes themselves.
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        corners = rng.normal(size=(3, 3)) * 0.3 + [1, 0, 0]
+        corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
+        outer = rng.uniform(0.2, 0.4, 3)
+        inner = outer * rng.uniform(0.3, 1, 3)
+        share = rng.uniform(0, 1, 3)
+        direction = share @ corners
+        distances = []
+        for radii in (outer, inner):
+            vertices = corners * radii[:, None]
+            normal = np.cross(vertices[1] - vertices[0], vertices[2] - vertices[0])
+            distances.append((normal @ vertices[0]) / (normal @ direction))
+            assert 1 / distances[-1] == pytest.approx((share / radii).sum())
+        assert distances[1] <= distances[0] + 1e-12
+
+
+def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
+    radii = np.full_like(sheets.radii, 0.3)
+    radii[1] = 0.29
+    radii[:, :, N // 2 :] += 0.05
+    (mesh, _) = decimate_sheets(replace(sheets, radii=radii), 256)
+    column = mesh.st[:, 0] * N - 0.5
+    assert (np.abs(column - (N / 2 - 0.5)) < 1).mean() > 0.1  # 2 of 64 columns, 3 %; seen: 16 %
+    radius = np.linalg.norm(mesh.vertices - sheets.centre, axis=-1)
+    assert np.minimum(np.abs(radius - 0.3), np.abs(radius - 0.35)).max() < 2e-3
+
+
+def test_what_is_transparent_in_all_frames_is_trimmed(sheets: Sheets) -> None:
+    opacity = np.zeros_like(sheets.opacity)
+    opacity[0, 20:40, 20:40] = 1
+    opacity[1] = 255
+    shown, whole = decimate_sheets(replace(sheets, opacity=opacity), 400)
+    assert len(shown.faces) < 0.6 * len(whole.faces)
+    inside = np.argwhere(opacity[0])[:, ::-1] * 1.0
+    a, b, c = (shown.st[shown.faces[:, k]].astype(np.float64) * N - 0.5 for k in range(3))
+    for point in inside[::7]:  # every sample that shows lies in a face
+        sides = [
+            (q - p)[:, 0] * (point - p)[:, 1] - (q - p)[:, 1] * (point - p)[:, 0] for p, q in ((a, b), (b, c), (c, a))
+        ]
+        assert (np.max(sides, 0) <= 1e-4).any()
+
+
+def test_a_layer_that_shows_nowhere_keeps_its_faces(sheets: Sheets) -> None:
+    opacity = sheets.opacity.copy()
+    opacity[0] = 0
+    first, second = decimate_sheets(replace(sheets, opacity=opacity), 100)
+    assert len(first.faces) == len(second.faces)
+
+
+def test_contributions_are_compositing_weights_with_a_floor() -> None:
+    opacity = np.array([51, 255, 255], np.uint8)[:, None, None]
+    assert contribution(opacity)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
