@@ -288,10 +288,29 @@ class GlbParams(Section):
     draco: bool = False
 
 
+class LevelParams(Section):
+    """A coarser level of detail, derived from the full one.
+
+    Attributes:
+        name: lower case letters, digits, - and _; not "full".
+        mesh_resolution: at most so many vertices squared a layer, as R^m.
+        texture_resolution: texels a side of a whole layer, as R^t.
+        crf: of its videos, on x264's scale.
+        max_error_pixels: as in `mesh`; null takes the full level's setting.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$")]
+    mesh_resolution: Annotated[int, Field(ge=4, le=2048)]
+    texture_resolution: Annotated[int, Field(ge=8, le=4096)]
+    crf: Annotated[int, Field(ge=0, le=51)]
+    max_error_pixels: Annotated[float, Field(gt=0)] | None = None
+
+
 class CompressParams(Section):
     """`compress`.
 
     Attributes:
+        levels: coarser levels of detail, the coarsest first; the full one is always there.
         view_effects: fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of
             the full level at most. It needs an asset that stands before the room, not one that has it painted on.
         photos: photos of held-out cameras that ship with the asset, to compare with: at most so many.
@@ -299,9 +318,17 @@ class CompressParams(Section):
 
     mesh: MeshCodec = MeshCodec()
     video: VideoCodec = VideoCodec()
+    levels: tuple[LevelParams, ...] = ()
     photos: Annotated[int, Field(ge=0)] = 0
     glb: GlbParams = GlbParams()
     view_effects: bool = False
+
+    @field_validator("levels")
+    @classmethod
+    def _names_differ(cls, value: tuple[LevelParams, ...]) -> tuple[LevelParams, ...]:
+        if len({"full", *(level.name for level in value)}) != len(value) + 1:
+            raise ValueError("two levels of one name (`full` is always there)")
+        return value
 
 
 class EvaluateParams(Section):

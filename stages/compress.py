@@ -8,9 +8,20 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
-from facefolds_core.export.stores import read_centre, read_meshes, read_windows
+from facefolds_core.export.collapse import decimate_sheets
+from facefolds_core.export.decimation import decimate_layers
+from facefolds_core.export.stores import (
+    holds_sheets,
+    read_centre,
+    read_grids,
+    read_meshes,
+    read_sheets,
+    read_surfaces,
+    read_windows,
+)
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.package import Export, package
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, DecimateParams
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
 
@@ -23,15 +34,25 @@ def compress(folders: SubjectFolders) -> str:
     textures = FrameStore(folders.textures / "textures.arrow")
     centre = read_centre(folders.samples / "grids.npz")
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), centre)
-    manifest = package(folders.asset, Export(meshes, windows, textures), scene, source, params)
+
+    def decimate(resolution: int) -> list[TexturedMesh]:
+        path = folders.surfaces / "surfaces.npz"
+        if holds_sheets(path):
+            return decimate_sheets(read_sheets(path), resolution**2)
+        grids = read_grids(folders.samples / "grids.npz")
+        section = read_stage(DecimateParams, folders.config).model_copy(update={"resolution": resolution})
+        return decimate_layers(read_surfaces(path), grids, grids.centre, section)
+
+    manifest = package(folders.asset, Export(meshes, windows, textures, decimate), scene, source, params)
     level = manifest.full
     write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame, params.glb.draco)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
+    coarser = "".join(f"; {other.name} {other.bytes} bytes" for other in manifest.levels[:-1])
     return (
         f"{len(level.layers)} of {len(meshes)} meshes ({mesh_bytes} bytes) and {level.texture.frames} frames "
-        f"in {level.texture.width} x {level.texture.height} ({videos}){quality}; {folders.asset}"
+        f"in {level.texture.width} x {level.texture.height} ({videos}){quality}{coarser}; {folders.asset}"
     )
 
 

@@ -3,7 +3,8 @@
 With quantization_bits = 0 the floats come back bit for bit (the paper's setting, with compression level 0, which also
 keeps the order of vertices and faces). With b > 0 bits a position is off by at most range / (2^b - 1) / 2 along each
 axis (and float32 rounding), range being the largest side of the layer's bounding box; a texture coordinate likewise,
-with its own number of bits and the larger extent of the layer's (s, t), at most 1, as range.
+with its own number of bits and the larger extent of the layer's (s, t), at most 1, as range; next to 1 by at most twice
+that, because what was rounded must not leave [0, 1].
 
 Above compression level 0 Draco chooses the order of vertices and faces, and merges vertices that are equal: keeping the
 order would cost more than half of the bytes of a quantised mesh.
@@ -44,6 +45,11 @@ def encode_mesh(mesh: TexturedMesh, codec: MeshCodec) -> tuple[bytes, TexturedMe
         the file's bytes, and the mesh that a reader gets from them.
     """
     ordered = _encode(mesh, codec, True)
+    if codec.quantization_bits > 0 and decode_mesh(ordered).st.max() > 1:
+        # The grid is that of the longer side of the box: along the other, rounding may lead out of [0, 1].
+        inside = np.float32(1 - 0.5 / (2**codec.texture_coordinate_bits - 1))
+        mesh = TexturedMesh(mesh.vertices, mesh.faces, np.minimum(mesh.st, inside))
+        ordered = _encode(mesh, codec, True)
     flat = _flat(ordered)
     if flat.any() and not flat.all():
         mesh = TexturedMesh(mesh.vertices, mesh.faces[~flat], mesh.st)

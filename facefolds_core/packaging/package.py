@@ -45,6 +45,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.effects import fit_effects
+from facefolds_core.packaging.levels import Decimate, coarse_content, level_params
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import FRAMES, ViewMeter, spread, training_cameras
@@ -65,11 +66,13 @@ class Export:
         meshes: N layers, outermost first.
         windows: of each layer's texture.
         textures: layered store, N layers x K frames of (R, R, 4).
+        decimate: R^m -> the layers with at most R^m x R^m vertices, for coarser levels.
     """
 
     meshes: Sequence[TexturedMesh]
     windows: Sequence[Window]
     textures: FrameStore
+    decimate: Decimate
 
 
 def package(folder: Path, export: Export, scene: Scene, source: AssetSource, params: CompressParams) -> Manifest:
@@ -80,17 +83,18 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
     """
     frames = check_inputs(export.meshes, export.windows, export.textures)
     layers = crop_layers(export.meshes, export.windows, export.textures, frames)
-    audio = scene.audio
-    content = LevelContent(layers, export.textures, frames, source.fps, audio)
+    full = LevelContent(layers, export.textures, frames, source.fps, scene.audio)
     cameras = training_cameras(scene)
-    meter = make_meter(content, cameras)
-    params = params.model_copy(update={"mesh": resolved(params.mesh, layers, cameras)})
+    meter = make_meter(full, cameras)
     with atomic_folder(folder) as temporary:
-        level = _level(temporary, FULL, content, params, meter)
+        levels = []
+        for coarse in params.levels:
+            content = coarse_content(full, export.windows, coarse, export.decimate)
+            levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
+        level = _level(temporary, FULL, full, params, meter, cameras)
         if params.view_effects:
-            level = _with_effects(temporary, level, fit_effects(content, scene, EFFECTS_SHARE * level.bytes))
-        manifest = manifest_of(source, [level])
-        manifest = _with_extras(temporary, manifest, scene, params.photos)
+            level = _with_effects(temporary, level, fit_effects(full, scene, EFFECTS_SHARE * level.bytes))
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, params.photos)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -103,7 +107,16 @@ def make_meter(content: LevelContent, cameras: Sequence[Camera]) -> ViewMeter | 
     return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames})
 
 
-def _level(folder: Path, name: str, content: LevelContent, params: CompressParams, meter: ViewMeter | None) -> Level:
+def _level(
+    folder: Path,
+    name: str,
+    content: LevelContent,
+    params: CompressParams,
+    meter: ViewMeter | None,
+    cameras: Sequence[Camera],
+) -> Level:
+    """Write a level and measure it: against the full one before coding, by `meter`."""
+    params = params.model_copy(update={"mesh": resolved(params.mesh, content.layers, cameras)})
     video = params.video
     crfs = None
     if meter is not None and video.target_psnr is not None and not video.lossless:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import wave
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +17,11 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
+from facefolds_core.export.stores import Grids, write_grids, write_surfaces
 from facefolds_core.files import write_text
+from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.params import CompressParams, MeshCodec
+from facefolds_core.params import CompressParams, DecimateParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
 from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
@@ -106,6 +109,39 @@ def test_view_effects_ship_and_are_scored_apart(folders: SubjectFolders, monkeyp
     assert asset.manifest.full.bytes == sum(size for _, size, _ in asset.manifest.full.files())
     (folders.asset / "full_effects.png").write_bytes(b"")
     assert any(problem.startswith("full_effects.png:") for problem in validate_asset(folders.asset))
+
+
+def test_levels_of_detail(folders: SubjectFolders) -> None:
+    levels = [
+        {"name": "small", "mesh_resolution": 5, "texture_resolution": 16, "crf": 34, "max_error_pixels": 0.5},
+        {"name": "medium", "mesh_resolution": 8, "texture_resolution": 32, "crf": 26},
+    ]
+    rig(folders, levels=levels)
+    write_text(folders.config / "decimate.json", DecimateParams(resolution=12).model_dump_json())
+    meshes = [cap_mesh(radius_of(layer), 25) for layer in range(3)]
+    write_surfaces(folders.surfaces / "surfaces.npz", [Surface(mesh.vertices, mesh.faces) for mesh in meshes])
+    n = 12
+    flat = np.zeros((3, n, n, 3), np.float32)
+    grids = Grids(
+        points=flat,
+        normals=flat,
+        valid=np.ones((3, n, n), bool),
+        opacity=np.full((3, n, n), 255, np.uint8),
+        windows=np.array([WINDOW] * 3),
+        centre=np.array(CENTRE),
+    )
+    write_grids(folders.samples / "grids.npz", grids)
+    compress(folders)
+    assert validate_asset(folders.asset) == []
+    asset = read_asset(folders.asset)
+    entries = asset.manifest.levels
+    assert [entry.name for entry in entries] == ["small", "medium", "full"]
+    assert all(a.bytes < b.bytes for a, b in pairwise(entries))
+    qualities = [entry.quality.psnr_to_model for entry in entries if entry.quality]
+    assert 15 < qualities[0] < qualities[1] < qualities[2]
+    for entry, level, side in zip(entries, asset.levels, (5, 8, 12), strict=True):
+        assert max(layer.vertices for layer in entry.layers) <= side**2
+        assert len(list(level.frames())) == 2
 
 
 def test_poster_photos_and_sound(folders: SubjectFolders) -> None:

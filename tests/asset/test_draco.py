@@ -59,6 +59,15 @@ def test_quantised_within_the_documented_bound(bits: int, st_bits: int, level: i
     assert len(decoded.faces) == len(mesh.faces)
 
 
+@pytest.mark.parametrize("bits", range(2, 13))
+def test_quantised_texture_coordinates_stay_inside(bits: int) -> None:
+    mesh = cap_mesh(0.4, 12)
+    st = mesh.st * np.float32([1, 0.71]) + np.float32([0, 0.29])
+    codec = MeshCodec(quantization_bits=12, texture_coordinate_bits=bits, compression_level=7)
+    _, decoded = encode_mesh(TexturedMesh(mesh.vertices, mesh.faces, st), codec)
+    assert decoded.st.min() >= -1e-6 and decoded.st.max() <= 1 + 1e-6
+
+
 def test_quantisation_makes_it_smaller() -> None:
     mesh = cap_mesh(0.4, 30)
     exact, _ = encode_mesh(mesh, MeshCodec())

@@ -11,6 +11,7 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package
 from facefolds_core.packaging.views import Shown
@@ -59,7 +60,11 @@ def filmed(folder: Path) -> Scene:
 def test_its_score_is_evaluates(tmp_path: Path, codec: str) -> None:
     scene = filmed(tmp_path / "scene")
     textures = write_store(tmp_path / "t.arrow", np.stack([cap_textures(LAYERS, frame, R) for frame in range(FRAMES)]))
-    export = Export([cap_mesh(radius_of(i)) for i in range(LAYERS)], [WINDOW] * LAYERS, textures)
+
+    def caps(side: int) -> list[TexturedMesh]:
+        return [cap_mesh(radius_of(i), side) for i in range(LAYERS)]
+
+    export = Export(caps(12), [WINDOW] * LAYERS, textures, caps)
     section: dict[str, Any] = {
         "video": {"codec": codec, "crf": 20},
         "mesh": {"max_error_pixels": 0.1, "compression_level": 7},
