@@ -212,8 +212,7 @@ class BakeParams(Section):
     """`bake`: textures are fitted to the meshes that ship.
 
     Attributes:
-        iterations: passes over the training cameras' rays in the first frame; later frames start from its result and
-            take a quarter of them. 0 leaves the textures as `texture` made them.
+        iterations: passes over the training cameras' rays, in each frame; 0 leaves the textures as `texture` made them.
     """
 
     iterations: Annotated[int, Field(ge=0)] = 2

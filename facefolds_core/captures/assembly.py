@@ -16,6 +16,7 @@ from facefolds_core.captures.images import decode_image, decode_mask, display_co
 from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
 from facefolds_core.captures.scene import Scene, Split, write_scene
+from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
@@ -47,12 +48,14 @@ class Plan:
         scene: all of it but pixels and mesh.
         rows: its images, ordered by camera, then frame.
         vertices: (K, V, 3) float32 normalised tracked mesh, or None.
+        sound_start: seconds, where the first frame lies in the capture's sound; None without a sound that fits.
     """
 
     capture: Capture
     scene: Scene
     rows: tuple[Row, ...]
     vertices: NDArray[np.float32] | None
+    sound_start: float | None = None
 
 
 def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeParams, folder: Path) -> Plan:
@@ -71,6 +74,10 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
     kept, frames, incomplete = complete_subset(capture, culling.kept)
     left_out = [*capture.left_out, *notes, *culling.lines, *incomplete]
+    fps = capture.fps if len(frames) > 1 else 0.0
+    sound = None if capture.sound is None else sound_start([capture.sound.seconds[f] for f in frames], fps)
+    if capture.sound is not None and sound is None:
+        left_out.append(f"{capture.sound.path.name}: the frames in use are not evenly spaced, so no sound fits them")
     splits = split_cameras([capture.views[c].name for c in kept], subject, left_out, capture.root)
     width, height = fit_box(*check_image_sizes(capture, kept, frames), params.long_side, params.short_side)
 
@@ -93,7 +100,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         splits=tuple(each),
         frame_ids=tuple(capture.frame_ids[f] for f in frames),
         times=np.arange(len(frames)) / (capture.fps or 1.0),
-        fps=capture.fps if len(frames) > 1 else 0.0,
+        fps=fps,
         from_capture=similarity,
         left_out=tuple(left_out),
         folder=folder,
@@ -101,7 +108,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     vertices = None
     if still.tracking is not None:
         vertices = similarity.apply(still.tracking.world_vertices()[frames]).astype(np.float32)
-    return Plan(capture, scene, tuple(rows), vertices)
+    return Plan(capture, scene, tuple(rows), vertices, sound)
 
 
 def _stabilizing(capture: Capture, params: NormalizeParams) -> list[Similarity]:
@@ -142,6 +149,9 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
             write_frames(temporary / "masks.arrow", (scene.height, scene.width, 1), _masks(plan, masked))
         if plan.vertices is not None and capture.tracking is not None and capture.tracking.faces is not None:
             np.savez(temporary / "surface.npz", vertices=plan.vertices, faces=capture.tracking.faces)
+        if capture.sound is not None and plan.sound_start is not None:
+            seconds = scene.num_frames / (scene.fps or 1.0)
+            cut_sound(capture.sound.path, temporary / "audio.wav", plan.sound_start, seconds)
         write_scene(scene, temporary)
 
 

@@ -57,6 +57,19 @@ class Tracking:
 
 
 @dataclass(frozen=True)
+class Sound:
+    """What was heard.
+
+    Attributes:
+        path: of the sound file.
+        seconds: K, where in it each of the capture's frames lies.
+    """
+
+    path: Path
+    seconds: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Capture:
     """Cameras, frames and files of one capture.
 
@@ -69,6 +82,7 @@ class Capture:
         masks: likewise, files of true opacity, where there are any.
         tracking: for all K frames, or None.
         left_out: one line for each thing of the capture that is not here, with the reason, and for each guess made.
+        sound: None where the capture is silent.
     """
 
     root: Path
@@ -79,6 +93,7 @@ class Capture:
     masks: Mapping[tuple[int, int], Path]
     tracking: Tracking | None
     left_out: tuple[str, ...]
+    sound: Sound | None = None
 
     def place(self, camera: int, frame: int) -> str:
         """Words for one image, for messages."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
+from facefolds_core.captures.capture import Capture, Sound, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
@@ -63,8 +63,18 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
         for c, f in images
         if (path := root / "masks" / segment / views[c].name / f"{frames[f]}.png").exists()
     }
+    audio = root / "audio" / f"{segment}.wav"
+    seconds = tuple(names.index(name) / (subject.fps or fps) for name in frames)
     return Capture(
-        root, views, tuple(frames), frame_rate(subject, fps, len(frames)), images, masks, tracking, tuple(left_out)
+        root,
+        views,
+        tuple(frames),
+        frame_rate(subject, fps, len(frames)),
+        images,
+        masks,
+        tracking,
+        tuple(left_out),
+        Sound(audio, seconds) if audio.is_file() else None,
     )
 
 

@@ -8,8 +8,6 @@
    become those of the sheets. A step is x -= sum J r / (damping + sum |J| row): a ray's residual r is spread over its
    texels, and a texel takes the mean of what its rays ask for (SIRT; Gregor and Benson 2008). Residuals are those of
    texels rounded to 8 bits.
-
-Decimation is the same in all frames, so a frame starts from the correction that the frame before it has found.
 """
 
 from __future__ import annotations
@@ -33,9 +31,6 @@ from facefolds_core.rendering.raster import cast_mesh
 
 DAMPING = 0.05
 """Added to a texel's sum of weights: what is hardly seen hardly moves."""
-
-LATER = 4
-"""Frames after the first take a LATER-th of its iterations."""
 
 Image = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
@@ -130,7 +125,6 @@ class Baker:
     def __init__(self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int) -> None:
         self.rays = rays
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
-        self._correction: Float = np.zeros((len(meshes), size, size, 4), np.float32)
         self._sums: Float = np.zeros((PARTS, len(meshes), size, size, 6), np.float32)
 
     def frame(self, textures: Image, samples: Image, iterations: int) -> Image:
@@ -147,13 +141,11 @@ class Baker:
         target = np.empty((len(self.rays.sampled), 4), np.float32)
         render(self.rays.sampled, samples.astype(np.float32), target)
         moved = np.stack([reproject(image, p) for image, p in zip(textures, self._positions, strict=True)])
-        start = moved.astype(np.float32) / np.float32(255)
-        values = np.where(start[..., 3:] > 0, start + self._correction, start).clip(0, 1)
-        shown = np.rint(values * 255) * np.float32(1 / 255)
+        values = moved.astype(np.float32) / np.float32(255)
+        shown = values.copy()
         for _ in range(iterations):
             accumulate(self.rays.shipped, target, shown, self._sums)
             update(values.reshape(-1, 4), self._sums.reshape(PARTS, -1, 6), DAMPING, shown.reshape(-1, 4))
-        self._correction = values - start
         return np.stack([_finished(image) for image in shown])
 
 
@@ -173,14 +165,13 @@ def baked_rows(
 
     Args:
         textures, samples: layered frame stores (camera := layer) of the same layers and frames.
-        iterations: of the first frame.
+        iterations: steps a frame.
 
     Yields:
         (layer, frame, (size, size, 4) uint8).
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
     for frame in progress_bar(frames, desc="bake", unit="frame", disable=not progress):
-        steps = iterations if frame == frames[0] else max(1, iterations // LATER)
         own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
-        for layer, image in zip(layers, baker.frame(own, theirs, steps), strict=True):
+        for layer, image in zip(layers, baker.frame(own, theirs, iterations), strict=True):
             yield layer, frame, image

@@ -138,7 +138,7 @@ def test_the_fit_wins_back_what_decimation_lost(
     before = decibels(coarse, sheets, samples[0], samples[0])
     moved = decibels(coarse, sheets, baker.frame(samples[0], samples[0], 0), samples[0])
     fitted = decibels(coarse, sheets, baker.frame(samples[0], samples[0], 6), samples[0])
-    later = decibels(coarse, sheets, baker.frame(samples[1], samples[1], 1), samples[1])
+    later = decibels(coarse, sheets, baker.frame(samples[1], samples[1], 6), samples[1])
     assert moved > before + 1
     assert fitted > moved + 1
     assert later > moved + 1
