@@ -1,5 +1,6 @@
 # make repro   set up, then run the pipeline for every subject in params.yaml
 # make test    set up, then run the tests
+# make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make lint    ruff, mypy and the layer check
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make clean   remove the environment and all results
@@ -8,14 +9,22 @@ PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
+PLAYER := viewer/dist/index.html
 
-.PHONY: repro test lint bench clean
+.PHONY: repro test view lint bench clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
 test: $(READY)
 	$(BIN)/python -m pytest
+
+view: $(READY) $(PLAYER)
+	$(BIN)/python -m stages.view $(ASSET)
+
+$(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.json viewer/build.mjs
+	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
+	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -35,4 +44,4 @@ $(READY): pyproject.toml constraints.txt
 	@touch $(READY)
 
 clean:
-	rm -rf $(VENV) .dvc/tmp .dvc/cache data/*/ dvc.lock
+	rm -rf $(VENV) viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock

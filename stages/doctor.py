@@ -10,6 +10,9 @@ SYSTEM_LIBRARIES = {
     "libGL.so.1": ("pymeshlab", "libgl1", "mesa-libGL"),
     "libOpenGL.so.0": ("pymeshlab", "libopengl0", "libglvnd-opengl"),
 }
+OPTIONAL_LIBRARIES = {
+    "libEGL.so.1": ("`python -m stages.render`", "libegl1 libgl1-mesa-dri", "mesa-libEGL mesa-dri-drivers"),
+}
 
 
 def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRARIES) -> list[str]:
@@ -30,7 +33,11 @@ def main() -> None:
     if missing:
         text = "\n  ".join(missing)
         sys.exit(f"doctor: system libraries are missing; install them and run the same command again:\n  {text}")
-    print("doctor: all system libraries are here")
+    optional = missing_libraries(OPTIONAL_LIBRARIES)
+    if optional:
+        print("doctor: not needed by the pipeline, but missing:\n  " + "\n  ".join(optional))
+    else:
+        print("doctor: all system libraries are here")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,78 @@
+"""Cameras for stills and films of an asset: around the subject at the origin, up +z, front +x (docs/conventions.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from facefolds_core.geometry.cameras import Camera
+
+STEEPEST = 89.0
+"""Degrees of elevation: straight up has no upright."""
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Where one looks from, at the subject.
+
+    Attributes:
+        azimuth: degrees from the front to the subject's left (+y).
+        elevation: degrees upwards.
+        distance: from the target, in units (the capture's cameras are about 1 away).
+        target: what is looked at.
+    """
+
+    azimuth: float = 0.0
+    elevation: float = 0.0
+    distance: float = 1.0
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def camera_of(eye: Eye, width: int, height: int, field_of_view: float) -> Camera:
+    """An upright camera.
+
+    Args:
+        width, height: of the picture, pixels.
+        field_of_view: degrees, of the picture's shorter side.
+    """
+    azimuth, elevation = math.radians(eye.azimuth), math.radians(float(np.clip(eye.elevation, -STEEPEST, STEEPEST)))
+    outward = np.array(
+        [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
+    )
+    right = np.cross(-outward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(-outward, right), -outward])
+    centre = np.array(eye.target) + eye.distance * outward
+    focal = min(width, height) / (2 * math.tan(math.radians(field_of_view) / 2))
+    K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+    return Camera("rendered", K, np.concatenate([rotation, -(rotation @ centre)[:, None]], 1), width, height)
+
+
+def turntable(start: Eye, count: int, sweep: float) -> list[Eye]:
+    """From `start` to one side, to the other and back: the subject has a front only. Ends where it begins.
+
+    Args:
+        count: pictures.
+        sweep: degrees to each side.
+    """
+    phases = 2 * math.pi * np.arange(count) / count
+    return [
+        Eye(start.azimuth + sweep * math.sin(phase), start.elevation, start.distance, start.target) for phase in phases
+    ]
+
+
+def fly_through(start: Eye, count: int) -> list[Eye]:
+    """A closed flight around `start`: to both sides, up and down, near and far, twice as often near as to one side."""
+    eyes = []
+    for phase in 2 * math.pi * np.arange(count) / count:
+        eyes.append(
+            Eye(
+                start.azimuth + 40 * math.sin(phase),
+                start.elevation + 18 * math.sin(2 * phase),
+                start.distance * (1 - 0.3 * (1 - math.cos(2 * phase)) / 2),
+                start.target,
+            )
+        )
+    return eyes

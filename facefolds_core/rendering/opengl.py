@@ -1,0 +1,257 @@
+"""The fast renderer: the reference renderer's picture by OpenGL 3.3, without a screen (moderngl, EGL).
+
+Layers are drawn from the innermost to the outermost with ordinary blending into a float32 picture. Each has its own
+slice of the depth range, nearer than those inside it, so layers never hide each other; and each first goes to depth
+alone, then its colour where depth is equal, so that its folds count once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.effects import Map
+from facefolds_core.rendering.reference import BLACK, Image, Layered
+
+VERTEX = """
+#version 330
+uniform mat4 projection; // clip coordinates of a world point
+uniform vec2 slice; // of the depth range [-1, 1]: half its size, its middle
+in vec3 position;
+in vec2 corner_st;
+out vec2 st;
+out vec3 point;
+invariant gl_Position; // the same depth in both passes
+void main() {
+  st = corner_st;
+  point = position;
+  gl_Position = projection * vec4(position, 1.0);
+  gl_Position.z = slice.x * gl_Position.z + slice.y * gl_Position.w;
+}
+"""
+FRAGMENT = """
+#version 330
+uniform sampler2D picture;
+in vec2 st;
+out vec4 colour;
+void main() { colour = texture(picture, st); }
+"""
+FRAGMENT_WITH_EFFECTS = """
+#version 330
+uniform sampler2D picture;
+uniform sampler2DArray effects; // what to add for each unit of x, y and z of the direction to the eye
+uniform vec3 eye;
+in vec2 st;
+in vec3 point;
+out vec4 colour;
+void main() {
+  colour = texture(picture, st);
+  vec3 to_eye = normalize(eye - point);
+  for (int k = 0; k < 3; ++k) colour.rgb += to_eye[k] * texture(effects, vec3(st, k)).rgb;
+  colour.rgb = clamp(colour.rgb, 0.0, 1.0);
+}
+"""
+NOTHING = """
+#version 330
+out vec4 colour;
+void main() { colour = vec4(0.0); }
+"""
+STRAIGHT_OVER: Any = (moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA, moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+"""Straight alpha in; what is stored is premultiplied: rgb of the layers alone, alpha their opacity together."""
+_MARGIN = 0.01
+"""By how much the near and the far plane stay away from the nearest and the farthest vertex, of its depth."""
+_NEAREST = 1e-3
+
+
+class OpenGLRenderer:
+    """Renders pictures of one asset. Use it in a `with` block: it holds memory of the graphics card.
+
+    Args:
+        asset: its meshes go to the card at once, textures as frames are asked for.
+        effects: one map of view effects a layer, such as `asset.effects()`; None for none.
+
+    Raises:
+        UserError: if there is no OpenGL here.
+    """
+
+    def __init__(self, asset: Layered, effects: Sequence[Map] | None = None) -> None:
+        self._asset = asset
+        self._context = _make_context()
+        self._colour = self._context.program(VERTEX, FRAGMENT if effects is None else FRAGMENT_WITH_EFFECTS)
+        self._depth = self._context.program(VERTEX, NOTHING)
+        self._layers = [self._upload(layer) for layer in asset.layers]
+        self._effects = [self._effect(table) for table in effects or ()]
+        self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
+        self._frame = -1
+        self._textures: list[moderngl.Texture] = []
+        self._target: tuple[tuple[int, int], moderngl.Framebuffer] | None = None
+
+    def __enter__(self) -> OpenGLRenderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._context.release()
+
+    @property
+    def device(self) -> str:
+        """What renders, in the driver's words."""
+        return str(self._context.info["GL_RENDERER"])
+
+    def render(self, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
+        """As `render_asset`: rgb (H, W, 3) and alpha (H, W), float32 in [0, 1], of frame `frame`.
+
+        Args:
+            background: RGB in [0, 1], (3,) or (H, W, 3).
+
+        Raises:
+            UserError: if the picture is larger than the card allows.
+        """
+        self._show_frame(frame)
+        target = self._sized_target(camera)
+        _write(target, colour=True, depth=True)
+        target.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        projection = _projection(camera, self._vertices).T.astype("f4").tobytes()
+        for program in (self._depth, self._colour):
+            _uniform(program, "projection").write(projection)
+        if self._effects:
+            _uniform(self._colour, "effects").value = 1
+            _uniform(self._colour, "eye").write(camera.centre.astype("f4").tobytes())
+        count = len(self._layers)
+        for index in reversed(range(count)):
+            # NDC depth from -1 (outermost layer) to 1; a little is left free between slices.
+            slice_ = np.array([0.99 / count, (2 * index + 1) / count - 1], "f4").tobytes()
+            for program in (self._depth, self._colour):
+                _uniform(program, "slice").write(slice_)
+            if self._effects:
+                self._effects[index].use(1)
+            self._draw_layer(target, *self._layers[index], self._textures[index])
+        data = np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
+        rgba = data.reshape(camera.height, camera.width, 4)[::-1]
+        alpha = np.clip(rgba[..., 3], 0, 1)
+        rgb = rgba[..., :3] + (1 - alpha)[..., None] * np.asarray(background, np.float32)
+        return np.asarray(rgb, np.float32), alpha
+
+    def _draw_layer(
+        self,
+        target: moderngl.Framebuffer,
+        depth_pass: moderngl.VertexArray,
+        colour_pass: moderngl.VertexArray,
+        texture: moderngl.Texture,
+    ) -> None:
+        context = self._context
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "<"
+        _write(target, colour=False, depth=True)
+        depth_pass.render()
+        _write(target, colour=True, depth=False)
+        context.enable(moderngl.BLEND)
+        context.blend_func = STRAIGHT_OVER
+        context.depth_func = "=="
+        texture.use()
+        colour_pass.render()
+
+    def _upload(self, layer: Any) -> tuple[moderngl.VertexArray, moderngl.VertexArray]:
+        corners = np.concatenate([layer.vertices, layer.st], 1).astype("f4")
+        vertices = self._context.buffer(corners.tobytes())
+        indices = self._context.buffer(np.asarray(layer.faces, "i4").tobytes())
+        depth = self._context.vertex_array(self._depth, [(vertices, "3f 2x4", "position")], indices)
+        colour = self._context.vertex_array(self._colour, [(vertices, "3f 2f", "position", "corner_st")], indices)
+        return depth, colour
+
+    def _show_frame(self, frame: int) -> None:
+        if frame == self._frame:
+            return
+        for texture in self._textures:
+            texture.release()
+        self._textures = [self._texture(texture) for texture in self._asset.frame(frame)]
+        self._frame = frame
+
+    def _texture(self, texels: NDArray[np.uint8]) -> moderngl.Texture:
+        """Stored values as they are: no sRGB format. Row 0 is the top, as t runs."""
+        height, width = texels.shape[:2]
+        texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels).tobytes(), alignment=1)
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        texture.repeat_x = texture.repeat_y = False
+        return texture
+
+    def _effect(self, table: Map) -> moderngl.TextureArray:
+        """(h, w, k, rgb) -> three pictures."""
+        height, width = table.shape[:2]
+        pictures = np.ascontiguousarray(table.transpose(2, 0, 1, 3), np.float32)
+        texture = self._context.texture_array((width, height, 3), 3, pictures.tobytes(), alignment=1, dtype="f4")
+        texture.filter = moderngl.LINEAR, moderngl.LINEAR
+        texture.repeat_x = texture.repeat_y = False
+        return texture
+
+    def _sized_target(self, camera: Camera) -> moderngl.Framebuffer:
+        size = (camera.width, camera.height)
+        if self._target and self._target[0] == size:
+            return self._target[1]
+        largest = int(self._context.info["GL_MAX_RENDERBUFFER_SIZE"])
+        if max(size) > largest:
+            raise UserError(
+                "the picture is too large",
+                expected=f"at most {largest} pixels a side ({self.device})",
+                found=f"{size[0]} x {size[1]}",
+                remedy="ask for a smaller size",
+            )
+        if self._target:
+            self._target[1].release()
+        colour = self._context.renderbuffer(size, 4, dtype="f4")
+        target = self._context.framebuffer([colour], self._context.depth_renderbuffer(size))
+        self._target = (size, target)
+        return target
+
+
+def _make_context() -> moderngl.Context:
+    """A context without a window. On Linux through EGL, by the names that the libraries have without -dev packages."""
+    options: dict[str, Any] = {}
+    if sys.platform.startswith("linux"):
+        options = {"backend": "egl", "libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
+    try:
+        return moderngl.create_context(standalone=True, require=330, **options)
+    except Exception as error:  # glcontext raises bare Exception
+        raise UserError(
+            "no OpenGL 3.3 on this machine",
+            found=str(error),
+            remedy="on Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri (no screen is needed)",
+        ) from None
+
+
+def _write(target: moderngl.Framebuffer, colour: bool, depth: bool) -> None:
+    """Draw to `target` from now on, to these of its parts; moderngl sets the masks when a target is put to use."""
+    target.color_mask, target.depth_mask = (colour,) * 4, depth
+    target.use()
+
+
+def _uniform(program: moderngl.Program, name: str) -> moderngl.Uniform:
+    uniform = program[name]
+    assert isinstance(uniform, moderngl.Uniform)
+    return uniform
+
+
+def _projection(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(4, 4), world points to OpenGL's clip coordinates, near and far plane around `points` (V, 3).
+
+    Pixel (i, j) has its centre at (i + 0.5, j + 0.5) from the top left corner, as in `Camera`.
+    """
+    depths = (points @ camera.rotation.T + camera.w2c[:, 3])[:, 2]
+    far = max(2 * _NEAREST, float(depths.max()) * (1 + _MARGIN))
+    near = max(_NEAREST, far / 1000, float(depths.min()) * (1 - _MARGIN))
+    width, height, K = camera.width, camera.height, camera.K
+    clip = np.zeros((4, 4))
+    clip[0, :3] = 2 / width * K[0] - [0, 0, 1]
+    clip[1, :3] = [0, 0, 1] - 2 / height * K[1]
+    clip[2, 2:] = (far + near) / (far - near), -2 * far * near / (far - near)
+    clip[3, 2] = 1
+    return np.asarray(clip @ np.concatenate([camera.w2c, [[0, 0, 0, 1]]]))

@@ -1,0 +1,159 @@
+"""Make stills and films of an asset: `python -m stages.render data/<subject>/asset --out face.png`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from enum import StrEnum
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.codecs import CODECS
+from facefolds_core.asset.colour import rgb_to_yuv420
+from facefolds_core.asset.reader import Asset, AssetLevel
+from facefolds_core.asset.video import encode_video
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files import atomic_file
+from facefolds_core.params import VideoCodec
+from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
+from facefolds_core.rendering.opengl import OpenGLRenderer
+
+STILL_RATE = 30
+"""Pictures a second of a film of an asset that does not move."""
+FILM = VideoCodec(crf=16, preset="medium")
+SUFFIXES = {"still": ".png", "turntable": ".mp4", "fly": ".mp4"}
+
+
+class Kind(StrEnum):
+    """What is made."""
+
+    STILL = "still"
+    TURNTABLE = "turntable"
+    FLY = "fly"
+
+
+def parse_size(text: str, film: bool) -> tuple[int, int]:
+    """Width and height from "1280x720".
+
+    Raises:
+        UserError: if it is no size, or odd numbers where a film is made (its colours are stored 2 x 2).
+    """
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    size = (int(match[1]), int(match[2])) if match else (0, 0)
+    if min(size) < 16 or (film and (size[0] % 2 or size[1] % 2)):
+        expected = f"WIDTHxHEIGHT in pixels, at least 16{', even' if film else ''}"
+        raise UserError(
+            "no size for a picture", place="--size", expected=expected, found=text, remedy="such as 1280x720"
+        )
+    return size
+
+
+def parse_colour(text: str) -> tuple[float, float, float]:
+    """RGB in [0, 1] from "#16181d".
+
+    Raises:
+        UserError: if it is no colour.
+    """
+    if not re.fullmatch(r"#?[0-9a-fA-F]{6}", text):
+        raise UserError("no colour", place="--background", expected="#rrggbb", found=text, remedy="such as #16181d")
+    red, green, blue = bytes.fromhex(text.removeprefix("#"))
+    return red / 255, green / 255, blue / 255
+
+
+def pick_level(asset: Asset, name: str | None) -> AssetLevel:
+    """The level of that name; the full one for None.
+
+    Raises:
+        UserError: if there is none of that name.
+    """
+    for level in asset.levels:
+        if level.entry.name == name:
+            return level
+    if name is not None:
+        names = ", ".join(level.entry.name for level in asset.levels)
+        raise UserError(
+            "no such level of detail", place="--level", expected=names, found=name, remedy="choose one of these"
+        )
+    return asset.full
+
+
+def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
+    """(samples H, samples W, 3) in [0, 1] -> (H, W, 3) bytes, means of samples x samples pixels."""
+    height, width = rgb.shape[0] // samples, rgb.shape[1] // samples
+    means = rgb.reshape(height, samples, width, samples, 3).mean((1, 3))
+    return np.asarray(np.rint(np.clip(means, 0, 1) * 255), np.uint8)
+
+
+def render(
+    asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
+    out: Annotated[Path, typer.Option(help="File to write: .png for a still, .mp4 for a film.")],
+    kind: Annotated[
+        Kind,
+        typer.Option(help="still: one picture; turntable: a film from side to side; fly: a flight around the face"),
+    ] = Kind.STILL,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1280x720",
+    frame: Annotated[int, typer.Option(help="Frame of the sequence; a film begins with it.")] = 0,
+    azimuth: Annotated[float, typer.Option(help="Degrees from the front, positive to the subject's left.")] = 0.0,
+    elevation: Annotated[float, typer.Option(help="Degrees upwards.")] = 0.0,
+    distance: Annotated[float, typer.Option(help="From the subject; the capture's cameras are about 1 away.")] = 1.0,
+    field_of_view: Annotated[float, typer.Option(help="Degrees, of the shorter side.", min=1, max=150)] = 30.0,
+    background: Annotated[str, typer.Option(help="Colour behind the subject, #rrggbb.")] = "#16181d",
+    seconds: Annotated[float, typer.Option(help="Length of a film; the sequence repeats as needed.", min=0.1)] = 8.0,
+    sweep: Annotated[float, typer.Option(help="Degrees to each side, of a turntable.")] = 55.0,
+    samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
+    effects: Annotated[bool, typer.Option(help="View effects, where the asset has them.")] = True,
+    level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
+) -> None:
+    """Render an asset with OpenGL, without a screen: a PNG still, or an MP4 film in which the sequence plays."""
+    with report_user_errors("render"):
+        width, height = parse_size(size, kind is not Kind.STILL)
+        colour = parse_colour(background)
+        if out.suffix.lower() != SUFFIXES[kind]:
+            remedy = f"name a file that ends in {SUFFIXES[kind]}, or choose another --kind"
+            raise UserError(f"the wrong kind of file for {kind.value}", file=out, remedy=remedy)
+        shown = pick_level(read_asset(asset), level)
+        if not 0 <= frame < shown.num_frames:
+            expected = f"0 to {shown.num_frames - 1}"
+            raise UserError(
+                "no such frame", place="--frame", expected=expected, found=frame, remedy="choose one of these"
+            )
+        start = Eye(azimuth, elevation, distance)
+        with OpenGLRenderer(shown, shown.effects() if effects else None) as renderer:
+
+            def picture(eye: Eye, index: int) -> NDArray[np.uint8]:
+                camera = camera_of(eye, samples * width, samples * height, field_of_view)
+                return shrink(renderer.render(camera, index % shown.num_frames, colour)[0], samples)
+
+            if kind is Kind.STILL:
+                with atomic_file(out) as temporary:
+                    Image.fromarray(picture(start, frame)).save(temporary)
+            else:
+                rate = shown.entry.texture.fps if shown.num_frames > 1 else STILL_RATE
+                count = max(2, round(seconds * rate))
+                eyes = turntable(start, count, sweep) if kind is Kind.TURNTABLE else fly_through(start, count)
+                pictures = (picture(eye, frame + index) for index, eye in enumerate(eyes))
+                with atomic_file(out) as temporary:
+                    write_film(temporary, pictures, (width, height), Fraction(rate).limit_denominator(1001))
+            typer.echo(f"render: {out} ({width} x {height}, {renderer.device})")
+
+
+def write_film(path: Path, pictures: Iterator[NDArray[np.uint8]], size: tuple[int, int], rate: Fraction) -> None:
+    """H.264 in MP4, BT.709."""
+    width = size[0]
+    planes = (rgb_to_yuv420(picture) for picture in pictures)
+    planar = (np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)]) for y, cb, cr in planes)
+    codec = CODECS["h264"]
+    encode_video(path, planar, size, rate, codec, codec.options(FILM, FILM.crf))
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(render)
+    app()

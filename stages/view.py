@@ -1,0 +1,76 @@
+"""Play an asset in a browser: `python -m stages.view data/<subject>/asset`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.serving import serving
+
+PLAYER = Path(__file__).resolve().parents[1] / "viewer" / "dist"
+
+
+def latest_asset(data: Path) -> Path:
+    """The asset under `data` that was made last.
+
+    Raises:
+        UserError: if there is none.
+    """
+    found = sorted(data.glob(f"*/asset/{MANIFEST_NAME}"), key=lambda path: path.stat().st_mtime)
+    if not found:
+        raise UserError(
+            "no asset has been made yet", file=data, remedy="run `make repro` first, or name an asset's folder"
+        )
+    return found[-1].parent
+
+
+def check_player(folder: Path) -> Path:
+    """Refuse a player that has not been built.
+
+    Raises:
+        UserError: naming the command that builds it.
+    """
+    if not (folder / "index.html").is_file():
+        raise UserError("the web player has not been built", file=folder, remedy="run `make view`, which builds it")
+    return folder
+
+
+def has_screen() -> bool:
+    """Whether a browser could open a window here."""
+    return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def view(
+    asset: Annotated[
+        Path | None, typer.Argument(help="Folder of the asset. Left out: the one under --data that was made last.")
+    ] = None,
+    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    port: Annotated[int, typer.Option(help="Port on this machine; 0 for any free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in a browser, where there is a screen.")] = True,
+) -> None:
+    """Serve an asset and the web player to this machine only, and open the player. Ctrl+C ends it."""
+    with report_user_errors("view"):
+        folder = (asset or latest_asset(data)).resolve()
+        parse_manifest(folder / MANIFEST_NAME)
+        with serving(check_player(PLAYER), {"asset": folder}, port) as address:
+            typer.echo(f"view: {folder}\nview: {address}  (Ctrl+C ends)")
+            if browser and has_screen():
+                webbrowser.open(address)
+            try:
+                threading.Event().wait()
+            except KeyboardInterrupt:
+                typer.echo("view: ended")
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(view)
+    app()

@@ -1,0 +1,182 @@
+"""The OpenGL renderer against the reference renderer; the cameras of films; the command `render`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.errors import UserError
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
+from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.opengl import OpenGLRenderer
+from stages.render import parse_colour, parse_size, shrink
+from tests.assets import make_asset
+from tests.scenes import look_at_origin
+
+
+@pytest.fixture(scope="module")
+def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    folder = tmp_path_factory.mktemp("opengl") / "asset"
+    make_asset(folder, layers=5, frames=3, resolution=64)
+    return read_asset(folder)
+
+
+def psnr(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(-10 * np.log10(np.mean((found.astype(np.float64) - expected) ** 2)))
+
+
+def test_it_agrees_with_the_reference(caps: Asset) -> None:
+    """Several cameras (grazing: sheets are crossed twice), sizes and frames; an off-centre principal point."""
+    plain = [look_at_origin("camera", *angles, 120) for angles in ((0, 0), (45, 0), (-30, 35), (80, 5))]
+    K = plain[1].K + np.array([[0, 0.3, 7], [0, 20, -4], [0, 0, 0]])
+    cameras = [*plain, replace(plain[1], K=K, width=130, height=90)]
+    caster = AssetCaster(caps)
+    with OpenGLRenderer(caps) as renderer:
+        for camera in cameras:
+            hits = caster.cast(camera)
+            for frame in (0, 2):
+                expected, opacity = composite(hits, caps.frame(frame), (0.2, 0.4, 0.6))
+                rgb, alpha = renderer.render(camera, frame, (0.2, 0.4, 0.6))
+                # Seen: 58 dB and more; single pixels at the outline of a sheet may fall to its other side.
+                assert psnr(rgb, expected) > 45
+                assert psnr(alpha, opacity) > 45
+
+
+def test_view_effects_agree_with_the_reference(caps: Asset) -> None:
+    camera = look_at_origin("camera", 30, 10, 120)
+    maps = [np.random.default_rng(i).normal(0, 0.2, (5, 6, 3, 3)).astype(np.float32) for i in range(len(caps.layers))]
+    hits = AssetCaster(caps).cast(camera)
+    expected, _ = composite(hits, caps.frame(1), added=added_colours(hits, to_eye(camera), maps))
+    plain, _ = composite(hits, caps.frame(1))
+    with OpenGLRenderer(caps, maps) as renderer:
+        rgb, _ = renderer.render(camera, 1)
+    assert psnr(rgb, expected) > 45
+    assert psnr(plain, expected) < 35
+
+
+def test_a_background_picture_shines_through(caps: Asset) -> None:
+    camera = look_at_origin("camera", 0, 0, 40)
+    background = np.random.default_rng(0).uniform(0, 1, (40, 40, 3)).astype(np.float32)
+    with OpenGLRenderer(caps) as renderer:
+        rgb, alpha = renderer.render(camera, 0, background)
+    assert (alpha == 0).any()
+    np.testing.assert_array_equal(rgb[alpha == 0], background[alpha == 0])
+
+
+def test_a_picture_larger_than_the_card_allows(caps: Asset) -> None:
+    camera = camera_of(Eye(), 100_000, 16, 30)
+    with OpenGLRenderer(caps) as renderer, pytest.raises(UserError, match="too large"):
+        renderer.render(camera, 0)
+
+
+def test_an_eye_looks_at_its_target_upright() -> None:
+    eye = Eye(azimuth=30, elevation=20, distance=2, target=(0.1, 0.2, 0.3))
+    camera = camera_of(eye, 200, 100, 30)
+    pixels, depth = camera.project(np.array([eye.target, [0.1, 0.2, 0.4]]))
+    np.testing.assert_allclose(pixels[0], [100, 50])
+    assert depth[0] == pytest.approx(2)
+    assert pixels[1, 0] == pytest.approx(100)
+    assert pixels[1, 1] < 50  # up in the world is up in the picture
+    # The shorter side spans the field of view: its end is at 15 degrees.
+    edge = np.linalg.inv(camera.K) @ [100, 0, 1]
+    assert np.degrees(np.arctan(-edge[1])) == pytest.approx(15)
+
+
+def test_azimuth_is_towards_the_left_of_the_subject() -> None:
+    assert camera_of(Eye(azimuth=90), 10, 10, 30).centre == pytest.approx([0, 1, 0])
+
+
+@pytest.mark.parametrize("path", [lambda start, n: turntable(start, n, 50), fly_through])
+def test_films_are_closed_and_stay_in_front(path: object) -> None:
+    start = Eye(azimuth=5, elevation=3, distance=1.5)
+    eyes = path(start, 48)  # type: ignore[operator]
+    assert eyes[0] == start
+    azimuths = np.array([eye.azimuth for eye in eyes])
+    assert np.abs(azimuths - 5).max() == pytest.approx(50, abs=11)
+    steps = np.abs(np.diff([*azimuths, azimuths[0]]))
+    assert steps.max() < 8  # no jump, not at the end either
+    assert min(eye.distance for eye in eyes) > 0.9
+
+
+def test_shrinking_takes_means() -> None:
+    rgb = np.zeros((4, 6, 3), np.float32)
+    rgb[:2, :2] = 1
+    rgb[0, 2] = 1
+    found = shrink(rgb, 2)
+    assert found.shape == (2, 3, 3)
+    assert found[0, 0].tolist() == [255] * 3
+    assert found[0, 1].tolist() == [64] * 3
+
+
+@pytest.mark.parametrize("text", ["720", "0x10", "axb", "-5x20", "641x480"])
+def test_sizes_that_are_none(text: str) -> None:
+    with pytest.raises(UserError, match="no size"):
+        parse_size(text, film=True)
+
+
+def test_colours() -> None:
+    assert parse_colour("#ff0033") == (1, 0, 0.2)
+    with pytest.raises(UserError, match="no colour"):
+        parse_colour("red")
+
+
+def run(project_root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "stages.render", *arguments]
+    return subprocess.run(command, cwd=project_root, capture_output=True, text=True, check=False)
+
+
+def test_a_still(caps: Asset, tmp_path: Path, project_root: Path) -> None:
+    out = tmp_path / "still.png"
+    look = ["--azimuth", "20", "--frame", "1", "--size", "80x60", "--samples", "1", "--background", "#336699"]
+    done = run(project_root, str(caps.folder), "--out", str(out), *look)
+    assert done.returncode == 0, done.stderr
+    camera = camera_of(Eye(azimuth=20), 80, 60, 30)
+    expected, _ = composite(AssetCaster(caps).cast(camera), caps.frame(1), (0.2, 0.4, 0.6))
+    assert psnr(np.asarray(Image.open(out)) / 255, expected) > 42
+
+
+def test_a_film(caps: Asset, tmp_path: Path, project_root: Path) -> None:
+    out = tmp_path / "film.mp4"
+    done = run(
+        project_root,
+        str(caps.folder),
+        "--out",
+        str(out),
+        "--kind",
+        "turntable",
+        "--size",
+        "160x128",
+        "--seconds",
+        "0.2",
+    )
+    assert done.returncode == 0, done.stderr
+    with av.open(str(out)) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        assert container.streams.video[0].average_rate == 30
+    assert len(frames) == 6
+    assert frames[0].shape == (128, 160, 3)
+    assert len({frame.tobytes() for frame in frames}) == 6  # it moves
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--out", "a.mp4"], "wrong kind of file"),
+        (["--out", "a.png", "--frame", "9"], "no such frame"),
+        (["--out", "a.png", "--level", "tiny"], "no such level"),
+    ],
+)
+def test_what_it_refuses(caps: Asset, project_root: Path, arguments: list[str], said: str) -> None:
+    done = run(project_root, str(caps.folder), *arguments)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert "remedy" in done.stderr

@@ -1,0 +1,191 @@
+"""The web player in headless Chromium: what its tests share. Without a browser or Node.js they skip, aloud."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.serving import serving
+from tests.viewer.fixtures import rich_asset
+
+BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
+FLAGS = (
+    "--use-angle=gl-egl",  # Mesa's llvmpipe: several times faster than Chromium's own software renderer
+    "--ignore-gpu-blocklist",
+    "--no-sandbox",  # containers run as root
+    "--autoplay-policy=no-user-gesture-required",
+)
+PATIENCE = 60_000
+"""Milliseconds for what takes one: software rendering on a busy machine."""
+ELEMENT = "document.querySelector('facefolds-player')"
+
+
+def find_browser() -> str | None:
+    """A Chromium that starts; Ubuntu's wrapper around a snap does not, in a container."""
+    for name in BROWSERS:
+        path = shutil.which(name)
+        if path and subprocess.run([path, "--version"], capture_output=True, check=False, timeout=60).returncode == 0:
+            return path
+    return None
+
+
+@pytest.fixture(scope="session")
+def player_folder(project_root: Path) -> Path:
+    """The player, built from what stands in the work tree."""
+    npm, source = shutil.which("npm"), project_root / "viewer"
+    if npm is None:
+        pytest.skip("no npm: the web player cannot be built (apt-get install nodejs npm)")
+    if not (source / "node_modules").is_dir():
+        subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=source, check=True)
+    subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
+    return source / "dist"
+
+
+@pytest.fixture(scope="session")
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An asset with all that the format knows, not to be changed."""
+    return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
+
+
+@pytest.fixture
+def rich_copy(rich: Path, tmp_path: Path) -> Path:
+    """The same, to spoil."""
+    return Path(shutil.copytree(rich, tmp_path / "asset"))
+
+
+@pytest.fixture(scope="session")
+def browser(player_folder: Path) -> Iterator[Browser]:
+    path = find_browser()
+    if path is None:
+        pytest.skip(f"no browser that starts (tried {', '.join(BROWSERS)}): apt-get install chromium")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        yield chromium
+        chromium.close()
+
+
+class Player:
+    """A page with the player on it, and what the page said."""
+
+    def __init__(self, page: Page, address: str) -> None:
+        self.page = page
+        self.address = address
+        self.said: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda message: self._note(message.type, message.text))
+        page.on("pageerror", lambda error: self.said.append(f"uncaught: {error}"))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def _note(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning"):
+            self.said.append(f"{kind}: {text}")
+
+    def open(self, asset: str, view: str = "frame=0", wait: bool = True) -> None:
+        """Open the page with the asset served as `asset`; by default at rest, at frame 0."""
+        self.page.goto(f"{self.address}?src={asset}/#{view}")
+        if wait:
+            self.wait("e.ready")
+
+    def wait(self, condition: str) -> None:
+        """Wait until a JavaScript condition on the element `e` holds."""
+        self.page.wait_for_function(f"() => {{ const e = {ELEMENT}; return {condition}; }}", timeout=PATIENCE)
+
+    def run(self, code: str, value: object = None) -> object:
+        """Run JavaScript with the element as `e` and `value` as `v`; returns its result."""
+        return self.page.evaluate(f"async (v) => {{ const e = {ELEMENT}; {code} }}", value)
+
+    def button(self, name: str) -> None:
+        """Press the first visible button with that accessible name."""
+        self.page.get_by_role("button", name=name).first.click()
+
+    def message(self) -> str:
+        """The failure that is shown over all."""
+        box = self.page.get_by_role("alert")
+        box.wait_for(timeout=PATIENCE)
+        return box.inner_text()
+
+    def notice(self) -> str:
+        box = self.page.locator(".toast")
+        box.wait_for(timeout=PATIENCE)
+        return box.inner_text()
+
+    def capture(self, camera: Camera | None = None) -> NDArray[np.float64]:
+        """What is shown: (H, W, 4) in [0, 1]."""
+        given = None
+        if camera:
+            size = {"width": camera.width, "height": camera.height}
+            given = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), **size}
+        code = """const { data, height, width } = e.capture(v ?? undefined);
+            let text = '';
+            for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+            return JSON.stringify([height, width, btoa(text)]);"""
+        height, width, data = json.loads(str(self.run(code, given)))
+        return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255
+
+
+NewPlayer = Callable[..., Player]
+
+
+@pytest.fixture
+def serve(player_folder: Path) -> Iterator[Callable[[dict[str, Path]], str]]:
+    """Serves assets by name together with the player for as long as the test lasts; returns the address."""
+    open_servers = []
+
+    def start(assets: dict[str, Path]) -> str:
+        server = serving(player_folder, assets)
+        open_servers.append(server)
+        return server.__enter__()
+
+    yield start
+    for server in open_servers:
+        server.__exit__(None, None, None)
+
+
+@contextmanager
+def fresh_context(browser: Browser, **options: object) -> Iterator[BrowserContext]:
+    context = browser.new_context(**{"viewport": {"width": 480, "height": 400}, **options})  # type: ignore[arg-type]
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def new_player(browser: Browser, serve: Callable[[dict[str, Path]], str]) -> Iterator[NewPlayer]:
+    """A page with the player; fails if the console holds an error or a warning that is not allowed."""
+    players: list[tuple[Player, tuple[str, ...]]] = []
+    contexts = []
+
+    def make(assets: dict[str, Path], allow: tuple[str, ...] = (), script: str = "", **options: object) -> Player:
+        manager = fresh_context(browser, **options)
+        context = manager.__enter__()
+        contexts.append(manager)
+        page = context.new_page()
+        if script:
+            page.add_init_script(script)
+        player = Player(page, serve(assets))
+        players.append((player, allow))
+        return player
+
+    yield make
+    for manager in contexts:
+        manager.__exit__(None, None, None)
+    for player, allow in players:
+        unexpected = [line for line in player.said if not any(part in line for part in allow)]
+        assert unexpected == []
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What hangs in a browser fails soon: the calls into a page have no time limit of their own."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.timeout(180))

@@ -1,0 +1,114 @@
+"""Assets for the player's tests, made once a session, and what the reference renderer shows of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import wave
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset import Asset
+from facefolds_core.asset.manifest import Manifest, parse_manifest, write_manifest
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import CompressParams, VideoCodec
+from facefolds_core.rendering import AssetCaster, composite
+from tests.assets import make_asset
+from tests.scenes import look_at_origin
+
+THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, keyframe_interval=4))
+GREY = "#7f7f7f"
+GREY_VALUE = 127 / 255
+
+
+def five_cameras(size: int) -> list[Camera]:
+    """Frontal, 45 degrees to both sides, from above, grazing."""
+    places = {"front": (0, 0), "left": (45, 0), "right": (-45, 10), "above": (15, 40), "grazing": (80, 5)}
+    return [look_at_origin(name, azimuth, elevation, size) for name, (azimuth, elevation) in places.items()]
+
+
+def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
+    error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
+    return -10 * np.log10(max(error, 1e-12))
+
+
+def reference(asset: Asset, camera: Camera, frame: int, background: float = GREY_VALUE) -> NDArray[np.float32]:
+    """The reference renderer's picture over grey."""
+    return composite(AssetCaster(asset).cast(camera), asset.frame(frame), (background,) * 3)[0]
+
+
+def file_entry(path: Path) -> dict[str, Any]:
+    data = path.read_bytes()
+    return {"file": path.name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+
+
+def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> Manifest:
+    """Edit the manifest of an asset as JSON, bring sizes up to date, validate and seal it again."""
+    path = folder / "manifest.json"
+    value = parse_manifest(path).model_dump(mode="json")
+    change(value)
+    for level in value["levels"]:
+        entries = [*level["layers"], *level["texture"]["videos"], *filter(None, [level.get("view_effects")])]
+        level["bytes"] = sum(entry["bytes"] for entry in entries)
+    return write_manifest(Manifest.model_validate_json(json.dumps(value)), path)
+
+
+def write_png(path: Path, image: NDArray[np.uint8]) -> dict[str, Any]:
+    Image.fromarray(image).save(path)
+    return file_entry(path)
+
+
+def rich_asset(folder: Path) -> Path:
+    """All that the format knows: two levels, three videos, view effects, poster, photos, sound; 6 frames."""
+    make_asset(folder, layers=3, frames=6, resolution=96, params=THREE_CODECS)
+    coarse = folder.with_name(f"{folder.name}-coarse")
+    make_asset(coarse, layers=2, frames=6, resolution=32)
+    level = parse_manifest(coarse / "manifest.json").model_dump(mode="json")["levels"][0]
+    level["name"] = "coarse"
+    for entry in level["layers"]:
+        name = f"coarse_{entry['mesh']}"
+        shutil.copy(coarse / entry["mesh"], folder / name)
+        entry["mesh"] = name
+    shutil.copy(coarse / "full.mp4", folder / "coarse.mp4")
+    level["texture"]["videos"][0]["file"] = "coarse.mp4"
+    with wave.open(str(folder / "audio.wav"), "wb") as sound:
+        sound.setparams((1, 2, 8000, 0, "NONE", ""))
+        sound.writeframes((3000 * np.sin(np.arange(1600) / 4)).astype("<i2").tobytes())
+    photo = np.zeros((60, 90, 3), np.uint8)
+    photo[:, :, 0] = 255
+
+    def change(value: dict[str, Any]) -> None:
+        full = value["levels"][0]
+        add_effects(folder, full)
+        value["levels"].insert(0, level)
+        value["audio"] = file_entry(folder / "audio.wav")
+        value["poster"] = write_png(folder / "poster.png", photo) | {"width": 90, "height": 60}
+        value["photos"] = [photo_entry(folder, index, frame) for index, frame in enumerate((2, 4))]
+
+    change_manifest(folder, change)
+    return folder
+
+
+def add_effects(folder: Path, level: dict[str, Any]) -> None:
+    """Random view effects: each layer has 7 x 5 texels, planes lie below each other."""
+    count = len(level["layers"])
+    planes = [[0, 9 * k, 8 * count, 9] for k in range(3)]
+    image = np.random.default_rng(0).integers(0, 256, (27, 8 * count, 3), dtype=np.uint8)
+    entry = write_png(folder / "full_effects.png", image)
+    level["view_effects"] = entry | {"basis": "sh1", "scale": 0.4, "width": 8 * count, "height": 27, "planes": planes}
+    for i, layer in enumerate(level["layers"]):
+        layer["effects_rect"] = [8 * i, 1, 7, 5]
+
+
+def photo_entry(folder: Path, index: int, frame: int) -> dict[str, Any]:
+    camera = look_at_origin(f"photo{index}", 30 * index, 5, 64)
+    image = np.full((64, 64, 3), (40, 80 + 60 * index, 200), np.uint8)
+    entry = write_png(folder / f"photo{index}.png", image)
+    pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist()}
+    return entry | {"camera": camera.name, "frame": frame, "width": 64, "height": 64} | pose

@@ -1,0 +1,182 @@
+"""What can go wrong is said in words, with what to do about it; nothing is left blank or uncaught."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.viewer.conftest import NewPlayer
+from tests.viewer.fixtures import change_manifest, file_entry
+
+NOT_FOUND = "Failed to load resource"  # the browser's own line about an answer of 404
+GONE = "net::ERR_"
+
+
+@pytest.fixture
+def asset(rich_copy: Path) -> Path:
+    return rich_copy
+
+
+def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:
+    script = """const get = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+          return kind === 'webgl2' ? null : get.call(this, kind, ...rest); };"""
+    player = new_player({"asset": asset}, script=script)
+    player.open("asset", wait=False)
+    text = player.message()
+    assert "no WebGL 2" in text
+    assert "hardware acceleration" in text
+
+
+def test_no_asset_at_the_address(new_player: NewPlayer, asset: Path) -> None:
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("nowhere", wait=False)
+    assert "manifest.json is missing" in player.message()
+
+
+def test_an_asset_of_version_1(new_player: NewPlayer, asset: Path) -> None:
+    path = asset / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 1}))
+    player = new_player({"asset": asset})
+    player.open("asset", wait=False)
+    assert "format version 1" in player.message()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "not JSON"),
+        ("[]", "not a facefolds asset"),
+        ('{"format": "facefolds", "version": 2}', "levels is not a list"),
+    ],
+)
+def test_a_garbled_manifest(new_player: NewPlayer, asset: Path, text: str, said: str) -> None:
+    (asset / "manifest.json").write_text(text)
+    player = new_player({"asset": asset})
+    player.open("asset", wait=False)
+    assert said in player.message()
+
+
+def spoil_missing(asset: Path) -> str:
+    (asset / "coarse_full_01.drc").unlink()
+    return "coarse_full_01.drc is missing"
+
+
+def spoil_short(asset: Path) -> str:
+    path = asset / "coarse.mp4"
+    path.write_bytes(path.read_bytes()[:-100])
+    return "coarse.mp4 is damaged"
+
+
+def spoil_changed(asset: Path) -> str:
+    path = asset / "coarse_full_00.drc"
+    data = bytearray(path.read_bytes())
+    data[200] ^= 1
+    path.write_bytes(data)
+    return "content was changed"
+
+
+def spoil_mesh(asset: Path) -> str:
+    """Garbage whose checksum is right."""
+    path = asset / "coarse_full_00.drc"
+    path.write_bytes(b"\x01" * 300)
+
+    def change(value: dict) -> None:
+        entry = file_entry(path)
+        value["levels"][0]["layers"][0] |= {"bytes": entry["bytes"], "sha256": entry["sha256"]}
+
+    change_manifest(asset, change)
+    return "not a Draco mesh"
+
+
+def spoil_video(asset: Path) -> str:
+    path = asset / "coarse.mp4"
+    path.write_bytes(b"\x01" * 300)
+    change_manifest(asset, lambda value: value["levels"][0]["texture"]["videos"][0].update(file_entry(path)))
+    return "cannot decode the asset's video"
+
+
+def spoil_codec(asset: Path) -> str:
+    def change(value: dict) -> None:
+        value["levels"][0]["texture"]["videos"][0]["mime"] = 'video/mp4; codecs="hvc9.1"'
+
+    change_manifest(asset, change)
+    return "h264: not supported"
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [spoil_missing, spoil_short, spoil_changed, spoil_mesh, spoil_video, spoil_codec],
+    ids=lambda f: f.__name__[6:],
+)
+def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, asset: Path, spoil: object) -> None:
+    said = spoil(asset)  # type: ignore[operator]
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("asset", wait=False)
+    text = player.message()
+    assert said in text
+    assert "Try again" in text
+
+
+def test_try_again_loads_again(new_player: NewPlayer, asset: Path, tmp_path: Path) -> None:
+    (asset / "coarse.mp4").rename(tmp_path / "away")
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("asset", wait=False)
+    player.message()
+    (tmp_path / "away").rename(asset / "coarse.mp4")
+    player.button("Try again")
+    player.wait("e.ready")
+    assert not player.page.get_by_role("alert").is_visible()
+
+
+def test_a_damaged_finer_level_leaves_the_coarse_one_playing(new_player: NewPlayer, asset: Path) -> None:
+    (asset / "full_01.drc").unlink()
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("asset")
+    assert "full_01.drc is missing" in player.notice()
+    assert player.run("e.play(); return [e.level, e.playing]") == ["coarse", True]
+
+
+def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, asset: Path) -> None:
+    """The MP4's coded pictures are garbage: the decoder gives up, the WebM of the same level is taken."""
+    path = asset / "full.mp4"
+    data = bytearray(path.read_bytes())
+    start = data.index(b"mdat") + 4
+    data[start:] = bytes(len(data) - start)
+    path.write_bytes(data)
+    change_manifest(asset, lambda value: value["levels"][1]["texture"]["videos"][0].update(file_entry(path)))
+    player = new_player({"asset": asset})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    assert player.run("return e.statistics.video") == "vp9"
+
+
+def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Path) -> None:
+    player = new_player({"asset": asset}, allow=("THREE.WebGLRenderer: Context",))
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    before = player.capture()
+    player.run(
+        """const gl = e.shadowRoot.querySelector('canvas').getContext('webgl2');
+        window.lose = gl.getExtension('WEBGL_lose_context'); lose.loseContext();"""
+    )
+    assert "graphics context was lost" in player.message()
+    player.run("lose.restoreContext()")
+    player.page.get_by_role("alert").wait_for(state="hidden")
+    assert abs(player.capture() - before).max() == 0
+
+
+def test_a_server_that_is_gone(new_player: NewPlayer, asset: Path) -> None:
+    player = new_player({"asset": asset}, allow=(NOT_FOUND, GONE))
+    player.page.route("**/coarse.mp4", lambda route: route.abort())
+    player.open("asset", wait=False)
+    assert "server cannot be reached" in player.message()
+
+
+def test_no_source(new_player: NewPlayer, asset: Path) -> None:
+    player = new_player({"asset": asset})
+    player.open("asset")
+    player.run("e.removeAttribute('src')")
+    assert "No asset was named" in player.message()

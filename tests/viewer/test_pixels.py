@@ -1,0 +1,91 @@
+"""The web player's pixels against the reference renderer's, read back from the browser."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.effects import added_colours, to_eye
+from tests.assets import make_asset
+from tests.viewer.conftest import NewPlayer
+from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, reference
+
+SIZE = 160
+AGREE = 40.0
+"""dB. Seen: 47 and more; the canvas rounds to 8 bits after each layer, and browsers place chroma otherwise."""
+
+
+@pytest.fixture(scope="module")
+def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    folder = tmp_path_factory.mktemp("caps") / "asset"
+    make_asset(folder, layers=5, frames=6, resolution=96)
+    return read_asset(folder)
+
+
+def check(new_player: NewPlayer, asset: Asset, allow: float = AGREE, script: str = "") -> None:
+    """Five cameras, first, middle and last frame."""
+    player = new_player({"asset": asset.folder}, script=script)
+    player.open("asset")
+    player.run("e.background = v; e.effects = false", GREY)
+    caster = AssetCaster(asset)
+    hits = [caster.cast(camera) for camera in five_cameras(SIZE)]
+    for frame in (0, asset.num_frames // 2, asset.num_frames - 1):
+        textures = asset.frame(frame)
+        assert player.run("return await e.seek(v)", frame)
+        for camera, hit in zip(five_cameras(SIZE), hits, strict=True):
+            expected = composite(hit, textures, (GREY_VALUE,) * 3)[0]
+            found = player.capture(camera)[..., :3]
+            assert psnr(found, expected) >= allow, (camera.name, frame)
+
+
+def test_five_cameras_and_three_frames_agree_with_the_reference(new_player: NewPlayer, caps: Asset) -> None:
+    check(new_player, caps)
+
+
+def test_the_video_element_shows_the_same(new_player: NewPlayer, caps: Asset) -> None:
+    """Without WebCodecs: older browsers, and pages without HTTPS."""
+    check(new_player, caps, script="delete globalThis.VideoDecoder")
+
+
+def test_the_canvas_shows_what_is_captured(new_player: NewPlayer, caps: Asset) -> None:
+    player = new_player({"asset": caps.folder})
+    player.open("asset", "view=30,10,0.9,0,0,0&frame=3")
+    player.run("e.setAttribute('controls', 'none'); e.background = v", GREY)
+    player.page.wait_for_timeout(300)
+    box = player.page.locator("canvas").screenshot(path=None, animations="disabled")
+    shown = np.asarray(Image.open(io.BytesIO(box)).convert("RGB")) / 255
+    assert psnr(shown, player.capture()[..., :3]) >= 50
+
+
+def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps: Asset) -> None:
+    player = new_player({"asset": caps.folder})
+    player.open("asset")
+    player.run("e.background = 'transparent'")
+    camera = five_cameras(SIZE)[0]
+    found = player.capture(camera)
+    rgb, alpha = composite(AssetCaster(caps).cast(camera), caps.frame(0))
+    assert psnr(found[..., 3], alpha) >= AGREE
+    assert psnr(found[..., :3], rgb) >= AGREE  # premultiplied: the composite over black
+
+
+def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:
+    asset = read_asset(rich)
+    player = new_player({"asset": asset.folder})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    player.run("e.background = v", GREY)
+    camera = five_cameras(SIZE)[1]
+    maps, hits = asset.effects(), AssetCaster(asset).cast(camera)
+    assert maps is not None
+    expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added_colours(hits, to_eye(camera), maps))
+    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
+    player.run("e.effects = false")
+    plain = reference(asset, camera, 0)
+    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
+    assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test

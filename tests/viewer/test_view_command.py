@@ -1,0 +1,51 @@
+"""`python -m stages.view`: which asset it takes, and what it says when it cannot."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.errors import UserError
+from stages.view import check_player, latest_asset
+from tests.assets import make_asset
+
+
+def test_the_asset_made_last_is_taken(tmp_path: Path) -> None:
+    for age, name in enumerate(("new", "old")):
+        manifest = tmp_path / name / "asset" / "manifest.json"
+        manifest.parent.mkdir(parents=True)
+        manifest.write_text("{}")
+        os.utime(manifest, (1000 - age, 1000 - age))
+    assert latest_asset(tmp_path) == tmp_path / "new" / "asset"
+
+
+def test_without_any_asset_it_says_how_to_make_one(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="make repro"):
+        latest_asset(tmp_path)
+
+
+def test_a_player_that_is_not_built(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="make view"):
+        check_player(tmp_path)
+
+
+def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, project_root: Path) -> None:
+    make_asset(tmp_path / "some" / "asset", layers=1, frames=1, resolution=32)
+    command = [sys.executable, "-m", "stages.view", "--data", str(tmp_path), "--no-browser"]
+    with subprocess.Popen(command, cwd=project_root, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        lines = process.stdout.readline() + process.stdout.readline()
+        address = re.search(r"http://\S+", lines)
+        assert address
+        for path in ("", "asset/manifest.json"):
+            with urllib.request.urlopen(address[0] + path, timeout=10) as response:
+                assert response.status == 200
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 0

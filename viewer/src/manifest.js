@@ -1,0 +1,165 @@
+/** manifest.json, format version 2 (docs/asset-format.md): read, checked as far as the player relies on it. */
+import { PlayerError } from "./errors.js";
+
+export const VERSION = 2;
+const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
+
+/**
+ * @typedef {[number, number, number, number]} Rect x, y, width, height in pixels, y down
+ * @typedef {{name: string, bytes: number, sha256: string}} FileEntry
+ * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, effectsRect: Rect | null}} LayerEntry
+ * @typedef {FileEntry & {codec: string, mime: string}} VideoEntry
+ * @typedef {{width: number, height: number, colourRect: Rect, alphaRect: Rect, frames: number, fps: number}} TextureEntry
+ * @typedef {{file: FileEntry, scale: number, width: number, height: number, planes: Rect[]}} EffectsEntry
+ * @typedef {{name: string, layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
+ *   effects: EffectsEntry | null, bytes: number}} Level
+ * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
+ *   w2c: number[][]}} Photo
+ * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry | null,
+ *   poster: FileEntry | null, photos: Photo[]}} Manifest
+ */
+
+/**
+ * @param {string} text the file
+ * @param {string} file its address, for messages
+ * @returns {Manifest} levels coarsest first
+ * @throws {PlayerError} if it is not the manifest of an asset that this player reads
+ */
+export function parseManifest(text, file) {
+  let value;
+  try {
+    value = JSON.parse(text);
+  } catch (cause) {
+    throw damaged(file, "it is not JSON", cause);
+  }
+  if (value === null || typeof value !== "object" || value.format !== "facefolds") {
+    throw new PlayerError("This is not a facefolds asset", {
+      file,
+      kind: "unsupported",
+      remedy: "Give the folder that holds an asset's manifest.json.",
+    });
+  }
+  if (value.version !== VERSION) {
+    throw new PlayerError(`The asset has format version ${value.version}; this player reads version ${VERSION}`, {
+      file,
+      kind: "unsupported",
+      remedy: "Make the asset again with the facefolds that this player came with.",
+    });
+  }
+  try {
+    return readManifest(value);
+  } catch (cause) {
+    if (cause instanceof TypeError || cause instanceof RangeError) throw damaged(file, cause.message, cause);
+    throw cause;
+  }
+}
+
+function damaged(file, found, cause) {
+  return new PlayerError(`The asset's manifest is damaged: ${found}`, { file, cause, remedy: "Copy or make the asset again." });
+}
+
+function readManifest(value) {
+  const levels = list(value.levels, "levels").map(readLevel);
+  check(levels.length > 0, "levels is empty");
+  return {
+    subject: String(value.subject ?? ""),
+    generator: String(value.generator ?? ""),
+    centre: value.coordinates?.sphere_centre ?? [0, 0, 0],
+    levels,
+    audio: value.audio ? readFile(value.audio, value.audio.file, "audio") : null,
+    poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
+    photos: (value.photos ?? []).map(readPhoto),
+  };
+}
+
+function readLevel(level, index) {
+  const place = `levels[${index}]`;
+  const { texture } = level;
+  check(texture !== null && typeof texture === "object", `${place}.texture is missing`);
+  const videos = list(texture.videos, `${place}.texture.videos`).map((video, i) => ({
+    ...readFile(video, video.file, `${place}.texture.videos[${i}]`),
+    codec: String(video.codec),
+    mime: String(video.mime),
+  }));
+  check(videos.length > 0, `${place}.texture.videos is empty`);
+  const effects = level.view_effects ? readEffects(level.view_effects, `${place}.view_effects`) : null;
+  const layers = list(level.layers, `${place}.layers`).map((layer, i) =>
+    readLayer(layer, effects !== null, `${place}.layers[${i}]`),
+  );
+  check(layers.length > 0, `${place}.layers is empty`);
+  return {
+    name: String(level.name),
+    layers,
+    texture: readTexture(texture, `${place}.texture`),
+    videos,
+    effects,
+    bytes: count(level.bytes, `${place}.bytes`),
+  };
+}
+
+function readTexture(texture, place) {
+  const fps = Number(texture.fps);
+  check(fps > 0, `${place}.fps is ${texture.fps}`);
+  return {
+    width: count(texture.width, `${place}.width`),
+    height: count(texture.height, `${place}.height`),
+    colourRect: rectangle(texture.colour_rect, `${place}.colour_rect`),
+    alphaRect: rectangle(texture.alpha_rect, `${place}.alpha_rect`),
+    frames: count(texture.frames, `${place}.frames`),
+    fps,
+  };
+}
+
+function readLayer(layer, hasEffects, place) {
+  return {
+    mesh: readFile(layer, layer.mesh, place),
+    vertices: count(layer.vertices, `${place}.vertices`),
+    triangles: count(layer.triangles, `${place}.triangles`),
+    rect: rectangle(layer.texture_rect, `${place}.texture_rect`),
+    effectsRect: hasEffects ? rectangle(layer.effects_rect, `${place}.effects_rect`) : null,
+  };
+}
+
+function readEffects(effects, place) {
+  if (effects.basis !== "sh1") return null; // optional by definition: what is not known is left out
+  check(effects.planes?.length === 3, `${place}.planes must be three`);
+  return {
+    file: readFile(effects, effects.file, place),
+    scale: Number(effects.scale),
+    width: count(effects.width, `${place}.width`),
+    height: count(effects.height, `${place}.height`),
+    planes: effects.planes.map((plane, i) => rectangle(plane, `${place}.planes[${i}]`)),
+  };
+}
+
+function readPhoto(photo, index) {
+  const place = `photos[${index}]`;
+  check(photo.K?.length === 3 && photo.w2c?.length === 3, `${place} has no camera`);
+  const { camera, frame, K, w2c } = photo;
+  const size = { width: count(photo.width, `${place}.width`), height: count(photo.height, `${place}.height`) };
+  return { file: readFile(photo, photo.file, place), camera: String(camera), frame: Number(frame), ...size, K, w2c };
+}
+
+function readFile(entry, name, place) {
+  check(typeof name === "string" && PLAIN_NAME.test(name), `${place} names no plain file`);
+  return { name, bytes: count(entry.bytes, `${place}.bytes`), sha256: String(entry.sha256 ?? "") };
+}
+
+function list(value, place) {
+  check(Array.isArray(value), `${place} is not a list`);
+  return value;
+}
+
+function count(value, place) {
+  check(Number.isInteger(value) && value > 0, `${place} is ${value}`);
+  return value;
+}
+
+function rectangle(value, place) {
+  check(Array.isArray(value) && value.length === 4 && value.every(Number.isFinite), `${place} is not a rectangle`);
+  return value;
+}
+
+function check(condition, message) {
+  if (!condition) throw new TypeError(message);
+}

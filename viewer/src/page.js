@@ -1,0 +1,23 @@
+/** The full page: index.html?src=FOLDER#VIEW. The address follows the view, so that it can be copied at any time. */
+import "./index.js";
+import { decode, encode } from "./viewstate.js";
+
+const PAUSE = 400; // ms without a change before the address is brought up to date
+
+const player = document.querySelector("facefolds-player");
+const given = new URLSearchParams(location.search);
+player.state = decode(location.hash);
+player.setAttribute("src", given.get("src") ?? "asset/");
+if (given.has("controls")) player.setAttribute("controls", given.get("controls"));
+
+let timer = 0;
+function note() {
+  clearTimeout(timer);
+  timer = setTimeout(() => {
+    if (player.ready) history.replaceState(null, "", `#${encode(player.state)}`);
+  }, PAUSE);
+}
+for (const name of ["pause", "change", "level", "play"]) player.addEventListener(name, note);
+for (const name of ["pointerup", "keyup", "wheel"]) player.addEventListener(name, note, { passive: true });
+addEventListener("hashchange", () => (player.state = decode(location.hash)));
+player.addEventListener("ready", () => (document.title = `${player.player.manifest.subject} · facefolds`));

@@ -1,0 +1,59 @@
+/** What a layer's pixel is: docs/asset-format.md, "A player in six steps". Stored values in, stored values out. */
+
+/** Shared by all passes of a layer, so that their depths are equal bit for bit. */
+export const VERTEX = /* glsl */ `
+invariant gl_Position;
+uniform vec3 shift; // of the layer, when the layers are pulled apart
+out vec2 st;
+out vec3 point;
+void main() {
+  st = uv;
+  point = position;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position + shift, 1.0);
+}`;
+
+export const DEPTH_FRAGMENT = /* glsl */ `
+out vec4 nothing;
+void main() { nothing = vec4(0.0); }`;
+
+export const COLOUR_FRAGMENT = /* glsl */ `
+precision highp float;
+precision highp sampler2D;
+uniform sampler2D picture;
+uniform vec4 colourRect; // x, y, w, h of this layer's colour in the picture, pixels
+uniform vec2 alphaOffset; // from its colour to its alpha
+#ifdef EFFECTS
+uniform sampler2D effects;
+uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
+uniform float effectsScale; // 0: off
+uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
+#endif
+in vec2 st;
+in vec3 point;
+out vec4 result;
+
+vec4 look(sampler2D image, vec4 rect, vec2 offset) {
+  vec2 margin = 0.5 / rect.zw;
+  return texture(image, (rect.xy + offset + clamp(st, margin, 1.0 - margin) * rect.zw) / vec2(textureSize(image, 0)));
+}
+
+void main() {
+  vec3 colour = look(picture, colourRect, vec2(0.0)).rgb;
+  float alpha = look(picture, colourRect, alphaOffset).r;
+#ifdef EFFECTS
+  if (effectsScale > 0.0) {
+    vec3 toEye = normalize(eye - point);
+    for (int k = 0; k < 3; ++k) {
+      colour += toEye[k] * effectsScale * (look(effects, planes[k], vec2(0.0)).rgb * 2.0 - 1.0);
+    }
+    colour = clamp(colour, 0.0, 1.0);
+  }
+#endif
+  result = vec4(colour, alpha);
+}`;
+
+export const WIRE_FRAGMENT = /* glsl */ `
+precision highp float;
+uniform vec4 wire;
+out vec4 result;
+void main() { result = wire; }`;

@@ -1,0 +1,132 @@
+/** What lies over the picture and is not a control: poster, progress, statistics, messages. */
+import { PlayerError } from "../errors.js";
+
+const mebibytes = (bytes) => `${(bytes / 2 ** 20).toFixed(bytes < 2 ** 20 * 10 ? 2 : 1)} MiB`;
+
+export class Overlays {
+  /** @param {import("../element.js").FacefoldsPlayer} element */
+  constructor(element) {
+    this.element = element;
+    this.find = (selector) => element.shadowRoot.querySelector(selector);
+    this.statistics = false;
+  }
+
+  /** @param {import("../player.js").Player} player */
+  connect(player) {
+    this.player = player;
+    this.find(".spinner").hidden = false;
+    player.addEventListener("progress", () => this.#progress());
+    player.addEventListener("ready", () => {
+      this.find(".title").textContent = player.manifest.subject;
+      this.find(".poster").classList.add("gone");
+      this.find(".spinner").hidden = true;
+    });
+    player.addEventListener("level", () => this.#pill());
+    player.addEventListener("restored", () => this.#hideMessage());
+    player.addEventListener("draw", () => this.#count());
+  }
+
+  /** All that was to be loaded is there. */
+  loaded() {
+    this.find(".pill").hidden = true;
+  }
+
+  #progress() {
+    const { player } = this;
+    const { manifest } = player;
+    if (!manifest) return;
+    if (manifest.poster && !player.level && !this.posterAsked) this.#showPoster(manifest.poster);
+    const wanted = manifest.levels.find(({ name }) => name === (player.wantedLevel ?? player.choices?.[0]));
+    if (!wanted) return;
+    if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
+    const part = Math.min(1, (player.files.loaded - this.loadedBefore) / wanted.bytes);
+    this.find(".spinner i").style.width = `${100 * part}%`;
+    this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
+    this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded)}`;
+    if (player.level && player.level.info !== wanted) {
+      this.find(".pill").hidden = false;
+      this.find(".pill").textContent = `Loading detail, ${Math.round(100 * part)} %`;
+    }
+  }
+
+  /** A picture to look at until there is one; without it, nothing is lost. */
+  async #showPoster(entry) {
+    this.posterAsked = true;
+    const poster = this.find(".poster");
+    try {
+      poster.src = URL.createObjectURL(new Blob([await this.player.files.bytes(entry)]));
+      await poster.decode();
+      poster.hidden = this.player.level !== null;
+    } catch {
+      poster.hidden = true;
+    }
+  }
+
+  #pill() {
+    this.find(".pill").hidden = true;
+  }
+
+  showStatistics(on) {
+    this.statistics = on;
+    this.find(".stats").hidden = !on;
+    if (on) this.#count(true);
+    this.player.dispatchEvent(new Event("change"));
+  }
+
+  #count(now = false) {
+    const time = performance.now();
+    if (!this.statistics || (!now && time - (this.counted ?? 0) < 250)) return;
+    this.counted = time;
+    const s = this.player.statistics;
+    const rows = {
+      "Pictures a second": this.element.playing ? s.fps.toFixed(0) : "at rest",
+      Layers: `${s.layers}`,
+      Triangles: s.triangles.toLocaleString("en"),
+      Loaded: mebibytes(s.bytesLoaded),
+      "GPU memory, computed": mebibytes(s.gpuBytes),
+      Detail: s.level,
+      Texture: `${s.texture.join(" × ")} ${s.video}`,
+      Decoder: s.decoder,
+      Canvas: s.canvas.join(" × "),
+    };
+    this.find(".stats").innerHTML = Object.entries(rows)
+      .map(([name, value]) => `<dt>${name}</dt><dd>${escaped(value)}</dd>`)
+      .join("");
+  }
+
+  /** A short word that goes by itself. */
+  say(text, milliseconds = 3500) {
+    const toast = this.find(".toast");
+    toast.textContent = text;
+    toast.hidden = false;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => (toast.hidden = true), milliseconds);
+  }
+
+  /**
+   * A failure, in words. @param {Error} error
+   * @param {"all" | "notice"} how over all, or (what was shown goes on) as a notice
+   */
+  fail(error, how = "all") {
+    const known = error instanceof PlayerError;
+    const title = known ? error.message : `The player failed: ${error.message}`;
+    const remedy = known ? error.remedy : "Load the page again; if it fails again, please report it.";
+    if (how === "notice" && error.kind !== "lost") {
+      this.find(".pill").hidden = true;
+      return this.say(`${title}. ${remedy}`, 12000);
+    }
+    this.find(".spinner").hidden = true;
+    this.find(".message h2").textContent = title;
+    this.find(".message p").textContent = remedy;
+    this.find(".message .file").textContent = error.file ?? "";
+    this.find(".message").hidden = false;
+  }
+
+  #hideMessage() {
+    this.find(".message").hidden = true;
+  }
+}
+
+function escaped(text) {
+  return text.replace(/[&<>]/g, (sign) => `&#${sign.charCodeAt(0)};`);
+}

@@ -1,0 +1,72 @@
+/** The player's markup, in its shadow root. Every control has a name; every picture is decoration or has a text. */
+import style from "./style.css";
+
+const icon = (path) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${path}"/></svg>`;
+
+export const ICONS = {
+  play: icon("M8 5.2v13.6a.8.8 0 0 0 1.2.7l10.6-6.8a.8.8 0 0 0 0-1.4L9.2 4.5a.8.8 0 0 0-1.2.7z"),
+  pause: icon("M7 5h3.2v14H7zM13.8 5H17v14h-3.2z"),
+  back: icon("M6 5h2.4v14H6zM19 5.6v12.8a.7.7 0 0 1-1.1.6L9.6 12.6a.7.7 0 0 1 0-1.2L17.900 5a.7.7 0 0 1 1.100.600z"),
+  next: icon("M15.600 5H18v14h-2.400zM5 5.600v12.800a.7.7 0 0 0 1.100.600l8.300-6.400a.7.7 0 0 0 0-1.200L6.100 5A.7.7 0 0 0 5 5.600z"),
+  loop: icon("M7 6h9.200l-2-2L15.600 2.600 20 7l-4.400 4.400-1.400-1.400 2-2H7a3 3 0 0 0-3 3v1H2v-1a5 5 0 0 1 5-5zm10 12H7.800l2 2-1.400 1.400L4 17l4.400-4.400 1.400 1.400-2 2H17a3 3 0 0 0 3-3v-1h2v1a5 5 0 0 1-5 5z"),
+  compare: icon("M11 2h2v20h-2zM4 5h5v2H5v10h4v2H4a1 1 0 0 1-1-1V6a1 1 0 0 1 1-1zm11 0h5a1 1 0 0 1 1 1v12a1 1 0 0 1-1 1h-5z"),
+  sound: icon("M4 9v6h4l5 5V4L8 9zm12.500 3a4.500 4.500 0 0 0-2.500-4v8a4.500 4.500 0 0 0 2.500-4zM14 3.200v2.100a7 7 0 0 1 0 13.400v2.100a9 9 0 0 0 0-17.600z"),
+  mute: icon("M4 9v6h4l5 5V4L8 9zm17.400.600L20 8.200l-2.400 2.400-2.400-2.400-1.400 1.400 2.400 2.400-2.400 2.400 1.400 1.400 2.400-2.400 2.400 2.400 1.400-1.400L19 12z"),
+  settings: icon("M4 6h9.200a3 3 0 0 1 5.600 0H20v2h-1.200a3 3 0 0 1-5.600 0H4zm12 2.200a1.200 1.200 0 1 0 0-2.400 1.200 1.200 0 0 0 0 2.400zM4 16h1.200a3 3 0 0 1 5.600 0H20v2h-9.200a3 3 0 0 1-5.600 0H4zm4 2.200a1.200 1.200 0 1 0 0-2.400 1.200 1.200 0 0 0 0 2.400z"),
+  share: icon("M17 15.500a3 3 0 0 0-2.200 1L9 13.100a3.200 3.200 0 0 0 0-2.200l5.800-3.400a3 3 0 1 0-.8-2 3 3 0 0 0 .1.800L8.300 9.700a3 3 0 1 0 0 4.600l5.800 3.400a3 3 0 1 0 2.900-2.200z"),
+  full: icon("M4 4h6v2H6v4H4zm10 0h6v6h-2V6h-4zM4 14h2v4h4v2H4zm14 0h2v6h-6v-2h4z"),
+  close: icon("M18.300 4.300 12 10.600 5.700 4.300 4.300 5.700l6.300 6.300-6.300 6.300 1.400 1.400 6.300-6.300 6.300 6.300 1.400-1.400-6.300-6.300 6.300-6.300z"),
+  reset: icon("M12 5V1.500L6.500 6 12 10.500V7a5.500 5.500 0 1 1-5.300 7H4.600A7.500 7.500 0 1 0 12 5z"),
+}; // prettier-ignore
+
+const button = (name, label, key = "", extra = "") =>
+  `<button type="button" data-do="${name}" aria-label="${label}" title="${label}${key && ` (${key})`}" ${extra}>${ICONS[name] ?? ""}</button>`;
+
+const toggle = (name, label, checked = false) =>
+  `<label class="row"><span>${label}</span><input type="checkbox" role="switch" name="${name}" ${checked ? "checked" : ""}></label>`;
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
+const SWATCHES = { "#16181d": "Dark", "#000000": "Black", "#7f7f7f": "Grey", "#ffffff": "White", "#2f5d46": "Green" };
+
+export const TEMPLATE = `<style>${style}</style>
+<div class="stage">
+  <canvas tabindex="0" role="img" aria-label="Three-dimensional picture. Drag to turn, wheel or pinch to zoom, right button or two fingers to move."></canvas>
+  <img class="poster" alt="" hidden>
+  <div class="compare" hidden>
+    <div class="frame"><img alt="Photo of a camera that was held out">
+      <span class="tag left">Asset</span><span class="tag right">Photo</span><i></i>
+      <input type="range" min="0" max="100" value="50" step="0.5" aria-label="Border between asset and photo"></div>
+    <div class="chooser"><select aria-label="Photo"></select>${button("close", "Close the comparison", "Esc")}</div>
+  </div>
+  <header><b class="title"></b><span class="pill" role="status" hidden></span></header>
+  <dl class="stats" hidden aria-label="Statistics"></dl>
+  <div class="spinner" hidden><div role="progressbar" aria-label="Loading" aria-valuemin="0" aria-valuemax="100"><i></i></div><span>Loading</span></div>
+  <aside class="panel" aria-label="Settings" hidden>
+    <div class="row head"><b>Settings</b>${button("settings", "Close the settings").replace(ICONS.settings, ICONS.close)}</div>
+    <label class="row"><span>Detail</span><select name="level"></select></label>
+    <fieldset class="swatches"><legend>Background</legend><div>${Object.entries(SWATCHES)
+      .map(([colour, name]) => `<button type="button" data-colour="${colour}" aria-label="${name}" title="${name}" style="--c:${colour}"></button>`)
+      .join("")}<input type="color" name="background" aria-label="Other background colour" title="Other colour"></div></fieldset>
+    <fieldset class="layers"><legend>Layers <small>outermost first</small></legend><div></div></fieldset>
+    <label class="row"><span>Pull apart</span><input type="range" name="spread" min="0" max="1" step="0.01" value="0"></label>
+    ${toggle("wireframe", "Wireframe")}${toggle("effects", "View effects", true)}${toggle("stats", "Statistics")}
+    <div class="row">${button("reset", "Reset the view", "0").replace("</button>", "<span>Reset the view</span></button>")}</div>
+    <details><summary>Keys</summary><dl class="keys">
+      <dt>Space</dt><dd>play, pause</dd><dt>← →</dt><dd>step</dd><dt>Home End</dt><dd>first, last frame</dd>
+      <dt>&lt; &gt;</dt><dd>slower, faster</dd><dt>L</dt><dd>loop</dd><dt>Shift + arrows</dt><dd>turn</dd><dt>+ −</dt><dd>zoom</dd><dt>0</dt><dd>reset the view</dd>
+      <dt>W</dt><dd>wireframe</dd><dt>E</dt><dd>view effects</dd><dt>P</dt><dd>pull apart</dd><dt>1 … 9</dt><dd>layer on, off</dd><dt>C</dt><dd>compare</dd>
+      <dt>M</dt><dd>sound</dd><dt>S</dt><dd>statistics</dd><dt>F</dt><dd>full screen</dd></dl></details>
+  </aside>
+  <div class="toast" role="status" aria-live="polite" hidden></div>
+  <div class="bar" role="group" aria-label="Playback">
+    <div class="buttons">${button("play", "Play", "Space")}${button("back", "Previous frame", "←")}${button("next", "Next frame", "→")}</div>
+    <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><output></output>
+      <select name="speed" aria-label="Speed" title="Speed">${SPEEDS.map((speed) => `<option value="${speed}" ${speed === 1 ? "selected" : ""}>${speed}×</option>`).join("")}</select></div>
+    <div class="buttons">
+      ${button("loop", "Loop", "L", 'aria-pressed="true"')}${button("sound", "Sound", "M", 'aria-pressed="false" hidden')}
+      ${button("compare", "Compare with a photo", "C", "hidden")}${button("settings", "Settings", "", 'aria-expanded="false"')}
+      ${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
+    </div>
+  </div>
+  <div class="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>
+</div>`; // prettier-ignore
