@@ -114,7 +114,7 @@ class TrainParams(Section):
         checkpoint_seconds: a checkpoint is written this often.
     """
 
-    preset: str = "quick"
+    preset: str = "fast"
     model: Literal["mlp", "explicit"] = "mlp"
     device: Literal["auto", "cpu", "cuda"] = "auto"
     seed: int = 0
@@ -149,7 +149,7 @@ class TrainParams(Section):
     def _fill_from_preset(cls, value: Any) -> Any:
         if not isinstance(value, dict):
             return value
-        name = value.get("preset", "quick")
+        name = value.get("preset", "fast")
         if name not in PRESETS:
             raise ValueError(f"unknown preset {name!r}; there are {', '.join(sorted(PRESETS))}")
         return {**PRESETS[name], **value}

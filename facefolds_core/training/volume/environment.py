@@ -37,7 +37,7 @@ class Environment:
         self._steps = 0
 
     def look_up(self, origins: Array, directions: Array) -> tuple[Array, NDArray[np.intp], Array]:
-        """Colours (R, 3) of rays from inside the sphere; the texels (R, 4) that each reads, and their weights (R, 4)."""
+        """Colours (R, 3) of rays from inside the sphere; their texels (R, 4) and weights (R, 4)."""
         along = (origins * directions).sum(1)
         inside = (origins * origins).sum(1) - self.radius**2
         exit_point = origins + (np.sqrt(along * along - inside) - along)[:, None] * directions
