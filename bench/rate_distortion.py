@@ -81,8 +81,8 @@ def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> S
     for stage, section in changes.items():
         path = folders.config / f"{stage}.json"
         write_json(path, (read_json(path) if path.exists() else {}) | section)
-    for stage in STAGES:
-        typer.echo(f"{work.name}: {stage(folders)}")
+    for run in STAGES:
+        typer.echo(f"{work.name}: {run(folders)}")
     return folders
 
 

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
 
+from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.model.intersection import Crossings, first_crossings
 from facefolds_core.model.layers import LinearStack
 
@@ -39,6 +40,10 @@ class Manifolds(Protocol):
 
     def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
         """Rays [R, 3] -> nearest crossing with each layer, outermost first; differentiable."""
+        ...
+
+    def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        """Directions (u, v) [M, 2] -> distance of each layer from c [M, N], and whether it has a point there [M, N]."""
         ...
 
     def regularisation(self) -> Tensor:
@@ -101,6 +106,12 @@ class MlpManifolds(nn.Module):
 
     def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
         return first_crossings(self, self.levels, origins, directions, self.centre, self.radius, self.samples)
+
+    def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        """By rays from the enclosing ball towards c."""
+        outward = uv_to_directions(uv)
+        crossings = self.crossings(self.centre + self.radius * outward, -outward)
+        return self.radius - crossings.distance, crossings.hit
 
     def regularisation(self) -> Tensor:
         """Sum of the squared weights (biases left out) of all layers but the last (paper, "Training details")."""

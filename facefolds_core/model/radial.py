@@ -85,6 +85,23 @@ class RadialManifolds(nn.Module):
         )
         return found
 
+    def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
+        """Directions (u, v) [M, 2] -> rho [M, N], and whether they lie inside the window [M, N]."""
+        y, x, inside = self._position(uv)
+        n = self.radii().permute(2, 0, 1)[None]
+        rows, columns = self.middle.shape
+        at = torch.stack([x / (columns - 1), y / (rows - 1)], -1) * 2 - 1
+        rho = torch.nn.functional.grid_sample(n, at[None, None].to(n), padding_mode="border", align_corners=True)
+        return rho[0, :, 0].T, inside[:, None].expand(-1, self.num_layers)
+
+    def _position(self, uv: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Rows and columns (continuous) of directions (u, v) [..., 2], and whether they lie inside the window."""
+        u0, u1, v0, v1 = self.window
+        rows, columns = self.middle.shape
+        y = (u1 - uv[..., 0]) / (u1 - u0) * (rows - 1)
+        x = (uv[..., 1] - v0) / (v1 - v0) * (columns - 1)
+        return y, x, (y >= 0) & (x >= 0) & (y <= rows - 1) & (x <= columns - 1)
+
     def reference_crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
         """The same in torch, differentiable in `middle` and `halfwidth`.
 
@@ -132,11 +149,8 @@ class RadialManifolds(nn.Module):
         With all_layers: [R, S, N]. Without: S = N, point (r, i) is compared with layer i, [R, N].
         """
         uv, r = points_to_uv(points, self.centre)
-        u0, u1, v0, v1 = self.window
+        y, x, inside = self._position(uv)
         rows, columns = self.middle.shape
-        y = (u1 - uv[..., 0]) / (u1 - u0) * (rows - 1)
-        x = (uv[..., 1] - v0) / (v1 - v0) * (columns - 1)
-        inside = (y >= 0) & (x >= 0) & (y <= rows - 1) & (x <= columns - 1)
         i = y.floor().clamp(0, rows - 2).long()
         j = x.floor().clamp(0, columns - 2).long()
         a, b = (y - i).clamp(0, 1), (x - j).clamp(0, 1)

@@ -123,8 +123,9 @@ class RadianceManifolds(nn.Module):
         weights = torch.cat([p.weights for p in parts])
         return Rendered(torch.cat([p.rgb for p in parts]).clamp(0, 1), weights.sum(-1), weights)
 
+    @torch.no_grad()
     def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        """Each layer along the directions (u, v), by rays from the enclosing ball towards c.
+        """Each layer along the directions (u, v).
 
         Args:
             uv: [M, 2] in [-1, 1].
@@ -132,9 +133,10 @@ class RadianceManifolds(nn.Module):
         Returns:
             points [N, M, 3] and valid [N, M] bool (False where the layer has no point in that direction).
         """
+        parts = [self.manifolds.radii_at(at) for at in uv.split(RAYS_AT_ONCE)]
+        radii, valid = (torch.cat(tensors) for tensors in zip(*parts, strict=True))
         outward = uv_to_directions(uv)
-        crossings = self.crossings(self.centre + self.manifolds.radius * outward, -outward)
-        return crossings.points.transpose(0, 1), crossings.hit.T
+        return self.centre + radii.T[..., None] * outward, valid.T
 
     @torch.no_grad()
     def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.geometry.sphere_uv import points_to_uv
+from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.radial import RadialManifolds
 
 C = (-0.25, 0.0, 0.0)
@@ -99,3 +99,19 @@ def test_one_layer_is_the_middle() -> None:
     crossings = manifolds.crossings(torch.tensor([[1.0, 0.0, 0.0]]), torch.tensor([[-1.0, 0.0, 0.0]]))
     assert crossings.distance.item() == pytest.approx(0.95, abs=1e-5)
     assert np.isfinite(crossings.points.detach().numpy()).all()
+
+
+def test_radii_in_a_direction_are_where_a_ray_along_it_crosses() -> None:
+    torch.manual_seed(0)
+    window = (-0.4, 0.5, -0.3, 0.45)
+    middle = 0.3 + 0.02 * torch.rand(9, 7)
+    manifolds = RadialManifolds((-0.25, 0.0, 0.0), window, middle, torch.full((9, 7), 0.01), 3)
+    uv = torch.rand(200, 2) * torch.tensor([0.8, 0.7]) + torch.tensor([-0.35, -0.27])
+    uv = torch.cat([uv, torch.tensor([[0.6, 0.0]])])
+    radii, valid = manifolds.radii_at(uv)
+    outward = uv_to_directions(uv)
+    with torch.no_grad():
+        found = manifolds.crossings(manifolds.centre + manifolds.radius * outward, -outward)
+    assert valid[:-1].all() and not valid[-1].any()
+    assert (found.hit == valid).all()
+    torch.testing.assert_close(radii[:-1], (manifolds.radius - found.distance)[:-1], atol=1e-5, rtol=0)

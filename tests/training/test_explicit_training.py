@@ -52,7 +52,7 @@ def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]
 
 def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
     names = {p.name for p in trained[1].iterdir()}
-    assert names == {"model.safetensors", "model.json", "training.json", "fit.json"}
+    assert names == {"model.safetensors", "model.json", "training.json", "fit.json", "fit.png"}
 
 
 def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), {})
+    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), {}, 30.0)
     levels = plan(chosen, 400)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)

@@ -68,7 +68,8 @@ class Fit:
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
         reasons: one line a choice.
-        figures: numbers behind the choices, for the summary.
+        losses: x of the candidates for the centre -> share of the visible surface that each loses.
+        volume_psnr: of the volume on training rays, dB.
     """
 
     centre: Array
@@ -80,7 +81,8 @@ class Fit:
     rgb: Array
     texels: tuple[int, int]
     reasons: tuple[str, ...]
-    figures: dict[str, object]
+    losses: dict[float, float]
+    volume_psnr: float
 
 
 def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
@@ -125,14 +127,15 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         texels=texels,
         reasons=(
             f"centre: of the candidates, the one whose hemisphere loses least of the visible surface "
-            f"({losses[f'{centre[0]:.2f}']:.1%})",
+            f"({losses[round(float(centre[0]), 2)]:.1%})",
             f"window: directions in which the volume is at least {SURE:.0%} opaque (and the tracked mesh, where there "
             f"is one), and {WINDOW_MARGIN} on each side",
             f"middle radius: {source}",
             f"halfwidth: {halfwidth}, more where the volume is blurred or far from the middle, at most {WIDEST}",
             f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera",
         ),
-        figures={"lost_by_centre": losses, "volume_psnr": volume.psnr, "volume_shape": list(volume.grid.shape[:3])},
+        losses=losses,
+        volume_psnr=volume.psnr,
     )
 
 

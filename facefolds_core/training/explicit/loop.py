@@ -25,6 +25,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, recentre
+from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Images, Views, trace_views
 from facefolds_core.training.log import open_log
@@ -125,6 +126,7 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
         save_model(model, spec, temporary)
         write_json(temporary / "training.json", asdict(report))
         write_json(temporary / "fit.json", trainer.summary(spec))
+        draw_fit(temporary / "fit.png", fit, spec.num_layers)
     return report
 
 
@@ -292,7 +294,8 @@ class _Trainer:
             "layers": spec.num_layers,
             "texels": list(spec.texels),
             "reasons": list(self.fit.reasons),
-            "figures": self.fit.figures,
+            "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
+            "volume_psnr": self.fit.volume_psnr,
             "events": self.events,
         }
 

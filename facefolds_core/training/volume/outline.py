@@ -126,9 +126,9 @@ def lost_share(volume: Volume, centre: Array, points: Array) -> float:
     return float(1 - held.mean())
 
 
-def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[str, float]]:
+def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[float, float]]:
     """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x."""
-    losses = {x: lost_share(volume, np.array([x, 0.0, 0.0]), points) for x in CENTRES}
+    losses = {round(x, 2): lost_share(volume, np.array([x, 0.0, 0.0]), points) for x in CENTRES}
     least = min(losses.values())
     best = min(x for x, loss in losses.items() if loss <= least + TIE)
-    return np.array([best, 0.0, 0.0]), {f"{x:.2f}": loss for x, loss in losses.items()}
+    return np.array([best, 0.0, 0.0]), losses
