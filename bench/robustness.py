@@ -27,7 +27,11 @@ from facefolds_core.geometry.cameras import Camera
 
 RESULTS = Path("bench/results/robustness.json")
 
-GEOMETRY_RATES: dict[str, tuple[str, ...]] = {"paper": ("lr_manifold",), "quick": ("lr_manifold",), "fast": ()}
+GEOMETRY_RATES: dict[str, tuple[str, ...]] = {
+    "paper": ("lr_manifold",),
+    "quick": ("lr_manifold",),
+    "fast": ("lr_volume",),
+}
 """Keys of `train` that are learning rates of the geometry. A preset without any has no such rows."""
 
 OVERRIDES: dict[tuple[str, str], dict[str, Any]] = {}

@@ -111,6 +111,7 @@ class TrainParams(Section):
         lambda_view, lambda_reg: weights of |view term|^2 and of |manifold weights|^2.
         lambda_veil: explicit model: weight of the opacity of a ray, so that what the background explains stays clear.
         lambda_solid: explicit model: weight of T (1 - T), T a ray's transmittance below 1/2: a face is solid.
+        lr_volume: explicit model: learning rate of the density of the volume that its geometry starts from.
         checkpoint_seconds: a checkpoint is written this often.
     """
 
@@ -142,6 +143,7 @@ class TrainParams(Section):
     lambda_reg: Annotated[float, Field(ge=0)]
     lambda_veil: Annotated[float, Field(ge=0)] = 0.003
     lambda_solid: Annotated[float, Field(ge=0)] = 0.003
+    lr_volume: Annotated[float, Field(gt=0)] = 0.3
     checkpoint_seconds: Annotated[float, Field(gt=0)] = 60.0
 
     @model_validator(mode="before")

@@ -136,7 +136,7 @@ def test_environment_learns_what_it_is_shown() -> None:
 
 def test_a_sphere_is_found_from_images_alone(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, size=64)
-    volume = outline.largest_body(fit.fit_volume(scene, 0, tqdm(disable=True)))
+    volume = outline.largest_body(fit.fit_volume(scene, 0, 0.3, tqdm(disable=True)))
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9))
     # Voxels are 0.008 wide here.

@@ -111,7 +111,7 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=iterations() + params.iterations, desc="train", unit="it")
-        volume = largest_body(fit_volume(scene, params.seed, bar))
+        volume = largest_body(fit_volume(scene, params.seed, params.lr_volume, bar))
         fit = fit_scene(scene, volume, params.level_halfwidth)
         trainer = _Trainer(scene, params, fit, volume, device)
         levels = plan(fit, params.iterations)

@@ -38,7 +38,7 @@ SHARED = 0.35
 VEIL, SOLID, SMOOTH = 0.001, 0.003, 0.001
 """Prices of opacity, of half opacity, and of differences between neighbours: see `kernel`."""
 
-RATE_DENSITY, RATE_COLOUR = 0.3, 0.03
+RATE_COLOUR = 0.03
 RAYS = 16384
 STEP = 0.7
 """Between samples, voxels."""
@@ -129,10 +129,11 @@ def bounding_box(cameras: list[Camera]) -> tuple[NDArray[np.float64], NDArray[np
     return kept.min(0) - half, kept.max(0) + half
 
 
-def fit_volume(scene: Scene, seed: int, bar: tqdm) -> Volume:
+def fit_volume(scene: Scene, seed: int, rate: float, bar: tqdm) -> Volume:
     """Fit to the middle frame.
 
     Args:
+        rate: learning rate of raw density.
         bar: advanced by one an iteration, `iterations()` in all.
 
     Raises:
@@ -157,7 +158,7 @@ def fit_volume(scene: Scene, seed: int, bar: tqdm) -> Volume:
         grid[share == 0, 0] = -kernel.LIMIT
         rays = _rays(cameras, images, voxel)
         last = number == len(LEVELS) - 1
-        psnr = _train(grid, share, lower, voxel, rays, environment, iterations, last, random, bar)
+        psnr = _train(grid, share, lower, voxel, rays, environment, iterations, last, rate, random, bar)
     assert grid is not None
     _clear(grid, lower, voxel, rays, environment)
     return Volume(grid, lower, voxel, environment, frame, psnr)
@@ -264,6 +265,7 @@ def _train(
     environment: Environment,
     iterations: int,
     last: bool,
+    rate: float,
     random: np.random.Generator,
     bar: tqdm,
 ) -> float:
@@ -303,7 +305,7 @@ def _train(
         scale = 1 - 0.9 * i / iterations if last else 1.0
         environment.step(taps, weights, through[:, None] * residual, scale)
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
-        kernel.adam_step(grid, gradient, share, scale * RATE_DENSITY, scale * RATE_COLOUR, bias1, bias2, SMOOTH)
+        kernel.adam_step(grid, gradient, share, scale * rate, scale * RATE_COLOUR, bias1, bias2, SMOOTH)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()
