@@ -15,6 +15,7 @@ chosen.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,8 @@ MAX_PIXELS = 35_651_584
 MAX_SIDE = 16_384
 """Pixels a side that the encoders take."""
 WIDTHS_TRIED = 24
+HEIGHT_SLACK = (1.0, 1.1, 1.25, 1.5, 2.0, math.inf)
+"""Heights tried, in those that the cells' area asks for at the width."""
 
 Rect = tuple[int, int, int, int]
 """(x, y, width, height), pixels, from the top left corner."""
@@ -60,13 +63,24 @@ class AtlasLayout:
     def pack(cls, sizes: Sequence[tuple[int, int]]) -> AtlasLayout:
         """The layout that the writer uses for N textures of (width, height) texels.
 
-        Of the packings for WIDTHS_TRIED greatest widths, the one of least area among those of at most HARDWARE_SIDE
-        a side, if there are any; among equals the one with the shorter long side.
+        Of the packings for WIDTHS_TRIED greatest widths, each as low as HEIGHT_SLACK allows, the one of least area among
+        those of at most HARDWARE_SIDE a side, if there are any; among equals the one with the shorter long side.
         """
         cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
         narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
         widths = sorted({round(float(w)) for w in np.geomspace(narrow, wide, WIDTHS_TRIED)})
-        layouts = [cls._placed(sizes, cells, rpack.pack(cells, max_width=width)) for width in widths]
+        area, tall = sum(width * height for width, height in cells), max(height for _, height in cells)
+        layouts = []
+        for width in widths:
+            # Without a bound on the height equal cells end up in one column.
+            for slack in HEIGHT_SLACK:
+                bound = sum(h for _, h in cells) if math.isinf(slack) else max(tall, math.ceil(slack * area / width))
+                try:
+                    places = rpack.pack(cells, max_width=width, max_height=bound)
+                except rpack.PackingImpossibleError:
+                    continue
+                layouts.append(cls._placed(sizes, cells, places))
+                break
         return min(layouts, key=lambda layout: (layout.long_side > HARDWARE_SIDE, layout.pixels, layout.long_side))
 
     @classmethod

@@ -35,6 +35,10 @@ def test_layout_has_no_problems(sizes: list[tuple[int, int]]) -> None:
     assert min(layout.width, layout.height) >= MIN_SIDE
 
 
+def test_equal_layers_stay_within_hardware_limits() -> None:
+    assert AtlasLayout.pack([(512, 512)] * 12).long_side <= HARDWARE_SIDE
+
+
 def test_equal_layers_waste_nothing() -> None:
     layout = AtlasLayout.pack([(56, 56)] * 12)
     assert layout.pixels == 2 * 12 * 64**2

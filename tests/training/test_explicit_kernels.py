@@ -45,6 +45,15 @@ def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int]
     assert squares == pytest.approx(float(total), rel=1e-3)
 
 
+def test_contributions_match_the_reference() -> None:
+    p = _problem(500, 5, (9, 7))
+    peak = np.zeros((shading_kernel.PARTS, 9, 7, 5), np.float32)
+    shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak)
+    expected = reference.contributions(torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]))
+    # The kernel stops behind a transmittance of 0.002.
+    torch.testing.assert_close(torch.from_numpy(peak.max(0)), expected, atol=2e-3, rtol=0)
+
+
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_shading_at_extreme_alphas(alpha: float) -> None:
     p = _problem(50, 4, (6, 6))

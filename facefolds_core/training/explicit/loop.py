@@ -62,6 +62,10 @@ BLUR = 6.0
 EPSILON = 1 / 255
 """A layer whose alpha is nowhere larger is dropped: no pixel changes by more than this."""
 
+LEAST = 1 / 1020
+"""Texels that add less to the opacity of every training ray are made transparent. A ray reads four a layer: its colour
+changes by no more than N / 255, and that only if all of them are just below."""
+
 DIVERGED = 9.0
 """A mean squared error this many times the best of its level is a divergence."""
 
@@ -209,9 +213,7 @@ class _Trainer:
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
         assert self.state is not None and self.views is not None
-        count = len(self.views.pixel)
-        texels = level.texels[0] * level.texels[1]
-        stride = max(1, int(count / (RAYS_PER_TEXEL * texels)))
+        count, stride = len(self.views.pixel), self._stride()
         coarse = number < len(ROUNDS)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
@@ -245,6 +247,11 @@ class _Trainer:
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True
 
+    def _stride(self) -> int:
+        """Steps look at every so-manieth ray."""
+        assert self.state is not None and self.views is not None
+        return max(1, int(len(self.views.pixel) / (RAYS_PER_TEXEL * self.state.shape[0] * self.state.shape[1])))
+
     def _rates(self, progress: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         rate = self.rate * (1 - 0.9 * progress)
         rates = rate * np.array([1, RATE_LAYERS, RATE_ALPHA, RATE_FRAME, RATE_FRAME * RATE_ALPHA])
@@ -254,7 +261,12 @@ class _Trainer:
         """The model, without the layers that show nothing."""
         assert self.state is not None
         state, n = self.state, self.params.layers
-        state.hide_unseen()
+        assert self.views is not None
+        hidden = state.contributions(self.views, self._stride()) < LEAST
+        state.hide(hidden)
+        self.events.append(
+            f"{float(hidden.float().mean()):.0%} of all texels add less than {LEAST:.5f} to any ray: cleared"
+        )
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= EPSILON] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.

@@ -33,6 +33,25 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
 
 
+def contributions(codes: Tensor, texture: Tensor) -> Tensor:
+    """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [H, W, N]."""
+    height, width, layers, _ = texture.shape
+    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
+    alpha = look_up(codes, texture)[..., 3]
+    before = torch.cat([torch.ones_like(alpha[:, :1]), (1 - alpha).cumprod(1)[:, :-1]], 1)
+    n = torch.arange(layers, device=texture.device).expand_as(i)
+    hit = codes[..., 0] > 0
+    peak = texture.new_zeros(height * width * layers)
+    for di, wi in ((0, 1 - (y - i)), (1, y - i)):
+        for dj, wj in ((0, 1 - (x - j)), (1, x - j)):
+            index = ((i + di) * width + j + dj) * layers + n
+            share = before * wi * wj * texture[i + di, j + dj, n, 3]
+            peak.scatter_reduce_(0, index[hit], share[hit], "amax")
+    return peak.view(height, width, layers)
+
+
 def shade(
     codes: Tensor,  # [R, N, 2] int32
     target: Tensor,  # [R, 3] in [0, 1]

@@ -132,3 +132,35 @@ def shade(  # type: ignore[no-untyped-def]
                     own[i, j, n, 3] += w * e3
         sums[part] = total
     return sums.sum()
+
+
+@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+def contributions(  # type: ignore[no-untyped-def]
+    codes,  # (P, N, 2) uint16, as above
+    rays,  # (R,) int64, which of the P to look at
+    texture,  # (H, W, N, 4)
+    peak,  # (PARTS, H, W, N) float32, raised to what is found
+):
+    """What each texel adds to a ray's opacity at most: T w alpha; w bilinear weight, T transmittance before it."""
+    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
+    count = rays.shape[0]
+    parts = peak.shape[0]
+    for part in numba.prange(parts):
+        own = peak[part]
+        for k in range(count * part // parts, count * (part + 1) // parts):
+            p = rays[k]
+            through = np.float32(1.0)
+            for n in range(layers):
+                if codes[p, n, 0] == 0:
+                    continue
+                j, b = _corner(codes[p, n, 0], width)
+                i, a = _corner(codes[p, n, 1], height)
+                alpha = np.float32(0.0)
+                for tap in range(4):
+                    di, dj = tap >> 1, tap & 1
+                    w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]
+                    alpha += w
+                    own[i + di, j + dj, n] = max(own[i + di, j + dj, n], through * w)
+                through *= 1 - alpha
+                if through < OPAQUE:
+                    break

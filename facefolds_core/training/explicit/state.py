@@ -186,9 +186,23 @@ class TextureState:
         )
         return float(squares)
 
-    def hide_unseen(self) -> None:
-        """Make texels transparent that no ray has met since the grids last grew."""
-        unseen = self.layers[2, ..., 3] == 0
+    def contributions(self, views: Views, passes: int) -> Tensor:
+        """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
+        (h, w), frames = self.shape, len(self.steps)
+        n = self.layers.shape[2]
+        peak = torch.zeros(shading_kernel.PARTS, h, w, n)
+        for i in range(max(passes, frames)):
+            rays = np.arange(i % passes, len(views.pixel), passes)
+            texture = self.activated(i % frames).view(h, w, n, 4)
+            if self.device.type == "cpu":
+                shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy())
+            else:
+                codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
+                peak[0] = torch.maximum(peak[0], reference.contributions(codes, texture).cpu())
+        return peak.amax(0).view(-1, n).to(self.device)
+
+    def hide(self, unseen: Tensor) -> None:
+        """Make texels [M, N] bool transparent."""
         self.layers[0, ..., 3] = torch.where(unseen, UNSEEN_LOGIT, self.layers[0, ..., 3])
         self.frame_alpha[0] = torch.where(unseen, 0.0, self.frame_alpha[0])
 
