@@ -63,8 +63,8 @@ class AtlasLayout:
     def pack(cls, sizes: Sequence[tuple[int, int]]) -> AtlasLayout:
         """The layout that the writer uses for N textures of (width, height) texels.
 
-        Of the packings for WIDTHS_TRIED greatest widths, each as low as HEIGHT_SLACK allows, the one of least area among
-        those of at most HARDWARE_SIDE a side, if there are any; among equals the one with the shorter long side.
+        Of the packings for WIDTHS_TRIED greatest widths, each as low as HEIGHT_SLACK allows, the one of least area
+        among those of at most HARDWARE_SIDE a side, if there are any; among equals the one with the shorter long side.
         """
         cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
         narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
