@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,9 @@ def test_a_player_that_is_not_built(tmp_path: Path) -> None:
 def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, project_root: Path) -> None:
     make_asset(tmp_path / "some" / "asset", layers=1, frames=1, resolution=32)
     command = [sys.executable, "-m", "stages.view", "--data", str(tmp_path), "--no-browser"]
-    with subprocess.Popen(command, cwd=project_root, stdout=subprocess.PIPE, text=True) as process:
+    # A shell's background jobs ignore SIGINT, and their children inherit that.
+    restore = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, cwd=project_root, stdout=subprocess.PIPE, text=True, preexec_fn=restore) as process:
         assert process.stdout
         lines = process.stdout.readline() + process.stdout.readline()
         address = re.search(r"http://\S+", lines)
