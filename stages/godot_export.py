@@ -18,7 +18,7 @@ def godot_export(
     out: Annotated[Path, typer.Argument(help="Folder to write; the add-on loads it. An earlier export is replaced.")],
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
 ) -> None:
-    """Write an asset as Godot 3 can read it: plain meshes with y up, the texture video as WebM, a picture a frame."""
+    """Write an asset as Godot 3 can read it: plain meshes with y up, a picture a frame."""
     with report_user_errors("godot_export"):
         found = read_asset(asset)
         chosen = pick_level(found, level)

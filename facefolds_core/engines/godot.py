@@ -1,7 +1,7 @@
 """An asset for Godot 3: what its add-on in engines/godot reads (docs/engines.md).
 
-Godot 3 has no Draco (it loads garbage without an error), its player of WebM cannot seek, and it has no MP4. So the folder holds plain
-binary meshes with y up, the texture video as WebM for playback, and every frame as a picture of its own for exact ones.
+Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player of WebM cannot seek. So the folder
+holds plain binary meshes with y up, and every frame as a picture of its own.
 
 `facefolds.json` names all files; rectangles are the asset's own ([x, y, width, height], pixels of the picture, y down).
 A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordinates (s, t), 3 T uint32 indices.
@@ -9,33 +9,26 @@ A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordin
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
 from facefolds_core.asset.manifest import Texture
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.asset.video import Picture, decode_video, encode_video
+from facefolds_core.asset.video import Picture, decode_video
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import VideoCodec
 
 CONTENTS = "facefolds.json"
 FORMAT, VERSION = "facefolds-godot", 1
-VIDEO = "texture.webm"
 PICTURE = "frame_{:05d}.webp"
 QUALITY = 95
-"""Of the pictures: lossy WebP, 0..100. Lossless ones would be ten times larger."""
-RECODED = VideoCodec(codec=("vp9",), crf=12)
-"""Where the asset has no VP9: near enough to its own video, which is lossy already."""
+"""Of the pictures: lossy WebP, 0..100. Lossless ones would be several times larger."""
 
 
 def y_up(points: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -67,7 +60,6 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             (out / name).write_bytes(mesh_bytes(mesh))
             counts = {"vertices": len(mesh.vertices), "triangles": len(mesh.faces)}
             layers.append({"mesh": name, **counts, "texture_rect": list(entry.texture_rect)})
-        _write_video(out / VIDEO, level)
         for number, picture in enumerate(_pictures(level)):
             Image.fromarray(rgb_picture(picture, texture)).save(out / PICTURE.format(number), quality=QUALITY, method=4)
         contents = {
@@ -80,7 +72,6 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             "height": texture.height,
             "colour_rect": list(texture.colour_rect),
             "alpha_rect": list(texture.alpha_rect),
-            "video": VIDEO,
             "pictures": [PICTURE.format(number) for number in range(texture.frames)],
             "layers": layers,
         }
@@ -109,15 +100,3 @@ def _pictures(level: AssetLevel) -> Iterator[Picture]:
     texture = level.entry.texture
     path = level.folder / texture.videos[level.video].file
     return decode_video(path, (texture.width, texture.height), texture.fps)
-
-
-def _write_video(path: Path, level: AssetLevel) -> None:
-    texture = level.entry.texture
-    for video in texture.videos:
-        if video.codec == "vp9":
-            shutil.copyfile(level.folder / video.file, path)
-            return
-    codec = CODECS["vp9"]
-    rate = Fraction(texture.fps).limit_denominator(1001)
-    options = codec.options(RECODED, codec.crf(int(RECODED.crf)))
-    encode_video(path, _pictures(level), (texture.width, texture.height), rate, codec, options)

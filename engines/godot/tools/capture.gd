@@ -2,7 +2,7 @@ extends SceneTree
 # Renders pictures for tests and documentation, from a job (JSON) named by the environment variable FACEFOLDS_JOB:
 # {"folder", "width", "height", "background": [r, g, b],
 #  "views": [{"file", "frame", "basis": rows of camera-to-world, "origin", "fov": vertical degrees}]}
-# With "video": seconds, it plays instead and saves what the first view shows after that time, with the frame's number.
+# With "play": seconds, it plays first, for so long, and prints the frames that were shown.
 
 const Player = preload("res://addons/facefolds/player.gd")
 
@@ -31,12 +31,11 @@ func _run():
 		printerr("error: " + player.error)
 		quit(3)
 		return
-	if job.has("video"):
-		yield(_play(job, player, viewport, camera), "completed")
-	else:
-		for view in job.views:
-			player.seek(view.frame)
-			yield(_save(viewport, camera, view), "completed")
+	if job.has("play"):
+		yield(_play(float(job.play), player), "completed")
+	for view in job.views:
+		player.seek(view.frame)
+		yield(_save(viewport, camera, view), "completed")
 	print("done ", VisualServer.get_video_adapter_name())
 	quit(0)
 
@@ -71,16 +70,15 @@ func _save(viewport, camera, view):
 	viewport.get_texture().get_data().save_png(view.file)
 
 
-func _play(job, player, viewport, camera):
+func _play(seconds, player):
 	var changes = []
 	player.connect("frame_changed", self, "_note", [changes])
 	player.play()
-	var end = OS.get_ticks_msec() + 1000 * float(job.video)
+	var end = OS.get_ticks_msec() + 1000 * seconds
 	while OS.get_ticks_msec() < end:
 		yield(self, "idle_frame")
 	player.pause()
-	yield(_save(viewport, camera, job.views[0]), "completed")
-	print("frame ", player.frame, " video ", player.from_video, " seen ", JSON.print(changes))
+	print("frames ", JSON.print(changes))
 
 
 func _note(frame, changes):

@@ -14,7 +14,6 @@ uniform float radius;
 uniform float slice;         // index of the layer, outermost 0
 uniform float slices;
 uniform bool depth_only;
-uniform bool from_video;
 
 float device_depth(mat4 projection, float z) {
 	vec4 clip = projection * vec4(0.0, 0.0, z, 1.0);
@@ -32,14 +31,6 @@ void vertex() {
 	POSITION = clip;
 }
 
-vec3 decoded(vec3 rgb) {
-	// Godot converts every WebM with the matrix of BT.601; the codes are BT.709's. Back to Y, Cb, Cr, and on.
-	float y = dot(rgb, vec3(0.299, 0.587, 0.114));
-	float red = y + 1.5748 * (rgb.r - y) / 1.402;
-	float blue = y + 1.8556 * (rgb.b - y) / 1.772;
-	return clamp(vec3(red, (y - 0.2126 * red - 0.0722 * blue) / 0.7152, blue), 0.0, 1.0);
-}
-
 vec3 to_linear(vec3 c) {
 	return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThan(c, vec3(0.04045)));
 }
@@ -47,9 +38,6 @@ vec3 to_linear(vec3 c) {
 void fragment() {
 	vec2 place = rect.xy + clamp(UV * rect.zw, vec2(0.5), rect.zw - 0.5);
 	vec3 colour = texture(picture, (colour_origin + place) / picture_size).rgb;
-	if (from_video) {
-		colour = decoded(colour);
-	}
 	ALBEDO = OUTPUT_IS_SRGB ? colour : to_linear(colour);
 	ALPHA = depth_only ? 0.0 : texture(picture, (alpha_origin + place) / picture_size).r;
 }

@@ -2,9 +2,8 @@ extends Spatial
 # Plays what `python -m stages.godot_export` writes. Add it to a scene, give it a folder, play. y is up, the subject
 # looks to +z; the meshes are about 1 unit from where the capture's cameras stood.
 #
-# While it plays from the beginning the textures come from the WebM. Godot 3 cannot seek in one: `seek` shows a picture
-# of its own for the frame, and `play` after it goes on with pictures (leaving out what the machine is too slow for)
-# until the end of the sequence; the next round is the WebM again.
+# Every frame is a picture of its own: `seek` is exact, and playing leaves out the frames that the machine is too slow
+# for, so that the clock stays right.
 
 signal frame_changed(frame)
 signal finished
@@ -22,26 +21,20 @@ var frames = 0
 var fps = 1.0
 var frame = 0
 var playing = false
-var from_video = false
 
 var _materials = []
-var _video
 var _picture
 var _clock = 0.0
-var _started = false
 
 
 func _ready():
-	_video = VideoPlayer.new()
-	_video.visible = false
-	add_child(_video)
 	if folder != "" and load_folder(folder) and autoplay:
 		play()
 
 
 # Loads an exported folder and shows its first frame; false, with the reason in `error`, if that fails.
 func load_folder(path):
-	stop()
+	pause()
 	folder = path
 	frames = 0
 	_clear()
@@ -59,31 +52,16 @@ func load_folder(path):
 
 
 func play():
-	if frames == 0:
-		return
-	if frame >= frames - 1 or frame == 0:
-		_start_video()
-	elif from_video:
-		_video.paused = false
-	else:
-		_clock = frame / fps
-	playing = true
+	if frames > 1:
+		_clock = 0.0 if frame == frames - 1 else frame / fps
+		playing = true
 
 
 func pause():
 	playing = false
-	if from_video:
-		_video.paused = true
 
 
-func stop():
-	playing = false
-	_started = false
-	if _video != null:
-		_video.stop()
-
-
-# Shows frame `number` exactly, and pauses the WebM; false if its picture cannot be read.
+# Shows frame `number` exactly; false if its picture cannot be read.
 func seek(number):
 	number = int(clamp(number, 0, max(frames - 1, 0)))
 	var file = folder.plus_file(contents.pictures[number])
@@ -96,88 +74,31 @@ func seek(number):
 		_picture.create_from_image(image, Texture.FLAG_FILTER)
 	else:
 		_picture.set_data(image)
-	_video.stop()
-	_started = false
-	_show(_picture, false)
+	_set_all("picture", _picture)
 	_clock = number / fps
-	_set_frame(number)
+	if number != frame:
+		frame = number
+		emit_signal("frame_changed", frame)
 	return true
 
 
 func set_layer_visible(index, shown):
-	get_child(index + 1).visible = shown
+	get_child(index).visible = shown
 
 
 func _process(delta):
 	if not playing:
 		return
-	if from_video:
-		_follow_video()
-	else:
-		_clock += delta
-		var number = int(_clock * fps)
-		if number >= frames:
-			_end()
-		elif number != frame:
-			seek_on(number)
-
-
-# As `seek`, but the clock goes on by itself.
-func seek_on(number):
-	var time = _clock
-	if not seek(number):
+	var time = _clock + delta
+	if time * fps >= frames:
+		emit_signal("finished")
+		time = fmod(time, frames / fps) if loop else (frames - 1) / fps
+		playing = loop
+	var number = int(time * fps + 0.001)
+	if number != frame and not seek(number):
 		playing = false
 		push_error("facefolds: " + error)
 	_clock = time
-
-
-func _follow_video():
-	if _video.is_playing():
-		_started = true
-		_set_frame(int(clamp(_video.stream_position * fps, 0, frames - 1)))
-	elif _started:
-		_end()
-
-
-func _end():
-	emit_signal("finished")
-	if loop:
-		_start_video()
-	else:
-		playing = false
-		seek(frames - 1)
-
-
-func _start_video():
-	if frames == 1:
-		return
-	if _video.stream == null:
-		var stream = VideoStreamWebm.new()
-		stream.set_file(folder.plus_file(contents.video))
-		_video.stream = stream
-	_video.paused = false
-	_video.play()
-	_started = false
-	var texture = _video.get_video_texture()
-	if texture == null:
-		error = "cannot play " + folder.plus_file(contents.video)
-		push_error("facefolds: " + error)
-		playing = false
-		return
-	_show(texture, true)
-	_set_frame(0)
-
-
-func _show(texture, is_video):
-	from_video = is_video
-	_set_all("picture", texture)
-	_set_all("from_video", is_video)
-
-
-func _set_frame(number):
-	if number != frame:
-		frame = number
-		emit_signal("frame_changed", frame)
 
 
 func _clear():
@@ -187,7 +108,6 @@ func _clear():
 			layer.queue_free()
 	_materials = []
 	_picture = null
-	_video.stream = null
 
 
 func _read_contents():
