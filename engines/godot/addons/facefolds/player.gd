@@ -1,0 +1,197 @@
+extends Spatial
+# Plays what `python -m stages.godot_export` writes. Add it to a scene, give it a folder, play. y is up, the subject
+# looks to +z; the meshes are about 1 unit from where the capture's cameras stood.
+#
+# Every frame is a picture of its own: `seek` is exact, and playing leaves out the frames that the machine is too slow
+# for, so that the clock stays right.
+
+signal frame_changed(frame)
+signal finished
+
+const FORMAT = "facefolds-godot"
+const VERSION = 1
+
+export(String, DIR) var folder = ""
+export var autoplay = true
+export var loop = true
+
+var contents = {}
+var error = ""
+var frames = 0
+var fps = 1.0
+var frame = 0
+var playing = false
+
+var _materials = []
+var _picture
+var _clock = 0.0
+
+
+func _ready():
+	if folder != "" and load_folder(folder) and autoplay:
+		play()
+
+
+# Loads an exported folder and shows its first frame; false, with the reason in `error`, if that fails.
+func load_folder(path):
+	pause()
+	folder = path
+	frames = 0
+	_clear()
+	error = _read_contents()
+	if error == "":
+		error = _build_layers()
+	if error == "":
+		frames = int(contents.frames)
+		fps = float(contents.fps)
+		if not seek(0):
+			frames = 0
+	if error != "":
+		push_error("facefolds: " + error)
+	return error == ""
+
+
+func play():
+	if frames > 1:
+		_clock = 0.0 if frame == frames - 1 else frame / fps
+		playing = true
+
+
+func pause():
+	playing = false
+
+
+# Shows frame `number` exactly; false if its picture cannot be read.
+func seek(number):
+	number = int(clamp(number, 0, max(frames - 1, 0)))
+	var file = folder.plus_file(contents.pictures[number])
+	var image = Image.new()
+	if image.load(file) != OK:
+		error = "cannot read " + file
+		return false
+	if _picture == null:
+		_picture = ImageTexture.new()
+		_picture.create_from_image(image, Texture.FLAG_FILTER)
+	else:
+		_picture.set_data(image)
+	_set_all("picture", _picture)
+	_clock = number / fps
+	if number != frame:
+		frame = number
+		emit_signal("frame_changed", frame)
+	return true
+
+
+func set_layer_visible(index, shown):
+	get_child(index).visible = shown
+
+
+func _process(delta):
+	if not playing:
+		return
+	var time = _clock + delta
+	if time * fps >= frames:
+		emit_signal("finished")
+		time = fmod(time, frames / fps) if loop else (frames - 1) / fps
+		playing = loop
+	var number = int(time * fps + 0.001)
+	if number != frame and not seek(number):
+		playing = false
+		push_error("facefolds: " + error)
+	_clock = time
+
+
+func _clear():
+	for layer in get_children():
+		if layer is MeshInstance:
+			remove_child(layer)
+			layer.queue_free()
+	_materials = []
+	_picture = null
+
+
+func _read_contents():
+	var path = folder.plus_file("facefolds.json")
+	var file = File.new()
+	if file.open(path, File.READ) != OK:
+		return "cannot open " + path + ": is it a folder that stages.godot_export wrote?"
+	var parsed = JSON.parse(file.get_as_text())
+	if parsed.error != OK or typeof(parsed.result) != TYPE_DICTIONARY:
+		return path + " is not JSON"
+	contents = parsed.result
+	if contents.get("format") != FORMAT or contents.get("version") != VERSION:
+		return path + ": this add-on reads format " + FORMAT + " " + str(VERSION) + "; export the asset again"
+	return ""
+
+
+func _build_layers():
+	var bounds = AABB()
+	var count = contents.layers.size()
+	for index in count:
+		var layer = contents.layers[index]
+		var mesh = _read_mesh(folder.plus_file(layer.mesh), int(layer.vertices), int(layer.triangles))
+		if mesh == null:
+			return "cannot read " + folder.plus_file(layer.mesh) + ": missing or cut off"
+		bounds = bounds.merge(mesh.get_aabb()) if index > 0 else mesh.get_aabb()
+		var depth = _material(layer, index, true)
+		depth.render_priority = 2 * (count - 1 - index)  # the outermost is drawn last
+		depth.next_pass = _material(layer, index, false)
+		depth.next_pass.render_priority = depth.render_priority + 1
+		var instance = MeshInstance.new()
+		instance.mesh = mesh
+		instance.material_override = depth
+		instance.cast_shadow = GeometryInstance.SHADOW_CASTING_SETTING_OFF
+		add_child(instance)
+	_set_all("slices", float(count))
+	_set_all("centre", bounds.position + bounds.size / 2)
+	_set_all("radius", bounds.size.length() / 2)
+	return ""
+
+
+func _material(layer, index, depth_only):
+	var material = ShaderMaterial.new()
+	var r = layer.texture_rect
+	material.shader = preload("layer.shader")
+	material.set_shader_param("picture_size", Vector2(contents.width, contents.height))
+	material.set_shader_param("colour_origin", Vector2(contents.colour_rect[0], contents.colour_rect[1]))
+	material.set_shader_param("alpha_origin", Vector2(contents.alpha_rect[0], contents.alpha_rect[1]))
+	material.set_shader_param("rect", Plane(r[0], r[1], r[2], r[3]))
+	material.set_shader_param("slice", float(index))
+	material.set_shader_param("depth_only", depth_only)
+	_materials.append(material)
+	return material
+
+
+func _set_all(name, value):
+	for material in _materials:
+		material.set_shader_param(name, value)
+
+
+func _read_mesh(path, vertices, triangles):
+	var file = File.new()
+	if file.open(path, File.READ) != OK or file.get_len() != 20 * vertices + 12 * triangles:
+		return null
+	var points = PoolVector3Array()
+	var coordinates = PoolVector2Array()
+	var indices = PoolIntArray()
+	points.resize(vertices)
+	coordinates.resize(vertices)
+	indices.resize(3 * triangles)
+	for i in vertices:
+		var x = file.get_float()
+		var y = file.get_float()
+		points[i] = Vector3(x, y, file.get_float())
+	for i in vertices:
+		var s = file.get_float()
+		coordinates[i] = Vector2(s, file.get_float())
+	for i in 3 * triangles:
+		indices[i] = file.get_32()
+	var arrays = []
+	arrays.resize(Mesh.ARRAY_MAX)
+	arrays[Mesh.ARRAY_VERTEX] = points
+	arrays[Mesh.ARRAY_TEX_UV] = coordinates
+	arrays[Mesh.ARRAY_INDEX] = indices
+	var mesh = ArrayMesh.new()
+	# No compression: half-precision texture coordinates are too coarse.
+	mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays, [], 0)
+	return mesh

@@ -1,0 +1,1 @@
+"""Assets for engines that cannot read them as they are."""

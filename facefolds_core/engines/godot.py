@@ -1,0 +1,102 @@
+"""An asset for Godot 3: what its add-on in engines/godot reads (docs/engines.md).
+
+Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player of WebM cannot seek. So the folder
+holds plain binary meshes with y up, and every frame as a picture of its own.
+
+`facefolds.json` names all files; rectangles are the asset's own ([x, y, width, height], pixels of the picture, y down).
+A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordinates (s, t), 3 T uint32 indices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
+from facefolds_core.asset.manifest import Texture
+from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.asset.video import Picture, decode_video
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.geometry.meshes import TexturedMesh
+
+CONTENTS = "facefolds.json"
+FORMAT, VERSION = "facefolds-godot", 1
+PICTURE = "frame_{:05d}.webp"
+QUALITY = 95
+"""Of the pictures: lossy WebP, 0..100. Lossless ones would be several times larger."""
+
+
+def y_up(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(..., 3) in the asset's axes -> Godot's: y up, the subject looks to +z, its left is +x. A rotation."""
+    return points[..., [1, 2, 0]]
+
+
+def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
+    """Write a level for Godot into `folder`, which is replaced.
+
+    Returns:
+        bytes of all files.
+
+    Raises:
+        UserError: if the folder holds anything else than an earlier export, or the asset's video is damaged.
+    """
+    if folder.exists() and any(folder.iterdir()) and not (folder / CONTENTS).is_file():
+        raise UserError(
+            "the folder is not empty, and holds no earlier export",
+            file=folder,
+            expected=f"no such folder, or one with {CONTENTS}",
+            remedy="name another folder",
+        )
+    texture = level.entry.texture
+    with atomic_folder(folder) as out:
+        layers = []
+        for index, (mesh, entry) in enumerate(zip(level.layers, level.entry.layers, strict=True)):
+            name = f"layer_{index:02d}.mesh"
+            (out / name).write_bytes(mesh_bytes(mesh))
+            counts = {"vertices": len(mesh.vertices), "triangles": len(mesh.faces)}
+            layers.append({"mesh": name, **counts, "texture_rect": list(entry.texture_rect)})
+        for number, picture in enumerate(_pictures(level)):
+            Image.fromarray(rgb_picture(picture, texture)).save(out / PICTURE.format(number), quality=QUALITY, method=4)
+        contents = {
+            "format": FORMAT,
+            "version": VERSION,
+            "subject": subject,
+            "frames": texture.frames,
+            "fps": texture.fps,
+            "width": texture.width,
+            "height": texture.height,
+            "colour_rect": list(texture.colour_rect),
+            "alpha_rect": list(texture.alpha_rect),
+            "pictures": [PICTURE.format(number) for number in range(texture.frames)],
+            "layers": layers,
+        }
+        write_json(out / CONTENTS, contents)
+        return sum(path.stat().st_size for path in out.iterdir())
+
+
+def mesh_bytes(mesh: TexturedMesh) -> bytes:
+    """A layer as the add-on reads it."""
+    vertices = y_up(mesh.vertices).astype("<f4").tobytes()
+    return vertices + mesh.st.astype("<f4").tobytes() + mesh.faces.astype("<u4").tobytes()
+
+
+def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
+    """A decoded picture -> (height, width, 3) RGB: colour in its half, alpha as grey in its own."""
+    height, width = texture.height, texture.width
+    y = picture[:height]
+    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
+    rgb = yuv420_to_rgb(y, cb, cr)
+    x0, y0, w, h = texture.alpha_rect
+    rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
+    return rgb
+
+
+def _pictures(level: AssetLevel) -> Iterator[Picture]:
+    texture = level.entry.texture
+    path = level.folder / texture.videos[level.video].file
+    return decode_video(path, (texture.width, texture.height), texture.fps)

@@ -1,0 +1,32 @@
+"""Write an asset for Godot 3: `python -m stages.godot_export data/<subject>/asset OUT`; see docs/engines.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facefolds_core.asset import read_asset
+from facefolds_core.engines.godot import write_godot
+from facefolds_core.errors import report_user_errors
+from stages.render import pick_level
+
+
+def godot_export(
+    asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
+    out: Annotated[Path, typer.Argument(help="Folder to write; the add-on loads it. An earlier export is replaced.")],
+    level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
+) -> None:
+    """Write an asset as Godot 3 can read it: plain meshes with y up, a picture a frame."""
+    with report_user_errors("godot_export"):
+        found = read_asset(asset)
+        chosen = pick_level(found, level)
+        size = write_godot(out, chosen, found.manifest.subject)
+        typer.echo(f"godot_export: {out}: {chosen.num_layers} layers, {chosen.num_frames} frames, {size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(godot_export)
+    app()
