@@ -66,6 +66,9 @@ LEAST = 1 / 1020
 """Texels that add less to the opacity of every training ray are made transparent. A ray reads four a layer: its colour
 changes by no more than N / 255, and that only if all of them are just below."""
 
+BESIDE = 0.1
+"""Directions in which the volume is less opaque lie beside the subject: what was painted there is room."""
+
 DIVERGED = 9.0
 """A mean squared error this many times the best of its level is a divergence."""
 
@@ -262,10 +265,11 @@ class _Trainer:
         assert self.state is not None
         state, n = self.state, self.params.layers
         assert self.views is not None
-        hidden = state.contributions(self.views, self._stride()) < LEAST
+        hidden = (state.contributions(self.views, self._stride()) < LEAST) | state.beside(BESIDE)
         state.hide(hidden)
         self.events.append(
-            f"{float(hidden.float().mean()):.0%} of all texels add less than {LEAST:.5f} to any ray: cleared"
+            f"{float(hidden.float().mean()):.0%} of all texels cleared: they add less than {LEAST:.5f} to any ray, "
+            "or lie beside the subject"
         )
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= EPSILON] or [n // 2]

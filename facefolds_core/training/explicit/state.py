@@ -76,6 +76,10 @@ class TextureState:
         image = torch.nn.functional.interpolate(image, size=self.shape, mode="bilinear", align_corners=False)
         return image[0].permute(1, 2, 0).reshape(-1, 4)
 
+    def beside(self, least: float) -> Tensor:
+        """[M, 1] bool: texels in directions in which there was less opacity than `least` at the start."""
+        return self._start()[:, 3:] < least
+
     def grow(self, shape: tuple[int, int]) -> None:
         """Resample all values to H x W texels (bilinear) and start the moments afresh."""
         old = self.shape
