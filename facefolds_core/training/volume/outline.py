@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 CENTRES = tuple(-0.05 * k for k in range(2, 9))
 """Candidates for the sphere centre: (x, 0, 0) with these x, units. The paper's is -0.25."""
 
-TIE = 0.01
+TIE = 0.02
 """Of the centres whose loss is within this of the least, the one farthest back wins: directions fan out less."""
 
 WINDOW_LIMIT = 0.9
