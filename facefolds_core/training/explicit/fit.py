@@ -15,6 +15,7 @@ from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to
 from facefolds_core.training.volume.fit import SEEN, Volume, seen_share
 from facefolds_core.training.volume.outline import (
     SURE,
+    TIE,
     WINDOW_LIMIT,
     Profile,
     choose_centre,
@@ -126,8 +127,8 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
         reasons=(
-            f"centre: of the candidates, the one whose hemisphere loses least of the visible surface "
-            f"({losses[round(float(centre[0]), 2)]:.1%})",
+            f"centre: of the candidates whose hemispheres lose least of the visible surface, within {TIE:.0%}, the one "
+            f"farthest back (it loses {losses[round(float(centre[0]), 2)]:.1%})",
             f"window: directions in which the volume is at least {SURE:.0%} opaque (and the tracked mesh, where there "
             f"is one), and {WINDOW_MARGIN} on each side",
             f"middle radius: {source}",
