@@ -218,6 +218,42 @@ def _occupied(density: Array) -> NDArray[np.bool_]:
     return occupied
 
 
+def _shade(
+    grid: Array,
+    occupied: NDArray[np.bool_],
+    lower: NDArray[np.float64],
+    voxel: float,
+    rays: _Rays,
+    jitter: Array,
+    background: Array,
+    gradient: Array,
+    veil: float,
+    solid: float,
+) -> tuple[float, Array, Array]:
+    """`kernel.shade` with steps of STEP voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
+    residual, through = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
+    samples = int(math.sqrt(3) * max(grid.shape) / STEP) + 2
+    squares: float = kernel.shade(
+        rays.origins,
+        rays.directions,
+        jitter,
+        rays.colours,
+        background,
+        grid,
+        occupied,
+        lower,
+        voxel,
+        STEP * voxel,
+        samples,
+        gradient,
+        residual,
+        through,
+        veil,
+        solid,
+    )
+    return squares, residual, through
+
+
 def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, environment: Environment) -> None:
     """Empty the voxels for which EVIDENCE is missing, in place: the mean over rays, by their weights there, of how far
     what they see in the volume is from the environment behind it. What no ray reaches stays."""
@@ -229,27 +265,10 @@ def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, e
     wanted = np.zeros_like(rgb)
     wanted[:, 0], wanted[:, 1] = (contrast**2).sum(1), 1
     target = rgb + (1 - alpha)[:, None] * background - wanted
-    residual, through = np.empty_like(rgb), np.empty(len(rgb), np.float32)
-    samples = int(math.sqrt(3) * max(grid.shape) / STEP) + 2
+    occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
-    kernel.shade(
-        rays.origins,
-        rays.directions,
-        half,
-        target,
-        background,
-        grid,
-        np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool),
-        lower,
-        voxel,
-        STEP * voxel,
-        samples,
-        gradient,
-        residual,
-        through,
-        0.0,
-        0.0,
-    )
+    seen = _Rays(rays.origins, rays.directions, target)
+    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
     evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
@@ -272,7 +291,6 @@ def _train(
     """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
     grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
     gradient = np.zeros((kernel.PARTS, *values.shape), np.float32)
-    samples = int(math.sqrt(3) * max(values.shape) / STEP) + 2
     count = min(RAYS, len(rays.origins))
     recent = math.nan
     for i in range(iterations):
@@ -281,24 +299,10 @@ def _train(
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         origins, directions = rays.origins[chosen], rays.directions[chosen]
         background, taps, weights = environment.look_up(origins, directions)
-        residual, through = np.empty((count, 3), np.float32), np.empty(count, np.float32)
-        squares = kernel.shade(
-            origins,
-            directions,
-            random.random(count, np.float32),
-            rays.colours[chosen],
-            background,
-            grid[0],
-            occupied,
-            lower,
-            voxel,
-            STEP * voxel,
-            samples,
-            gradient,
-            residual,
-            through,
-            VEIL,
-            SOLID,
+        part = _Rays(origins, directions, rays.colours[chosen])
+        jitter = random.random(count, np.float32)
+        squares, residual, through = _shade(
+            grid[0], occupied, lower, voxel, part, jitter, background, gradient, VEIL, SOLID
         )
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
