@@ -1,0 +1,78 @@
+"""A headless Chromium that cannot hang the tests: a watchdog kills it, and the next test gets a new one."""
+
+from __future__ import annotations
+
+import os
+import threading
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import psutil
+import pytest
+from playwright.sync_api import Browser, Playwright
+
+FLAGS = (
+    "--use-angle=gl-egl",  # Mesa's llvmpipe: several times faster than Chromium's own software renderer
+    "--ignore-gpu-blocklist",
+    "--no-sandbox",  # containers run as root
+    "--autoplay-policy=no-user-gesture-required",
+)
+PATIENCE = 120.0
+"""Seconds that a test may take, fixtures included. Seen: 15 on a busy machine."""
+ALLOWED_KILLS = 3
+
+
+class Chromium:
+    """Starts the browser when it is asked for, and again after it was killed."""
+
+    def __init__(self, path: str, playwright: Playwright) -> None:
+        self.kills = 0
+        self.path = path
+        self.playwright = playwright
+        self._mark = f"--facefolds-tests={uuid.uuid4().hex}"  # by which its process is known
+        self._browser: Browser | None = None
+
+    def browser(self) -> Browser:
+        if self.kills >= ALLOWED_KILLS:
+            pytest.fail(f"Chromium hung and was killed {self.kills} times: it is not tried again")
+        if self._browser is None or not self._browser.is_connected():
+            flags = [*FLAGS, self._mark]
+            self._browser = self.playwright.chromium.launch(executable_path=self.path, args=flags)
+        return self._browser
+
+    def kill(self) -> None:
+        """From any thread: every call that waits for the browser fails with TargetClosedError."""
+        self.kills += 1
+        for process in self.processes():
+            with suppress(psutil.NoSuchProcess):  # it ended meanwhile
+                for member in (*process.children(recursive=True), process):
+                    member.kill()
+
+    def close(self) -> None:
+        if self._browser is not None and self._browser.is_connected():
+            with self.watched():
+                self._browser.close()
+
+    @contextmanager
+    def watched(self, seconds: float = PATIENCE) -> Iterator[None]:
+        """Kill the browser if the block takes longer."""
+        timer = threading.Timer(seconds, self.kill)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def processes(self) -> list[psutil.Process]:
+        """The browsers with the mark: without their helpers, which do not bear it."""
+        children = psutil.Process(os.getpid()).children(recursive=True)
+        return [process for process in children if self._mark in _arguments(process)]
+
+
+def _arguments(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:  # it ended meanwhile
+        return []
