@@ -1,8 +1,8 @@
-"""The files through which parameters reach the stages.
+"""The files through which parameters reach the stages: reading them.
 
-The stage `configure` splits params.yaml into one small file a stage, `data/<subject>/config/<stage>.json`, with the
-subject's overrides merged in. Each stage depends on its own file only, so a change of one section (or of one subject's
-override) reruns what it must and nothing else.
+The stage `configure` (`params_file.write_configs`) splits params.yaml into one small file a stage,
+`data/<subject>/config/<stage>.json`, with the subject's overrides merged in. Each stage depends on its own file only,
+so a change of one section (or of one subject's override) reruns what it must and nothing else.
 """
 
 from __future__ import annotations
@@ -13,21 +13,10 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
-from facefolds_core.params import STAGE_SECTIONS, Overrides, Params, Section, Subject
+from facefolds_core.params import STAGE_SECTIONS, Section, Subject
 
 S = TypeVar("S", bound=Section)
 _REMEDY = "run `dvc repro`, which writes it from params.yaml"
-
-
-def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
-    """Write `subject.json` and one file for each stage; returns their paths."""
-    core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
-    values = {"subject": core}
-    values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
-    for name, value in values.items():
-        write_json(folder / f"{name}.json", value)
-    return [folder / f"{name}.json" for name in values]
 
 
 def _read(kind: type[S], path: Path) -> S:

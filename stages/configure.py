@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from facefolds_core.config import write_configs
 from facefolds_core.files import atomic_folder
-from facefolds_core.params import load_params
+from facefolds_core.params_file import load_params, write_configs
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.config import write_configs
 from facefolds_core.errors import UserError
-from facefolds_core.params import Params, Subject
+from facefolds_core.params import Subject
+from facefolds_core.params_file import Params, write_configs
 from facefolds_core.paths import SubjectFolders
 from stages.normalize import normalize
 from tests.captures.fixtures import (

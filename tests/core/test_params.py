@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.config import read_stage, read_subject, write_configs
+from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError
-from facefolds_core.params import CompressParams, TextureParams, TrainParams, load_params
+from facefolds_core.params import CompressParams, TextureParams, TrainParams
+from facefolds_core.params_file import load_params, write_configs
 from facefolds_core.presets import PRESETS
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
