@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_text
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
@@ -50,13 +51,13 @@ def make_report(folders: SubjectFolders) -> Path:
     Raises:
         UserError: if the folder is not an evaluated subject's, or something in it is damaged.
     """
-    page = render_page(read_subject(folders), folders.root.resolve().name)
+    page = render_page(gather(folders), folders.root.resolve().name)
     path = folders.root / REPORT_NAME
     write_text(path, page)
     return path
 
 
-def read_subject(folders: SubjectFolders) -> Subject:
+def gather(folders: SubjectFolders) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     if not (folders.scene / "scene.json").is_file():
@@ -70,7 +71,7 @@ def read_subject(folders: SubjectFolders) -> Subject:
             found=f"{asset.num_frames} in the asset",
             remedy=REMEDY,
         )
-    params = EvaluateParams.model_validate(facts.config.get("evaluate", {}))
+    params = read_stage(EvaluateParams, folders.config) if "evaluate" in facts.config else EvaluateParams()
     pairs = chosen_pairs(scene, params.sheet_frames)
     return Subject(facts, asset, scene, measure(scene, asset, pairs, params.background) if pairs else None)
 
@@ -129,7 +130,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "has_scene": scene is not None,
         "camera_map": camera_map(scene) if scene else None,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
-        "angles": tables.angles(measured.angles, measured.bare) if measured else [],
+        "angles": tables.angles(measured) if measured else [],
         "views": len(views),
         "masked": measured is not None and measured.masked,
         **layers(subject),

@@ -115,9 +115,16 @@ def read_facts(folders: SubjectFolders) -> Facts:
             found="no such file" if folders.root.is_dir() else "no such folder",
             remedy="name a folder like data/actor, or make it first: " + REMEDY,
         )
+    metrics = read_mapping(folders.metrics) or {}
+    for part in ("asset", "cost"):
+        if not isinstance(metrics.get(part), dict):
+            raise UserError(
+                "garbled file", file=folders.metrics, place=part, expected="a JSON object", found=metrics.get(part),
+                remedy=REMEDY,
+            )  # fmt: skip
     waterfall = read_mapping(folders.root / "waterfall" / "waterfall.json") or {}
     return Facts(
-        metrics=read_mapping(folders.metrics) or {},
+        metrics=metrics,
         images=read_images(folders.evaluation / "per_image.parquet"),
         training=read_mapping(folders.model / "training.json"),
         fit=read_mapping(folders.model / "fit.json"),

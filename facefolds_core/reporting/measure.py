@@ -86,7 +86,7 @@ def measure(
     truths, masks = scene.open_frames(), scene.open_masks()
     caster, meshes = AssetCaster(asset), [EmbreeMesh(layer.vertices, layer.faces) for layer in asset.layers]
     textures = {k: asset.frame(k) for k in sorted({k for _, k in pairs})}
-    sums, views = _Sums(asset.num_layers), []
+    sums, views = Sums(asset.num_layers), []
     for index in dict.fromkeys(camera for camera, _ in pairs):
         camera = scene.cameras[index]
         hits = caster.cast(camera)
@@ -144,7 +144,7 @@ def face_normals(triangles: Array) -> Array:
     return np.asarray(np.divide(normals, length, out=np.full_like(normals, np.nan), where=length > 0))
 
 
-class _Sums:
+class Sums:
     """Running sums over pixels, weighted with the subject's opacity."""
 
     def __init__(self, layers: int) -> None:

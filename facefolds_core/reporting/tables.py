@@ -14,7 +14,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
 from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
-from facefolds_core.reporting.measure import AngleBin, Measured, Spacing
+from facefolds_core.reporting.measure import Measured, Spacing
 from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
 from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS
 
@@ -132,9 +132,11 @@ def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
     return rows
 
 
-def angles(bins: Sequence[AngleBin], bare: AngleBin) -> list[Row]:
-    most = max((one.rms for one in [*bins, bare] if one.rms is not None), default=0.0)
-    named = [(span(one), one) for one in bins] + [("no layer met", bare)]
+def angles(measured: Measured) -> list[Row]:
+    """By angle; pixels without a surface where masks show that there should be one."""
+    bins = [(span(one), one) for one in measured.angles]
+    bins += [("no layer met", measured.bare)] if measured.masked else []
+    most = max((one.rms for _, one in bins if one.rms is not None), default=0.0)
     return [
         {
             "name": name,
@@ -143,7 +145,7 @@ def angles(bins: Sequence[AngleBin], bare: AngleBin) -> list[Row]:
             "rms": number(one.rms, 3),
             "bar": share(one.rms, most),
         }
-        for name, one in named
+        for name, one in bins
     ]
 
 

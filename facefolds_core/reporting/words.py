@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,9 +34,11 @@ def size(value: Any) -> str:
     found = finite(value)
     if found is None:
         return NONE
-    for limit, unit, digits in ((1e9, "GB", 2), (1e6, "MB", 2), (1e3, "KB", 0)):
+    for limit, unit in ((1e9, "GB"), (1e6, "MB")):
         if found >= limit:
-            return f"{found / limit:.{digits}f}\u00a0{unit}"
+            return f"{found / limit:.{2 if found < 10 * limit else 1 if found < 100 * limit else 0}f}\u00a0{unit}"
+    if found >= 1e3:
+        return f"{found / 1e3:.0f}\u00a0KB"
     return f"{found:.0f}\u00a0bytes"
 
 
@@ -136,18 +139,22 @@ def extremes_words(images: tuple[ImageScores, ...], key: str) -> str | None:
     )
 
 
-def angle_words(angles: tuple[AngleBin, ...], bare: AngleBin) -> str | None:
-    """Where the error is least and greatest, of the angles that matter, and holes."""
-    known = [(one.rms, one) for one in angles if one.rms is not None and one.share >= LEAST_SHARE]
+def angle_words(measured: Measured) -> str | None:
+    """Where the error is least and greatest, of the angles that matter; holes, where masks show them."""
+    known = [(one.rms, one) for one in measured.angles if one.rms is not None and one.share >= LEAST_SHARE]
     if len(known) < 2:
         return None
     least, most = min(known, key=lambda one: one[0]), max(known, key=lambda one: one[0])
-    holes = "None" if bare.share == 0 else "Less than 0.1\u00a0%" if bare.share < 0.001 else percent(bare.share)
-    return (
+    text = (
         f"By the angle between the view and the surface's normal, the root mean square error is least at "
         f"{span(least[1])} ({number(least[0], 3)} of the full range) and greatest at {span(most[1])} "
-        f"({number(most[0], 3)}). {holes} of the subject's pixels {'meets' if holes == 'None' else 'meet'} no layer."
+        f"({number(most[0], 3)})."
     )
+    if not measured.masked:
+        return text
+    bare = measured.bare.share
+    holes = "None" if bare == 0 else "Less than 0.1\u00a0%" if bare < 0.001 else percent(bare)
+    return f"{text} {holes} of the subject's pixels {'meets' if holes == 'None' else 'meet'} no layer."
 
 
 def span(one: AngleBin) -> str:
@@ -162,7 +169,7 @@ def layer_words(measured: Measured) -> str:
     strongest = sorted(int(i) + 1 for i in order[:needed])
     weakest = int(order[-1])
     return (
-        f"{percent(shares[order[:needed]].sum(), 0)} of what is seen of the subject comes from "
+        f"{percent(shares[order[:needed]].sum(), 0)} of what is seen comes from "
         f"{'layer' if needed == 1 else 'layers'} {listed([str(i) for i in strongest])}, counted from outside; "
         f"layer {weakest + 1} adds least, {percent(shares[weakest])}, and to no pixel more than "
         f"{number(measured.greatest[weakest])}."
@@ -173,14 +180,16 @@ def export_words(steps: tuple[dict[str, Any], ...]) -> str | None:
     """The step of the export that loses most."""
     values = [finite(step.get("psnr")) for step in steps]
     changes = [
-        (after - before, step["name"])
-        for before, after, step in zip(values, values[1:], steps[1:], strict=False)
+        (after - before, step.get("name", NONE))
+        for (before, after), step in zip(pairwise(values), steps[1:], strict=True)
         if before is not None and after is not None
     ]
     if not changes:
         return None
     change, name = min(changes)
-    return f"Of the steps of the export, “{name}” changes PSNR for the worse most: {change:+.2f} dB.".replace("-", "−")
+    if change >= 0:
+        return "No step of the export loses PSNR."
+    return f"Of the export's steps, “{name}” loses most: {number(-change)} dB."
 
 
 def time_words(metrics: dict[str, Any], training: dict[str, Any] | None, stages: tuple[StageCost, ...]) -> str:
@@ -208,7 +217,7 @@ def summary(
         ("How near it comes", [quality_words(facts.metrics), extremes_words(facts.images, quality_key(facts.metrics))]),
         (
             "What is seen",
-            [angle_words(measured.angles, measured.bare), layer_words(measured)] if measured else [],
+            [angle_words(measured), layer_words(measured)] if measured else [],
         ),
         ("What it took", [time_words(facts.metrics, facts.training, facts.stages), export_words(facts.waterfall)]),
     ]
