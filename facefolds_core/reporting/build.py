@@ -177,13 +177,12 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
     """Truth, asset and error of each view."""
     result = []
     for view in subject.measured.views if subject.measured else ():
-        values = [f"{words.number(view.psnr)} dB over the whole frame"]
+        values = [f"{words.number(view.psnr)} dB over the whole frame", f"{places[view.camera].angle:.0f}° from front"]
         if view.psnr_subject is not None:
             values.insert(0, f"{words.number(view.psnr_subject)} dB of the subject")
-        place = places[view.camera]
         result.append(
             {
-                "name": f"{view.camera}, frame {view.frame}, {place.angle:.0f}° from front",
+                "name": f"{view.camera}, frame {view.frame}",
                 "scores": ", ".join(values),
                 "height": view.truth.shape[0],
                 "width": view.truth.shape[1],

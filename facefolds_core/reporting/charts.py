@@ -98,7 +98,7 @@ def camera_map(dots: Sequence[Dot]) -> Markup:
         if dot.held_out:
             label = f'<text class="name" x="{x:.1f}" y="{y - 10:.1f}" text-anchor="middle">{escape(dot.name)}</text>'
             marks.append(label)
-    return _svg("Where the cameras stand", _axes(frame, "azimuth, degrees"), "".join(marks))
+    return _svg("Where the cameras stand", _axes(frame, "azimuth"), "".join(marks))
 
 
 def section(lines: Sequence[Array], label: str) -> Markup:

@@ -179,7 +179,7 @@ def finite(value: Any) -> float | None:
 
 
 def read_curves(folder: Path) -> tuple[Curve, ...]:
-    """Every series of dvclive's log; lines that hold no two finite numbers are left out."""
+    """Every series of dvclive's log, PSNR first; lines that hold no two finite numbers are left out."""
     curves = []
     for path in sorted(folder.rglob("*.tsv")):
         points = []
@@ -190,7 +190,7 @@ def read_curves(folder: Path) -> tuple[Curve, ...]:
                     points.append((values[0], values[-1]))
         if len(points) > 1:
             curves.append(Curve(path.relative_to(folder).with_suffix("").as_posix(), tuple(sorted(points))))
-    return tuple(curves)
+    return tuple(sorted(curves, key=lambda curve: (curve.name != "psnr", curve.name)))
 
 
 def as_number(text: str) -> float | None:
