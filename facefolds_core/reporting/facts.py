@@ -18,7 +18,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import read_json
 from facefolds_core.paths import SubjectFolders
 
-REMEDY = "run `dvc repro`, or `make repro` on a fresh machine, which make it"
+REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 
 STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
     "configure": ("config",),
@@ -113,7 +113,7 @@ def read_facts(folders: SubjectFolders) -> Facts:
             file=folders.root,
             expected="metrics.json in it",
             found="no such file" if folders.root.is_dir() else "no such folder",
-            remedy="name a folder like data/actor, or make it first: " + REMEDY,
+            remedy=f"name a folder like data/actor; if nothing is in it yet, {REMEDY}",
         )
     metrics = read_mapping(folders.metrics) or {}
     for part in ("asset", "cost"):

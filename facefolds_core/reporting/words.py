@@ -197,7 +197,8 @@ def time_words(metrics: dict[str, Any], training: dict[str, Any] | None, stages:
     preset = (training or {}).get("preset")
     text = f"Training took {duration(cost.get('train_seconds'))} on {cost.get('device', 'an unknown device')}"
     text += f" with the preset {preset}" if preset else ""
-    text += f", {plural(int(cost.get('iterations') or 0), 'iteration')}."
+    iterations = finite(cost.get("iterations"))
+    text += "." if iterations is None else f", {plural(int(iterations), 'iteration')}."
     timed = [(stage.seconds, stage.name) for stage in stages if stage.seconds is not None]
     if timed:
         longest = max(timed)

@@ -51,6 +51,14 @@ def test_nothing_is_missing_and_nothing_is_no_number(subject: SubjectFolders) ->
     assert str(subject.root) not in page
 
 
+def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
+    for path in (copy.metrics, copy.root / "waterfall" / "waterfall.json", copy.timing("train")):
+        path.write_text(re.sub(r"(\d+\.\d+|300)(?=[,\n])", "NaN", path.read_text()))
+    page = page_of(copy)
+    assert not re.search(r"\b(nan|None|inf)\b", re.sub(r"data:image[^\"]*|<script>.*</script>", "", page, flags=re.S))
+    assert "reaches – dB" in page
+
+
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
     assert "centre: &lt;the middle&gt;" in page_of(subject)
 
