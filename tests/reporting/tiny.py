@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facefolds_core.config import STAGE_SECTIONS
 from facefolds_core.files import write_json, write_text
-from facefolds_core.params import Section
+from facefolds_core.params import STAGE_SECTIONS, Section
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import metrics_json, write_per_image
