@@ -1,6 +1,7 @@
 # make repro   set up, then run the pipeline for every subject in params.yaml
 # make test    set up, then run the tests
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
+# make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make clean   remove the environment and all results
@@ -11,7 +12,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view lint bench clean
+.PHONY: repro test view report lint bench clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -25,6 +26,9 @@ view: $(READY) $(PLAYER)
 $(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.json viewer/build.mjs
 	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
+
+report: $(READY)
+	$(BIN)/python -m stages.report $(SUBJECT)
 
 lint: $(READY)
 	$(BIN)/ruff check .

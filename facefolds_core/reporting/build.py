@@ -1,0 +1,261 @@
+"""Put the page together: facts from files, measurements of the asset, pictures, and the template."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.config import read_stage
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_text
+from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
+from facefolds_core.params import EvaluateParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.reporting import charts, pictures, tables, words
+from facefolds_core.reporting.facts import REMEDY, Facts, read_facts
+from facefolds_core.reporting.measure import Measured, measure, radii, spacings
+from facefolds_core.scoring.evaluation import sheet_frames
+from facefolds_core.scoring.sheets import MAX_ERROR
+
+REPORT_NAME = "report.html"
+MOST_PIXELS = 2_500_000
+"""Of all compared pictures together: keeps the page below 5 MB."""
+MOST_VIEWS = 24
+TEXTURE_SIDE = 320
+SPACING_GRID = 48
+"""Rays a side through which the layers' spacing is measured."""
+SECTION_RAYS = 181
+
+
+@dataclass(frozen=True)
+class Subject:
+    """All that the page is made of; `scene` and `measured` are None where the normalised scene is not there."""
+
+    facts: Facts
+    asset: Asset
+    scene: Scene | None
+    measured: Measured | None
+
+
+def make_report(folders: SubjectFolders) -> Path:
+    """Write `report.html` into the subject's folder; returns its path.
+
+    Raises:
+        UserError: if the folder is not an evaluated subject's, or something in it is damaged.
+    """
+    page = render_page(gather(folders), folders.root.resolve().name)
+    path = folders.root / REPORT_NAME
+    write_text(path, page)
+    return path
+
+
+def gather(folders: SubjectFolders) -> Subject:
+    facts = read_facts(folders)
+    asset = read_asset(folders.asset)
+    if not (folders.scene / "scene.json").is_file():
+        return Subject(facts, asset, None, None)
+    scene = read_scene(folders.scene)
+    if scene.num_frames != asset.num_frames:
+        raise UserError(
+            "the asset and the scene have different numbers of frames",
+            file=folders.root,
+            expected=f"{scene.num_frames} frames, as in the scene",
+            found=f"{asset.num_frames} in the asset",
+            remedy=REMEDY,
+        )
+    params = read_stage(EvaluateParams, folders.config) if "evaluate" in facts.config else EvaluateParams()
+    pairs = chosen_pairs(scene, params.sheet_frames)
+    return Subject(facts, asset, scene, measure(scene, asset, pairs, params.background) if pairs else None)
+
+
+def chosen_pairs(scene: Scene, wanted: int) -> list[tuple[int, int]]:
+    """(camera, frame) of the held-out pictures that are shown: `wanted` frames a camera, fewer if they are large."""
+    photos = scene.open_frames()
+    frames = sheet_frames(scene.num_frames, wanted)
+    pairs = [(index, k) for index in scene.indices("holdout") for k in frames if (index, k) in photos]
+    most = max(1, min(MOST_VIEWS, MOST_PIXELS // (scene.width * scene.height)))
+    return [pairs[i] for i in sheet_frames(len(pairs), most)] if pairs else []
+
+
+def render_page(subject: Subject, folder: str) -> str:
+    """The page's HTML.
+
+    Args:
+        folder: the subject's name in commands: that of its folder.
+    """
+    environment = Environment(
+        loader=PackageLoader("facefolds_core.reporting", "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    files = {name: Markup(_source(environment, name)) for name in ("report.css", "report.js")}
+    return environment.get_template("report.html.j2").render(
+        css=files["report.css"], js=files["report.js"], folder=folder, **context(subject)
+    )
+
+
+def _source(environment: Environment, name: str) -> str:
+    assert environment.loader is not None
+    return environment.loader.get_source(environment, name)[0]
+
+
+def context(subject: Subject) -> dict[str, Any]:
+    """What the template prints, section by section; empty where there is nothing to show."""
+    facts, manifest, scene, measured = subject.facts, subject.asset.manifest, subject.scene, subject.measured
+    key = words.quality_key(facts.metrics)
+    places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
+    views = measured.views if measured else ()
+    pairs = {(view.camera, view.frame): i for i, view in enumerate(views)}
+    return {
+        "subject": facts.metrics.get("subject", manifest.subject),
+        "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "generator": manifest.generator,
+        "of_subject": key == "psnr_subject",
+        "tiles": tiles(subject, key),
+        "summary": words.summary(facts, manifest, scene, measured),
+        "scores": tables.scores(facts.metrics),
+        "comparisons": comparisons(subject, places),
+        "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
+        "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
+        "has_scene": scene is not None,
+        "camera_map": camera_map(scene) if scene else None,
+        "cameras": tables.cameras(scene, facts.images, key) if scene else [],
+        "angles": tables.angles(measured) if measured else [],
+        "views": len(views),
+        "masked": measured is not None and measured.masked,
+        **layers(subject),
+        "textures": textures(subject.asset),
+        "curves": curves(facts),
+        "fit_notes": [*(facts.fit or {}).get("reasons", []), *(facts.fit or {}).get("events", [])],
+        "waterfall": tables.waterfall(facts.waterfall),
+        "stages": tables.stages(facts.stages),
+        "levels": tables.levels(manifest),
+        "config": tables.configuration(facts.config),
+        "versions": facts.versions,
+    }
+
+
+def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
+    """The figures at the head of the page."""
+    metrics, manifest = subject.facts.metrics, subject.asset.manifest
+    asset, cost, suffix = metrics.get("asset", {}), metrics.get("cost", {}), key.removeprefix("psnr")
+    where = "of the subject" if suffix else "whole frame"
+    files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
+    return [
+        {"name": "PSNR", "value": number_unit(asset.get(key), "dB"), "note": f"{where}, held-out cameras"},
+        {"name": "SSIM", "value": words.number(asset.get(f"ssim{suffix}"), 3), "note": f"{where}, 1 is best"},
+        {"name": "ST-LPIPS", "value": words.number(asset.get(f"st_lpips{suffix}"), 3), "note": f"{where}, 0 is best"},
+        {"name": "Size", "value": words.size(files), "note": "meshes and video"},
+        {
+            "name": "Triangles",
+            "value": words.count(cost.get("triangles")),
+            "note": f"{manifest_layers(subject)} layers",
+        },
+        {"name": "Training", "value": words.duration(cost.get("train_seconds")), "note": str(cost.get("device", ""))},
+    ]
+
+
+def number_unit(value: Any, unit: str) -> str:
+    return f"{words.number(value)}\u00a0{unit}"
+
+
+def manifest_layers(subject: Subject) -> str:
+    return words.count(subject.asset.num_layers)
+
+
+def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
+    """Truth, asset and error of each view."""
+    result = []
+    for view in subject.measured.views if subject.measured else ():
+        values = [f"{words.number(view.psnr)} dB over the whole frame", f"{places[view.camera].angle:.0f}° from front"]
+        if view.psnr_subject is not None:
+            values.insert(0, f"{words.number(view.psnr_subject)} dB of the subject")
+        result.append(
+            {
+                "name": f"{view.camera}, frame {view.frame}",
+                "scores": ", ".join(values),
+                "height": view.truth.shape[0],
+                "width": view.truth.shape[1],
+                "truth": pictures.photo(view.truth),
+                "asset": pictures.photo(view.asset),
+                "error": pictures.error_map(view.asset, view.truth, view.mask),
+            }
+        )
+    return result
+
+
+def curves(facts: Facts) -> list[dict[str, Any]]:
+    named = [(words.curve_name(curve.name), curve.points) for curve in facts.curves]
+    return [{"name": name, "svg": charts.line_chart(points, name, "step")} for name, points in named]
+
+
+def error_stops() -> str:
+    """The error's colours as the stops of a CSS gradient."""
+    return ", ".join(
+        f"rgb({red:.0f} {green:.0f} {blue:.0f})" for red, green, blue in (255 * pictures.error_colours(9)).tolist()
+    )
+
+
+def camera_map(scene: Scene) -> Markup:
+    return charts.camera_map(
+        [
+            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split == "holdout")
+            for camera, split in zip(scene.cameras, scene.splits, strict=True)
+        ]
+    )
+
+
+def layers(subject: Subject) -> dict[str, Any]:
+    """The layers' table and their sections, by rays from the sphere centre."""
+    manifest, shipped = subject.asset.manifest, subject.asset.layers
+    centre = np.array(manifest.coordinates.sphere_centre)
+    windows = np.array([layer.uv_window for layer in manifest.full.layers])
+    window = windows[:, 0].min(), windows[:, 1].max(), windows[:, 2].min(), windows[:, 3].max()
+    steps = (np.arange(SPACING_GRID) + 0.5) / SPACING_GRID
+    grid = uv_to_directions(st_to_uv(np.stack(np.meshgrid(steps, steps), -1), window))
+    line, zero = np.linspace(0, 1, SECTION_RAYS), np.zeros(SECTION_RAYS)
+    upright = uv_to_directions(np.stack([window[0] + line * (window[1] - window[0]), zero], -1))
+    level = uv_to_directions(np.stack([zero, window[2] + line * (window[3] - window[2])], -1))
+    scale = manifest.coordinates.to_capture.scale
+    cut = [
+        (name, axes, centre + radii(shipped, centre, directions)[..., None] * directions[:, None])
+        for name, axes, directions in (("from the side", (0, 2), upright), ("from above", (1, 0), level))
+    ]
+    return {
+        "layers": tables.layers(manifest.full, spacings(radii(shipped, centre, grid)), scale, subject.measured),
+        "sections": [
+            {"name": name, "svg": charts.section([points[:, i][:, list(axes)] for i in range(len(shipped))], name)}
+            for name, axes, points in cut
+        ],
+        "scale": words.number(scale, 3),
+    }
+
+
+def textures(asset: Asset) -> dict[str, Any]:
+    """Every layer's texture of the middle frame."""
+    frame = asset.num_frames // 2
+    texture = asset.manifest.full.texture
+    return {
+        "frame": frame + 1,
+        "frames": asset.num_frames,
+        "picture": f"{texture.width} × {texture.height}",
+        "layers": [
+            {
+                "name": f"layer {i + 1}",
+                "size": f"{rgba.shape[1]} × {rgba.shape[0]}",
+                "src": pictures.texture(rgba, TEXTURE_SIDE),
+                "opaque": words.percent(float((rgba[..., 3] >= 128).mean()), 0),
+            }
+            for i, rgba in enumerate(asset.frame(frame))
+        ],
+    }

@@ -1,0 +1,238 @@
+"""What the pipeline's files say about one subject. What a file would say that is not there is None or empty."""
+
+from __future__ import annotations
+
+import csv
+import math
+import platform
+import subprocess
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json
+from facefolds_core.paths import SubjectFolders
+
+REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
+
+STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
+    "configure": ("config",),
+    "capture": ("capture",),
+    "normalize": ("scene",),
+    "train": ("model", "training"),
+    "sample": ("samples",),
+    "reconstruct": ("surfaces",),
+    "decimate": ("meshes",),
+    "texture": ("resampled",),
+    "bake": ("textures",),
+    "compress": ("asset", "asset.glb"),
+    "evaluate": ("evaluation", "metrics.json"),
+}
+"""What each stage leaves in data/<subject>, in the order in which they run."""
+
+PACKAGES = ("facefolds", "torch", "numpy", "dvc", "av", "DracoPy")
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """What a stage took when it ran last.
+
+    Attributes:
+        seconds: wall clock; None where no timing was left.
+        bytes: of all it left on disk; None where nothing is there.
+    """
+
+    name: str
+    seconds: float | None
+    bytes: int | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One series of the training log: (step, value), steps rising, values finite."""
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class ImageScores:
+    """One row of per_image.parquet, of the asset.
+
+    Attributes:
+        psnr, psnr_subject: dB; None where the value cannot be had.
+    """
+
+    camera: str
+    frame: str
+    psnr: float | None
+    psnr_subject: float | None
+
+
+@dataclass(frozen=True)
+class Facts:
+    """All that is read.
+
+    Attributes:
+        metrics: metrics.json.
+        images: scores of the asset on each held-out image; empty without evaluation/per_image.parquet.
+        training: model/training.json.
+        fit: model/fit.json, of presets that fit the scene first.
+        curves: the training log.
+        waterfall: steps of waterfall/waterfall.json.
+        stages: in the order in which they run.
+        config: the subject's parameters, by section.
+        versions: (what, version); of the environment in which the report is made.
+    """
+
+    metrics: dict[str, Any]
+    images: tuple[ImageScores, ...]
+    training: dict[str, Any] | None
+    fit: dict[str, Any] | None
+    curves: tuple[Curve, ...]
+    waterfall: tuple[dict[str, Any], ...]
+    stages: tuple[StageCost, ...]
+    config: dict[str, dict[str, Any]]
+    versions: tuple[tuple[str, str], ...]
+
+
+def read_facts(folders: SubjectFolders) -> Facts:
+    """Read them all.
+
+    Raises:
+        UserError: if the folder is not a subject's that has been evaluated, or a file is garbled.
+    """
+    if not folders.metrics.is_file():
+        raise UserError(
+            "not the folder of a subject that has been evaluated",
+            file=folders.root,
+            expected="metrics.json in it",
+            found="no such file" if folders.root.is_dir() else "no such folder",
+            remedy=f"name a folder like data/actor; if nothing is in it yet, {REMEDY}",
+        )
+    metrics = read_mapping(folders.metrics) or {}
+    for part in ("asset", "cost"):
+        if not isinstance(metrics.get(part), dict):
+            raise UserError(
+                "garbled file", file=folders.metrics, place=part, expected="a JSON object", found=metrics.get(part),
+                remedy=REMEDY,
+            )  # fmt: skip
+    waterfall = read_mapping(folders.root / "waterfall" / "waterfall.json") or {}
+    return Facts(
+        metrics=metrics,
+        images=read_images(folders.evaluation / "per_image.parquet"),
+        training=read_mapping(folders.model / "training.json"),
+        fit=read_mapping(folders.model / "fit.json"),
+        curves=read_curves(folders.training_log / "plots" / "metrics"),
+        waterfall=tuple(waterfall.get("steps", ())),
+        stages=tuple(stage_cost(folders, name) for name in STAGE_OUTPUTS),
+        config={path.stem: read_mapping(path) or {} for path in sorted(folders.config.glob("*.json"))},
+        versions=versions(Path(__file__).resolve().parents[2]),
+    )
+
+
+def read_mapping(path: Path) -> dict[str, Any] | None:
+    """The object in a JSON file; None where there is no such file.
+
+    Raises:
+        UserError: if it is not JSON, or no object.
+    """
+    if not path.is_file():
+        return None
+    value = read_json(path, remedy=REMEDY)
+    if not isinstance(value, dict):
+        found = type(value).__name__
+        raise UserError("garbled file", file=path, expected="a JSON object", found=found, remedy=REMEDY)
+    return value
+
+
+def read_images(path: Path) -> tuple[ImageScores, ...]:
+    """The asset's rows of per_image.parquet, in the file's order; empty where there is no such file.
+
+    Raises:
+        UserError: if it is damaged or lacks columns.
+    """
+    if not path.is_file():
+        return ()
+    columns = ["camera", "frame", "variant", "psnr", "psnr_subject"]
+    try:
+        rows = pq.read_table(path, columns=columns).to_pylist()
+    except (pa.ArrowException, OSError, KeyError) as error:
+        raise UserError("damaged scores", file=path, found=str(error), remedy=REMEDY) from None
+    return tuple(
+        ImageScores(row["camera"], row["frame"], finite(row["psnr"]), finite(row["psnr_subject"]))
+        for row in rows
+        if row["variant"] == "asset"
+    )
+
+
+def finite(value: Any) -> float | None:
+    """A number as it is; None for anything else, NaN and infinity among it."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def read_curves(folder: Path) -> tuple[Curve, ...]:
+    """Every series of dvclive's log, PSNR first; lines that hold no two finite numbers are left out."""
+    curves = []
+    for path in sorted(folder.rglob("*.tsv")):
+        points = []
+        with path.open(newline="", encoding="utf-8", errors="replace") as file:
+            for row in csv.reader(file, delimiter="\t"):
+                values = [as_number(text) for text in row]
+                if len(values) >= 2 and values[0] is not None and values[-1] is not None:
+                    points.append((values[0], values[-1]))
+        if len(points) > 1:
+            curves.append(Curve(path.relative_to(folder).with_suffix("").as_posix(), tuple(sorted(points))))
+    return tuple(sorted(curves, key=lambda curve: (curve.name != "psnr", curve.name)))
+
+
+def as_number(text: str) -> float | None:
+    try:
+        return finite(float(text))
+    except ValueError:
+        return None
+
+
+def stage_cost(folders: SubjectFolders, stage: str) -> StageCost:
+    timing = read_mapping(folders.timing(stage)) or {}
+    outputs = [path for name in STAGE_OUTPUTS[stage] if (path := folders.root / name).exists()]
+    return StageCost(stage, finite(timing.get("seconds")), sum(map(size_of, outputs)) if outputs else None)
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    if path.is_file():
+        return path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
+
+
+def versions(project: Path) -> tuple[tuple[str, str], ...]:
+    """(what, version) of Python, of the packages that matter, and of the project's work tree."""
+    found = [("Python", platform.python_version())]
+    for package in PACKAGES:
+        try:
+            found.append((package, version(package)))
+        except PackageNotFoundError:
+            found.append((package, "not installed"))
+    return (*found, ("git commit", commit(project) or "not a git work tree"))
+
+
+def commit(project: Path) -> str | None:
+    """The commit that is checked out, with a note if files differ from it; None outside of git."""
+
+    def git(*arguments: str) -> str | None:
+        try:
+            done = subprocess.run(["git", "-C", project, *arguments], capture_output=True, text=True, check=False)
+        except OSError:
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    head = git("rev-parse", "--short=12", "HEAD")
+    return f"{head}, with uncommitted changes" if head and git("status", "--porcelain") else head

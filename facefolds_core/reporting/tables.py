@@ -1,0 +1,264 @@
+"""Rows of the page's tables: figures with the words and shares of bars that the template prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from facefolds_core.asset.manifest import Level, Manifest
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.reporting.charts import heat_colour, ink_on
+from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
+from facefolds_core.reporting.measure import Measured, Spacing
+from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
+from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS
+
+Row = dict[str, Any]
+
+VARIANT_NAMES = {
+    "model": "model",
+    "diffuse": "model without view branch",
+    "asset": "asset",
+    WITH_EFFECTS: "asset with view effects",
+}
+METRIC_NAMES = {"psnr": "PSNR, dB", "ssim": "SSIM", "lpips": "LPIPS", "st_lpips": "ST-LPIPS"}
+HEAT_RANGE = 3.0
+"""dB: the heat map's colours span at least so many, so that next to nothing does not look like much."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Of a camera seen from the subject, degrees: `azimuth` to its left, `elevation` upwards, `angle` from front."""
+
+    azimuth: float
+    elevation: float
+    angle: float
+
+
+def place_of(camera: Camera) -> Place:
+    x, y, z = (camera.centre / np.linalg.norm(camera.centre)).tolist()
+    angle = math.degrees(math.acos(max(-1.0, min(1.0, x))))
+    return Place(math.degrees(math.atan2(y, x)), math.degrees(math.asin(max(-1.0, min(1.0, z)))), angle)
+
+
+def share(value: float | None, most: float) -> float:
+    """Length of a bar, 0 to 100."""
+    return 0.0 if value is None or most <= 0 else max(0.0, min(100.0, 100 * value / most))
+
+
+def scores(metrics: dict[str, Any]) -> dict[str, Any]:
+    """Means of each variant; metrics that nothing has are left out."""
+    variants = [name for name in (*VARIANTS, WITH_EFFECTS) if name in metrics]
+    kept = [
+        key
+        for pair in zip(SUBJECT_METRICS, METRICS, strict=True)
+        for key in pair
+        if any(finite(metrics[name].get(key)) is not None for name in variants)
+    ]
+    ordered = [key for key in kept if key in SUBJECT_METRICS] + [key for key in kept if key in METRICS]
+    rows = [
+        {
+            "name": VARIANT_NAMES[name],
+            "values": [number(metrics[name].get(key), 2 if "psnr" in key else 3) for key in ordered],
+        }
+        for name in variants
+    ]
+    subject = sum(key in SUBJECT_METRICS for key in ordered)
+    names = [METRIC_NAMES[key.removesuffix("_subject")] for key in ordered]
+    return {"names": names, "rows": rows, "subject": subject, "whole": len(ordered) - subject}
+
+
+def heat_map(
+    images: Sequence[ImageScores], key: str, pairs: dict[tuple[str, str], int], places: dict[str, Place]
+) -> Row:
+    """PSNR of every held-out camera and frame.
+
+    Args:
+        pairs: index of the comparison of (camera, frame), where the page shows one.
+    """
+    values = {(image.camera, image.frame): image_psnr(image, key) for image in images}
+    known = [value for value in values.values() if value is not None]
+    low, high = (min(known), max(known)) if known else (0.0, 0.0)
+    middle, half = (low + high) / 2, max(HEAT_RANGE, high - low) / 2
+    frames = list(dict.fromkeys(image.frame for image in images))
+    rows = []
+    for camera in dict.fromkeys(image.camera for image in images):
+        own = [value for frame in frames if (value := values.get((camera, frame))) is not None]
+        cells = []
+        for frame in frames:
+            value = values.get((camera, frame))
+            where = None if value is None else (value - middle + half) / (2 * half)
+            cells.append(
+                {
+                    "value": number(value, 1),
+                    "colour": None if where is None else heat_colour(where),
+                    "ink": None if where is None else ink_on(where),
+                    "pair": pairs.get((camera, frame)),
+                }
+            )
+        place = places.get(camera)
+        note = f"{place.angle:.0f}° from front" if place else ""
+        rows.append({"camera": camera, "note": note, "mean": number(np.mean(own) if own else None), "cells": cells})
+    stops = ", ".join(heat_colour(i / 8) for i in range(9))
+    return {
+        "frames": frames,
+        "rows": rows,
+        "low": number(middle - half, 1),
+        "high": number(middle + half, 1),
+        "stops": stops,
+    }
+
+
+def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
+    """Held-out cameras, the most frontal first."""
+    rows = []
+    held = [scene.cameras[index] for index in scene.indices("holdout")]
+    for camera, place in sorted(((c, place_of(c)) for c in held), key=lambda one: one[1].angle):
+        own = [value for i in images if i.camera == camera.name and (value := image_psnr(i, key)) is not None]
+        rows.append(
+            {
+                "name": camera.name,
+                "angle": f"{place.angle:.0f}°",
+                "azimuth": number(place.azimuth, 0) + "°",
+                "elevation": number(place.elevation, 0) + "°",
+                "psnr": number(np.mean(own) if own else None),
+            }
+        )
+    return rows
+
+
+def angles(measured: Measured) -> list[Row]:
+    """By angle; pixels without a surface where masks show that there should be one."""
+    bins = [(span(one), one) for one in measured.angles]
+    bins += [("no layer met", measured.bare)] if measured.masked else []
+    most = max((one.rms for _, one in bins if one.rms is not None), default=0.0)
+    return [
+        {
+            "name": name,
+            "share": percent(one.share),
+            "mean": number(one.mean, 3),
+            "rms": number(one.rms, 3),
+            "bar": share(one.rms, most),
+        }
+        for name, one in bins
+    ]
+
+
+def layers(level: Level, spacing: Sequence[Spacing], scale: float, measured: Measured | None) -> list[Row]:
+    """One row a layer, outermost first.
+
+    Args:
+        spacing: from each layer to the next inwards, N - 1 of them.
+        scale: capture units a unit of the normalised world.
+    """
+    most = max(measured.contribution) if measured else 0.0
+    rows = []
+    for i, layer in enumerate(level.layers):
+        gap = spacing[i] if i < len(spacing) else Spacing(None, None)
+        rows.append(
+            {
+                "name": str(i + 1),
+                "contribution": percent(measured.contribution[i]) if measured else NONE,
+                "bar": share(measured.contribution[i], most) if measured else 0.0,
+                "reach": percent(measured.reach[i], 0) if measured else NONE,
+                "greatest": number(measured.greatest[i]) if measured else NONE,
+                "gap": number(None if gap.mean is None else 1000 * gap.mean),
+                "gap_capture": number(None if gap.mean is None else gap.mean * scale),
+                "least": number(None if gap.least is None else 1000 * gap.least),
+                "triangles": count(layer.triangles),
+                "bytes": size(layer.bytes),
+            }
+        )
+    return rows
+
+
+def levels(manifest: Manifest) -> list[Row]:
+    """Levels of detail, the full one first."""
+    rows = []
+    for level in reversed(manifest.levels):
+        texture = level.texture
+        quality = level.quality.psnr_to_model if level.quality else None
+        rows.append(
+            {
+                "name": level.name,
+                "layers": count(len(level.layers)),
+                "triangles": count(sum(layer.triangles for layer in level.layers)),
+                "picture": f"{texture.width} × {texture.height}",
+                "meshes": size(sum(layer.bytes for layer in level.layers)),
+                "videos": ", ".join(f"{video.codec} {size(video.bytes)}" for video in texture.videos),
+                "bytes": size(level.bytes),
+                "quality": number(quality, 1),
+            }
+        )
+    return rows
+
+
+def stages(costs: Sequence[StageCost]) -> list[Row]:
+    most_seconds = max((cost.seconds for cost in costs if cost.seconds is not None), default=0.0)
+    most_bytes = max((cost.bytes for cost in costs if cost.bytes is not None), default=0)
+    return [
+        {
+            "name": cost.name,
+            "seconds": duration(cost.seconds),
+            "seconds_bar": share(cost.seconds, most_seconds),
+            "bytes": size(cost.bytes),
+            "bytes_bar": share(cost.bytes, most_bytes),
+            "what": ", ".join(STAGE_OUTPUTS[cost.name]),
+        }
+        for cost in costs
+    ]
+
+
+def waterfall(steps: Sequence[dict[str, Any]]) -> list[Row]:
+    """Steps of the export; bars start 1 dB below the least value."""
+    values = [finite(step.get("psnr")) for step in steps]
+    known = [value for value in values if value is not None]
+    floor = min(known, default=0.0) - 1
+    rows = []
+    for i, step in enumerate(steps):
+        value, before = values[i], values[i - 1] if i else None
+        change = None if value is None or before is None else value - before
+        total = (finite(step.get("mesh_bytes")) or 0) + (finite(step.get("texture_bytes")) or 0)
+        rows.append(
+            {
+                "name": step.get("name", NONE),
+                "psnr": number(value),
+                "change": NONE if change is None else f"{change:+.2f}".replace("-", "−"),
+                "worse": change is not None and change < -0.005,
+                "bar": share(None if value is None else value - floor, max(known, default=0.0) - floor),
+                "bytes": size(total) if total else NONE,
+                "triangles": count(step.get("triangles")) if step.get("triangles") else NONE,
+            }
+        )
+    return rows
+
+
+def configuration(config: dict[str, dict[str, Any]]) -> list[Row]:
+    """One entry a section: (key, value) with dotted keys; `subject` first, then in the order of the stages."""
+    order = ["subject", *STAGE_OUTPUTS]
+    names = sorted(config, key=lambda name: (order.index(name) if name in order else len(order), name))
+    return [{"name": name, "rows": list(flat(config[name]))} for name in names]
+
+
+def flat(value: Any, key: str = "") -> list[tuple[str, str]]:
+    """Leaves of nested objects and of lists of objects, with dotted keys."""
+    if isinstance(value, dict) and value:
+        return [leaf for name, part in value.items() for leaf in flat(part, f"{key}.{name}" if key else str(name))]
+    if isinstance(value, list) and any(isinstance(part, dict) for part in value):
+        return [leaf for i, part in enumerate(value) for leaf in flat(part, f"{key}.{i + 1}")]
+    if isinstance(value, list):
+        return [(key, ", ".join(map(plain, value)) or "none")]
+    return [(key, plain(value))]
+
+
+def plain(value: Any) -> str:
+    if value is None or value == {}:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,48 @@
+"""Make a page that tells all about a subject: `python -m stages.report data/<subject>` (docs/report.md)."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.reporting.build import make_report
+
+
+def evaluated_subjects(data: Path) -> list[Path]:
+    """Folders of the subjects under `data` that have scores.
+
+    Raises:
+        UserError: if there is none.
+    """
+    found = sorted(path.parent for path in data.glob("*/metrics.json"))
+    if not found:
+        raise UserError(
+            "no subject has been evaluated yet", file=data, remedy="run `make repro` first, or name a subject's folder"
+        )
+    return found
+
+
+def report(
+    subjects: Annotated[
+        list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
+    ] = None,
+    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+) -> None:
+    """Write one self-contained page a subject, report.html in its folder: pictures, scores, layers, costs."""
+    with report_user_errors("report"):
+        for folder in subjects or evaluated_subjects(data):
+            start = time.perf_counter()
+            path = make_report(SubjectFolders(folder))
+            seconds = time.perf_counter() - start
+            typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(report)
+    app()

@@ -1,0 +1,158 @@
+"""The page in headless Chromium: nothing is fetched, nothing fails, the divider moves, it fits a phone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from facefolds_core.reporting.build import make_report
+from tests.reporting.tiny import FRAMES, LAYERS, make_subject
+from tests.viewer.conftest import BROWSERS, find_browser
+
+pytestmark = pytest.mark.timeout(180)
+
+PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
+PANELS = [
+    "Summary",
+    "Truth, asset, error",
+    "Scores",
+    "Error by viewing angle",
+    "Layers",
+    "Textures of one frame",
+    "Training",
+    "Export, step by step",
+    "Time and bytes by stage",
+    "Configuration",
+    "Versions",
+]
+
+Open = Callable[..., Page]
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_report(make_subject(tmp_path_factory.mktemp("browser") / "somebody"))
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    path = find_browser()
+    if path is None:
+        pytest.skip(f"no browser that starts (tried {', '.join(BROWSERS)}): apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def open_report(chromium: Browser, report: Path) -> Iterator[Open]:
+    """Opens the page; fails if it says or fetches anything."""
+    said: list[str] = []
+    requests: list[str] = []
+    contexts = []
+
+    def start(**options: object) -> Page:
+        context = chromium.new_context(**({"viewport": DESKTOP} | options))  # type: ignore[arg-type]
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(report.as_uri())
+        return page
+
+    yield start
+    for context in contexts:
+        context.close()
+    assert said == []
+    assert {url for url in requests if not url.startswith("data:")} == {report.as_uri()}
+
+
+def share_of_truth(page: Page) -> float:
+    """Percent of the picture in front of the divider that is the photo."""
+    clip = page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).clipPath")
+    numbers = [float(text) for text in re.findall(r"[\d.]+(?=%)", clip)]
+    return 100 - numbers[0]
+
+
+@pytest.mark.parametrize("viewport", [PHONE, DESKTOP], ids=["phone", "desktop"])
+def test_all_panels_are_there_and_fit(open_report: Open, viewport: dict[str, int]) -> None:
+    page = open_report(viewport=viewport)
+    assert page.locator("h2").all_inner_texts() == PANELS
+    assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"]
+    assert page.evaluate("[...document.images].filter((i) => !i.naturalWidth).length") == 0
+    assert page.locator("#layers tbody tr").count() == LAYERS
+    outside = """[...document.querySelectorAll('main *')].filter((e) => !e.closest('.scroll, svg, .wipe, .plain')
+        && e.getBoundingClientRect().right > innerWidth).length"""
+    assert page.evaluate(outside) == 0
+
+
+def test_the_divider_follows_keys_and_drags(open_report: Open) -> None:
+    page = open_report()
+    assert share_of_truth(page) == pytest.approx(50)
+    slider = page.get_by_role("slider", name="Divide between truth")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    assert share_of_truth(page) == pytest.approx(51)
+    page.keyboard.press("Home")
+    assert share_of_truth(page) == pytest.approx(0)
+    picture = page.locator(".view:visible .wipe")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2)
+    assert share_of_truth(page) == pytest.approx(80, abs=1)
+    page.mouse.move(box["x"] + 3 * box["width"], box["y"])
+    assert share_of_truth(page) == pytest.approx(100)
+    page.mouse.up()
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    assert share_of_truth(page) == pytest.approx(100)
+    assert slider.input_value() == "100"
+
+
+def test_a_touch_moves_the_divider(open_report: Open) -> None:
+    page = open_report(viewport=PHONE, has_touch=True)
+    picture = page.locator(".view:visible .wipe")
+    picture.scroll_into_view_if_needed()
+    box = picture.bounding_box()
+    assert box is not None
+    page.touchscreen.tap(box["x"] + 0.25 * box["width"], box["y"] + 0.3 * box["height"])
+    assert share_of_truth(page) == pytest.approx(25, abs=1)
+
+
+def test_pictures_are_chosen_by_list_buttons_and_heat_map(open_report: Open) -> None:
+    page = open_report()
+    choice = page.get_by_label("Held-out picture", exact=True)
+    page.get_by_role("slider").press("Home")
+    choice.select_option("1")
+    assert page.locator(".view:visible").get_attribute("data-view") == "1"
+    assert share_of_truth(page) == pytest.approx(0)  # the divider stays
+    page.get_by_role("button", name="Next picture").click()
+    page.get_by_role("button", name="Next picture").click()
+    assert page.locator(".view:visible").get_attribute("data-view") == "0"
+    page.get_by_role("button", name="Previous picture").click()
+    assert choice.input_value() == str(FRAMES - 1)
+    page.locator(".heat a").first.click()
+    assert page.locator(".view:visible").get_attribute("data-view") == "0"
+
+
+def test_it_follows_light_and_dark(open_report: Open) -> None:
+    colours = []
+    for scheme in ("light", "dark"):
+        page = open_report(color_scheme=scheme)
+        colours.append(page.evaluate("getComputedStyle(document.body).backgroundColor"))
+    levels = [sum(map(int, re.findall(r"\d+", colour))) for colour in colours]
+    assert levels[0] > 600
+    assert levels[1] < 150
+
+
+def test_without_script_the_first_picture_is_shown(open_report: Open) -> None:
+    page = open_report(java_script_enabled=False)
+    assert page.locator(".view:visible").count() == 1

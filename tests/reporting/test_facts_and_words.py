@@ -1,0 +1,184 @@
+"""What is read, how it is said, and what is said of what is not there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_text
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.reporting import charts, tables, words
+from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts
+from facefolds_core.reporting.measure import AngleBin, Measured
+from tests.reporting.tiny import make_subject
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> SubjectFolders:
+    return make_subject(tmp_path_factory.mktemp("facts") / "spheres")
+
+
+@pytest.mark.parametrize("make", [True, False])
+def test_a_wrong_folder_is_named_with_a_remedy(tmp_path: Path, make: bool) -> None:
+    folder = tmp_path / "somebody"
+    if make:
+        folder.mkdir()
+    with pytest.raises(UserError, match="not the folder of a subject") as error:
+        read_facts(SubjectFolders(folder))
+    assert error.value.file == folder
+    assert "dvc repro" in str(error.value.remedy)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"asset": null, "cost": {}}'])
+def test_garbled_scores_are_named(tmp_path: Path, text: str) -> None:
+    write_text(tmp_path / "metrics.json", text)
+    with pytest.raises(UserError) as error:
+        read_facts(SubjectFolders(tmp_path))
+    assert error.value.file == tmp_path / "metrics.json"
+
+
+def test_scores_alone_are_enough_to_read(tmp_path: Path) -> None:
+    write_text(tmp_path / "metrics.json", '{"asset": {}, "cost": {}}')
+    facts = read_facts(SubjectFolders(tmp_path))
+    assert (facts.images, facts.curves, facts.waterfall, facts.config) == ((), (), (), {})
+    assert facts.training is None
+    assert all(stage.seconds is None for stage in facts.stages)
+
+
+def test_damaged_scores_of_pictures_are_named(folders: SubjectFolders, tmp_path: Path) -> None:
+    copy = SubjectFolders(tmp_path)
+    write_text(copy.metrics, folders.metrics.read_text())
+    write_text(copy.evaluation / "per_image.parquet", "no parquet")
+    with pytest.raises(UserError, match="damaged scores"):
+        read_facts(copy)
+
+
+def test_facts_are_those_of_the_files(folders: SubjectFolders) -> None:
+    facts = read_facts(folders)
+    assert facts.images[0] == ImageScores("cam3", "000000", 19.0, 24.0)
+    assert facts.curves == (Curve("psnr", ((0, 10), (2, 20))),)  # the header and NaN are left out
+    costs = {stage.name: stage for stage in facts.stages}
+    assert costs["train"].seconds == 10
+    assert costs["compress"].bytes == sum(path.stat().st_size for path in folders.asset.iterdir())
+    assert costs["bake"].bytes is None
+    assert dict(facts.versions)["numpy"] == np.__version__
+
+
+def test_a_curve_of_one_point_is_none(tmp_path: Path) -> None:
+    write_text(tmp_path / "x.tsv", "step\tx\n0\t1\n")
+    assert read_curves(tmp_path) == ()
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (words.number(None), "–"),
+        (words.number(math.nan), "–"),
+        (words.number(math.inf), "–"),
+        (words.number(-1.5, 1), "−1.5"),
+        (words.count(93425), "93\u202f425"),
+        (words.size(999), "999\u00a0bytes"),
+        (words.size(231_000), "231\u00a0KB"),
+        (words.size(2_451_088), "2.45\u00a0MB"),
+        (words.duration(95.5), "96\u00a0s"),
+        (words.duration(389), "6\u00a0min 29\u00a0s"),
+        (words.duration(None), "–"),
+        (words.percent(0.125), "12.5\u00a0%"),
+        (words.listed(["5", "6", "7"]), "5, 6 and 7"),
+    ],
+)
+def test_figures_as_people_read_them(found: str, expected: str) -> None:
+    assert found == expected
+
+
+METRICS = {
+    "images": 3,
+    "images_with_mask": 2,
+    "asset": {"psnr": 11.0, "ssim": 0.5, "psnr_subject": 24.5, "ssim_subject": 0.9},
+    "diffuse": {"psnr": 11.5, "psnr_subject": 24.75},
+    "cost": {"train_seconds": 95.5, "device": "cpu", "iterations": 460},
+}
+
+
+def test_the_summary_tells_the_loss_of_the_export() -> None:
+    assert words.quality_words(METRICS) == (
+        "On 2 held-out pictures the asset reaches 24.50 dB PSNR and 0.900 SSIM of the subject. The model without its "
+        "view branch, of which the asset is made, reaches 24.75 dB: the export costs 0.25 dB. Over the whole frame, "
+        "the room with it, it is 11.00 dB."
+    )
+
+
+def test_the_summary_without_masks_speaks_of_the_whole_frame() -> None:
+    metrics = METRICS | {"asset": {"psnr": 11.75, "ssim": 0.5, "psnr_subject": None}}
+    text = words.quality_words(metrics)
+    assert "over the whole frame" in text
+    assert "adds 0.25 dB" in text
+    assert "There are no masks" in text
+
+
+def test_the_summary_names_the_layers_that_make_up_half() -> None:
+    measured = Measured((), (), AngleBin(0, 90, 0, None, None), (0.1, 0.4, 0.3, 0.2), (1,) * 4, (0.5,) * 4, True)
+    text = words.layer_words(measured)
+    assert text.startswith("70\u00a0% of what is seen comes from layers 2 and 3, counted from outside; layer 1 adds")
+
+
+def test_the_summary_names_the_angles_of_least_and_greatest_error() -> None:
+    bins = (AngleBin(0, 15, 0.5, 0.1, 0.2), AngleBin(15, 30, 0.4, 0.1, 0.1), AngleBin(30, 45, 0.001, 0.9, 0.9))
+    measured = Measured((), bins, AngleBin(0, 90, 0.0, None, None), (1.0,), (1,), (1,), True)
+    text = str(words.angle_words(measured))
+    assert "least at 15°–30° (0.100 of the full range) and greatest at 0°–15° (0.200). None of" in text
+    assert "pixels" not in str(words.angle_words(replace(measured, masked=False)))
+
+
+def test_the_summary_names_the_step_that_loses_most() -> None:
+    steps = tuple({"name": name, "psnr": psnr} for name, psnr in (("a", 25.0), ("b", 24.0), ("c", 24.5), ("d", None)))
+    assert words.export_words(steps) == "Of the export's steps, “b” loses most: 1.00 dB."
+    assert words.export_words(steps[1:3]) == "No step of the export loses PSNR."
+    assert words.export_words(()) is None
+
+
+def test_a_heat_map_with_gaps() -> None:
+    images = [
+        ImageScores("a", "0", 20.0, None),
+        ImageScores("b", "1", math.nan, None),
+        ImageScores("b", "0", 21.0, None),
+    ]
+    images[1] = replace(images[1], psnr=None)
+    heat = tables.heat_map(images, "psnr", {("a", "0"): 4}, {})
+    assert heat["frames"] == ["0", "1"]
+    assert (heat["low"], heat["high"]) == ("19.0", "22.0")  # at least 3 dB, about the middle
+    assert [cell["pair"] for cell in heat["rows"][0]["cells"]] == [4, None]
+    assert [cell["value"] for cell in heat["rows"][1]["cells"]] == ["21.0", "–"]
+
+
+def test_configuration_is_flat_and_whole() -> None:
+    value = {"a": {"b": 1.0, "c": []}, "d": [{"e": None}, {"e": True}], "f": [0.5, 2]}
+    expected = [("a.b", "1"), ("a.c", "none"), ("d.1.e", "none"), ("d.2.e", "yes"), ("f", "0.5, 2")]
+    assert list(tables.flat(value)) == expected
+
+
+def test_thinning_keeps_means() -> None:
+    assert charts.thinned([(0, 0), (1, 2), (2, 4), (3, 6)], 2) == [(0.5, 1), (2.5, 5)]
+
+
+@pytest.mark.parametrize("values", [(1.0, 1.0), (0.0, 1e-9), (-1e6, 1e6)])
+def test_a_line_chart_of_any_range_is_finite(values: tuple[float, float]) -> None:
+    svg = charts.line_chart([(0, values[0]), (1, values[1])], "<x>", "step")
+    assert "nan" not in svg
+    assert "<x>" not in svg
+    assert svg.count("<polyline") == 1
+
+
+def test_a_section_breaks_where_a_layer_is_not_met() -> None:
+    line = np.array([[0.0, 0], [1, 1], [np.nan, np.nan], [2, 2], [3, 3]])
+    assert charts.section([line], "x").count("M") == 2
+    assert charts.section([np.full((2, 2), np.nan)], "x") == ""
+
+
+def test_ink_is_read_on_any_colour() -> None:
+    assert (charts.ink_on(0.0), charts.ink_on(1.0)) == ("#ffffff", "#000000")

@@ -1,0 +1,130 @@
+"""The page as a file: whole, self-contained, with a line for all that is missing; and the command."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from facefolds_core.asset import read_asset
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_json
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.reporting.build import make_report
+from stages.report import evaluated_subjects, report
+from tests.assets import make_asset
+from tests.reporting.tiny import FRAMES, LAYERS, make_subject
+
+
+@pytest.fixture(scope="module")
+def subject(tmp_path_factory: pytest.TempPathFactory) -> SubjectFolders:
+    return make_subject(tmp_path_factory.mktemp("page") / "somebody")
+
+
+@pytest.fixture
+def copy(subject: SubjectFolders, tmp_path: Path) -> SubjectFolders:
+    """The same, to spoil."""
+    return SubjectFolders(Path(shutil.copytree(subject.root, tmp_path / "somebody")))
+
+
+def page_of(folders: SubjectFolders) -> str:
+    return make_report(folders).read_text(encoding="utf-8")
+
+
+def test_everything_is_in_the_file(subject: SubjectFolders) -> None:
+    page = page_of(subject)
+    addresses = re.findall(r"""(?:src|href|srcset|action|poster)\s*=\s*["']?([^"'\s>]+)""", page)
+    assert all(address.startswith(("data:", "#")) for address in addresses)
+    assert not re.search(r"url\(|@import|https?://|<iframe|<object", page)
+    assert page.count("data:image/webp") == 2 * FRAMES + LAYERS
+    assert page.count("data:image/png") == FRAMES
+
+
+def test_nothing_is_missing_and_nothing_is_no_number(subject: SubjectFolders) -> None:
+    page = page_of(subject)
+    assert 'class="missing"' not in page
+    assert not re.search(r">\s*(nan|None|inf)\b", page)
+    assert str(subject.root) not in page
+
+
+def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
+    for path in (copy.metrics, copy.root / "waterfall" / "waterfall.json", copy.timing("train")):
+        path.write_text(re.sub(r"(\d+\.\d+|300)(?=[,\n])", "NaN", path.read_text()))
+    page = page_of(copy)
+    assert not re.search(r"\b(nan|None|inf)\b", re.sub(r"data:image[^\"]*|<script>.*</script>", "", page, flags=re.S))
+    assert "reaches – dB" in page
+
+
+def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
+    assert "centre: &lt;the middle&gt;" in page_of(subject)
+
+
+@pytest.mark.parametrize(
+    ("gone", "command"),
+    [
+        ("scene", "dvc repro normalize@somebody"),
+        ("evaluation", "dvc repro evaluate@somebody"),
+        ("training", "dvc repro train@somebody"),
+        ("waterfall", "python -m bench.export_waterfall --subjects somebody"),
+        ("config", "dvc repro configure@somebody"),
+    ],
+)
+def test_what_is_missing_is_said_with_the_command_that_makes_it(copy: SubjectFolders, gone: str, command: str) -> None:
+    shutil.rmtree(copy.root / gone)
+    page = page_of(copy)
+    assert f"<code>{command}</code>" in page
+
+
+def test_with_scores_and_asset_alone_there_is_a_page(copy: SubjectFolders) -> None:
+    for path in copy.root.iterdir():
+        if path.is_dir() and path != copy.asset:
+            shutil.rmtree(path)
+    assert page_of(copy).count('class="missing"') == 6
+
+
+def test_without_masks_the_whole_frame_is_spoken_of(tmp_path: Path) -> None:
+    page = page_of(make_subject(tmp_path / "bare", masks=False))
+    assert "There are no masks" in page
+    assert "no layer met" not in page
+
+
+def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:
+    shutil.rmtree(copy.asset)
+    make_asset(copy.asset, layers=2, frames=FRAMES + 1, resolution=32)
+    assert read_asset(copy.asset).num_frames == FRAMES + 1
+    with pytest.raises(UserError, match="different numbers of frames"):
+        make_report(copy)
+
+
+def test_a_missing_asset_is_named(copy: SubjectFolders) -> None:
+    shutil.rmtree(copy.asset)
+    with pytest.raises(UserError) as error:
+        make_report(copy)
+    assert error.value.file == copy.asset
+
+
+def test_no_held_out_camera_is_said(copy: SubjectFolders) -> None:
+    path = copy.scene / "scene.json"
+    path.write_text(path.read_text().replace('"holdout"', '"train"'))
+    assert page_of(copy).count("No camera is held out") == 2
+
+
+def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no subject has been evaluated"):
+        evaluated_subjects(tmp_path)
+    write_json(tmp_path / "b" / "metrics.json", {})
+    write_json(tmp_path / "a" / "metrics.json", {})
+    (tmp_path / "c").mkdir()
+    assert evaluated_subjects(tmp_path) == [tmp_path / "a", tmp_path / "b"]
+
+
+def test_the_command_says_where_the_page_lies(copy: SubjectFolders) -> None:
+    app = typer.Typer()
+    app.command()(report)
+    done = CliRunner().invoke(app, ["--data", str(copy.root.parent)])
+    assert done.exit_code == 0
+    assert str(copy.root / "report.html") in done.output
