@@ -7,13 +7,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from facefolds_core.reporting.build import make_report
 from tests.reporting.tiny import FRAMES, LAYERS, make_subject
-from tests.viewer.conftest import BROWSERS, find_browser
-
-pytestmark = pytest.mark.timeout(180)
 
 PHONE, DESKTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 900}
 PANELS = [
@@ -38,26 +35,15 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_report(make_subject(tmp_path_factory.mktemp("browser") / "somebody"))
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    path = find_browser()
-    if path is None:
-        pytest.skip(f"no browser that starts (tried {', '.join(BROWSERS)}): apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
-def open_report(chromium: Browser, report: Path) -> Iterator[Open]:
+def open_report(browser: Browser, report: Path) -> Iterator[Open]:
     """Opens the page; fails if it says or fetches anything."""
     said: list[str] = []
     requests: list[str] = []
     contexts = []
 
     def start(**options: object) -> Page:
-        context = chromium.new_context(**({"viewport": DESKTOP} | options))  # type: ignore[arg-type]
+        context = browser.new_context(**({"viewport": DESKTOP} | options))  # type: ignore[arg-type]
         contexts.append(context)
         page = context.new_page()
         page.on("console", lambda message: said.append(message.text))

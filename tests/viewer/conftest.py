@@ -13,26 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving import serving
-from tests.viewer.chromium import Chromium
 from tests.viewer.fixtures import rich_asset
 
-BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
 PATIENCE = 60_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
 ELEMENT = "document.querySelector('facefolds-player')"
-
-
-def find_browser() -> str | None:
-    """A Chromium that starts; Ubuntu's wrapper around a snap does not, in a container."""
-    for name in BROWSERS:
-        path = shutil.which(name)
-        if path and subprocess.run([path, "--version"], capture_output=True, check=False, timeout=60).returncode == 0:
-            return path
-    return None
 
 
 @pytest.fixture(scope="session")
@@ -57,24 +46,6 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def rich_copy(rich: Path, tmp_path: Path) -> Path:
     """The same, to spoil."""
     return Path(shutil.copytree(rich, tmp_path / "asset"))
-
-
-@pytest.fixture(scope="session")
-def chromium(player_folder: Path) -> Iterator[Chromium]:
-    path = find_browser()
-    if path is None:
-        pytest.skip(f"no browser that starts (tried {', '.join(BROWSERS)}): apt-get install chromium")
-    with sync_playwright() as playwright:
-        running = Chromium(path, playwright)
-        yield running
-        running.close()
-
-
-@pytest.fixture
-def browser(chromium: Chromium) -> Iterator[Browser]:
-    """A browser that is killed when the test hangs; the test then fails, and is run once more in a new one."""
-    with chromium.watched():
-        yield chromium.browser()
 
 
 class Player:
@@ -184,10 +155,3 @@ def new_player(browser: Browser, serve: Callable[[dict[str, Path]], str]) -> Ite
     for player, allow in players:
         unexpected = [line for line in player.said if not any(part in line for part in allow)]
         assert unexpected == []
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A browser that hung, and was killed, gets one more chance; a test that found something wrong gets none."""
-    for item in items:
-        if Path(__file__).parent in item.path.parents:
-            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["TargetClosedError"]))

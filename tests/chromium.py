@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import threading
 import uuid
 from collections.abc import Iterator
@@ -12,6 +14,7 @@ import psutil
 import pytest
 from playwright.sync_api import Browser, Playwright
 
+BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
 FLAGS = (
     "--use-angle=gl-egl",  # Mesa's llvmpipe: several times faster than Chromium's own software renderer
     "--ignore-gpu-blocklist",
@@ -21,6 +24,15 @@ FLAGS = (
 PATIENCE = 120.0
 """Seconds that a test may take, fixtures included. Seen: 15 on a busy machine."""
 ALLOWED_KILLS = 3
+
+
+def find_browser() -> str | None:
+    """A Chromium that starts; Ubuntu's wrapper around a snap does not, in a container."""
+    for name in BROWSERS:
+        path = shutil.which(name)
+        if path and subprocess.run([path, "--version"], capture_output=True, check=False, timeout=60).returncode == 0:
+            return path
+    return None
 
 
 class Chromium:

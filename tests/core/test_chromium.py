@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Error
 
-from tests.viewer.chromium import ALLOWED_KILLS, Chromium
+from tests.chromium import ALLOWED_KILLS, Chromium
 
 
 @pytest.fixture
