@@ -193,7 +193,7 @@ def decibels(scores: Sequence[Score], region: str) -> float:
 def table(scores: Sequence[Score]) -> str:
     """Markdown."""
     fast = fast_intervals(scores)
-    columns = {
+    columns: dict[str, Callable[[Score], bool]] = {
         "all": lambda s: True,
         "fast": lambda s: s.frame in fast,
         "still": lambda s: s.frame not in fast,

@@ -62,7 +62,7 @@ class Motion:
         """How to make the frame at k + t, 0 < t < 1."""
         first, second = sources(t * self.forward), sources((1 - t) * self.backward)
         weight, other = (1 - t) * crowd(first), t * crowd(second)
-        return Moved(first, second, (other / (weight + other))[..., None])
+        return Moved(first, second, np.asarray(other / (weight + other), np.float32)[..., None])
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,8 @@ def dense_flow(first: Image, second: Image) -> Float:
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)  # the result depends on how many share the picture
     try:
-        flow = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM).calc(first, second, None)
+        method = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+        flow = method.calc(first, second, None)  # type: ignore[call-overload]  # None: no flow to start from
     finally:
         cv2.setNumThreads(threads)
     return np.where(np.isfinite(flow).all(-1, keepdims=True), flow, np.float32(0))
@@ -133,7 +134,7 @@ def picture(store: FrameStore, layers: int, frame: int) -> Image:
         seen += through * texture[..., :3]
         through *= 1 - texture[..., 3:]
     grey = seen @ GREY + np.float32(BEHIND) * through[..., 0]
-    return np.rint(grey * 255).clip(0, 255).astype(np.uint8)
+    return np.asarray(np.rint(grey * 255).clip(0, 255), np.uint8)
 
 
 def motions(store: FrameStore, layers: int, frames: int) -> Iterator[Motion]:

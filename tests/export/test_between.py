@@ -92,6 +92,10 @@ def test_a_hidden_colour_does_not_bleed(tmp_path: Path) -> None:
 
 
 class _Nan:
+    @classmethod
+    def create(cls, preset: int) -> _Nan:
+        return cls()
+
     def calc(self, first: Image, second: Image, flow: None) -> NDArray[np.float32]:
         return np.full((*first.shape, 2), np.nan, np.float32)
 
@@ -104,7 +108,7 @@ def mixed(first: Image, second: Image) -> NDArray[np.float64]:
 
 
 def test_without_a_finite_flow_frames_are_mixed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cv2, "DISOpticalFlow_create", lambda preset: _Nan())
+    monkeypatch.setattr(cv2, "DISOpticalFlow", _Nan)
     between = rows_of(moving(tmp_path, 4.0), 2)[0, 1].astype(float) / 255
     between[..., :3] *= between[..., 3:]
     np.testing.assert_allclose(between, mixed(pattern(0), pattern(4)), atol=1 / 255)
