@@ -20,6 +20,7 @@ from typing import Annotated
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from PIL import Image
 
 from facefolds_core.captures.actor import frame_times, make_rig, render
 from facefolds_core.captures.frames import FrameStore
@@ -41,16 +42,16 @@ MOVES = 0.05
 TRAINING_EVERY = 7
 """With --split train, every so many-th training camera is looked at."""
 
-Image = NDArray[np.uint8]
-Textures = Sequence[Image]
+Codes = NDArray[np.uint8]
+Textures = Sequence[Codes]
 
 
 @dataclass(frozen=True)
 class Truth:
     """What one camera would have seen: pictures (M, H, W, 3) and the subject's opacity (M, H, W), uint8, at M times."""
 
-    pictures: Image
-    opacity: Image
+    pictures: Codes
+    opacity: Codes
 
 
 @dataclass(frozen=True)
@@ -239,11 +240,30 @@ def measure(folders: SubjectFolders, work: Path, split: Split, factor: int) -> l
     return found
 
 
+def draw(path: Path, folders: SubjectFolders, truth: Truth, camera: int, intervals: Sequence[int], factor: int) -> None:
+    """Rows: truth, cross-fade, ours, over black; columns: the middle of the intervals. Cut to what moves, enlarged."""
+    store = FrameStore(folders.textures / "textures.arrow")
+    meshes, scene = read_meshes(folders.meshes / "meshes.npz"), read_scene(folders.scene)
+    cast = AssetCaster(Shown(meshes)).cast(scene.cameras[camera])
+    wanted = [k * factor + factor // 2 for k in intervals]
+    rows = [[truth.pictures[at] / 255.0 * (truth.opacity[at] / 255.0)[..., None] for at in wanted]]
+    for method in ("cross-fade", "ours"):
+        rows.append([shown(composite(cast, made)[0]) for at, made in METHODS[method](store, factor) if at in wanted])
+    alike = np.ptp(truth.pictures.astype(np.int16), axis=0).max(-1) <= 4 * MOVES * 255
+    down, right = (np.flatnonzero(~alike.all(axis)) for axis in (1, 0))
+    box = slice(down[0], down[-1] + 1), slice(right[0], right[-1] + 1)
+    sheet = np.concatenate([np.concatenate([picture[box] for picture in row], 1) for row in rows])
+    image = Image.fromarray(np.rint(sheet * 255).astype(np.uint8))
+    with atomic_file(path) as temporary:
+        image.resize((2 * image.width, 2 * image.height), Image.Resampling.BICUBIC).save(temporary, quality=88)
+
+
 def main(
     subject: Annotated[Path, typer.Argument(help="Folder of an exported actor: scene, meshes, textures.")],
     work: Annotated[Path, typer.Option(help="Folder for what is rendered and scored; a second run uses it again.")],
     split: Annotated[str, typer.Option(help="Cameras: holdout, or train (a seventh of them).")] = "holdout",
     factor: Annotated[int, typer.Option(min=2, max=3, help="Times the capture's frame rate.")] = 2,
+    picture: Annotated[Path | None, typer.Option(help="Write the first camera's fast intervals there (JPEG).")] = None,
 ) -> None:
     """Score frames between frames against the actor's truth."""
     with report_user_errors("between"):
@@ -252,7 +272,12 @@ def main(
         work.mkdir(parents=True, exist_ok=True)
         scores = measure(SubjectFolders(subject), work, "train" if split == "train" else "holdout", factor)
         typer.echo(f"\n{split} cameras, {factor} times the frame rate; dB against the truth\n{table(scores)}")
-        typer.echo(f"fast: the intervals after frames {', '.join(map(str, sorted(fast_intervals(scores))))}")
+        fast = sorted(fast_intervals(scores))
+        typer.echo(f"fast: the intervals after frames {', '.join(map(str, fast))}")
+        if picture is not None:
+            camera, folders = scores[0].camera, SubjectFolders(subject)
+            truth = truth_of(folders, read_scene(folders.scene), camera, factor, work)
+            draw(picture, folders, truth, camera, fast, factor)
 
 
 if __name__ == "__main__":
