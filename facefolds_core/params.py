@@ -277,7 +277,7 @@ class GlbParams(Section):
     """The GLB beside the asset: one frame as binary glTF.
 
     Attributes:
-        frame: index of the frame whose textures it shows.
+        frame: index of the capture's frame whose textures it shows.
         draco: keep the meshes compressed (KHR_draco_mesh_compression, which not every program reads).
     """
 
@@ -311,12 +311,15 @@ class CompressParams(Section):
         view_effects: fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of
             the full level at most. It needs an asset that stands before the room, not one that has it painted on.
         photos: photos of held-out cameras that ship with the asset, to compare with: at most so many.
+        frame_rate_factor: the asset plays at 1, 2 or 3 times the capture's frames a second; what lies between the
+            capture's frames follows the motion (export/between.py).
     """
 
     mesh: MeshCodec = MeshCodec()
     video: VideoCodec = VideoCodec()
     levels: tuple[LevelParams, ...] = ()
     photos: Annotated[int, Field(ge=0)] = 0
+    frame_rate_factor: Literal[1, 2, 3] = 1
     glb: GlbParams = GlbParams()
     view_effects: bool = False
 

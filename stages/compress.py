@@ -45,7 +45,8 @@ def compress(folders: SubjectFolders) -> str:
 
     manifest = package(folders.asset, Export(meshes, windows, textures, decimate), scene, source, params)
     level = manifest.full
-    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame, params.glb.draco)
+    glb_frame = params.glb.frame * (level.texture.frames // scene.num_frames)
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, glb_frame, params.glb.draco)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""

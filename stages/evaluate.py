@@ -12,7 +12,7 @@ from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import EvaluateParams, TrainParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import evaluate
+from facefolds_core.scoring.evaluation import evaluate, frame_rate_factor
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
@@ -34,6 +34,10 @@ def evaluate_subject(folders: SubjectFolders) -> str:
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
     write_json(folders.metrics, metrics)
     sys.stdout.write(text_table(metrics) + "\n")
+    factor = frame_rate_factor(scene, asset)
+    if factor > 1:
+        kept = f"{scene.num_frames} of the asset's {asset.num_frames} frames"
+        sys.stdout.write(f"evaluate: {kept} have photos and are scored, not those between them\n")
     return f"{metrics['images']} images of {len(scene.indices('holdout'))} held-out cameras; {folders.metrics}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -40,6 +40,7 @@ from facefolds_core.asset.writer import (
 )
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene
+from facefolds_core.export.between import at_frame_rate
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -82,19 +83,22 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
         UserError: if the export cannot be an asset.
     """
     frames = check_inputs(export.meshes, export.windows, export.textures)
-    layers = crop_layers(export.meshes, export.windows, export.textures, frames)
-    full = LevelContent(layers, export.textures, frames, source.fps, scene.audio)
+    factor = params.frame_rate_factor if frames > 1 else 1
     cameras = training_cameras(scene)
-    meter = make_meter(full, cameras)
-    with atomic_folder(folder) as temporary:
+    with atomic_folder(folder) as temporary, at_frame_rate(export.textures, factor, temporary) as textures:
+        layers = crop_layers(export.meshes, export.windows, textures, frames * factor)
+        full = LevelContent(layers, textures, frames * factor, source.fps * factor, scene.audio)
+        meter = make_meter(full, cameras)
         levels = []
         for coarse in params.levels:
             content = coarse_content(full, export.windows, coarse, export.decimate)
             levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
         level = _level(temporary, FULL, full, params, meter, cameras)
         if params.view_effects:
-            level = _with_effects(temporary, level, fit_effects(full, scene, EFFECTS_SHARE * level.bytes))
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, params.photos)
+            photographed = replace(full, textures=export.textures, frames=frames)
+            level = _with_effects(temporary, level, fit_effects(photographed, scene, EFFECTS_SHARE * level.bytes))
+        photos = _photos(temporary, scene, params.photos, factor)
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -158,9 +162,9 @@ def _crf(content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMete
         return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf
 
 
-def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: int) -> Manifest:
+def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo]) -> Manifest:
     """Add sound, a poster and photos."""
-    update: dict[str, object] = {}
+    update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
         path = folder / f"audio{scene.audio.suffix}"
         shutil.copyfile(scene.audio, path)
@@ -168,7 +172,6 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: int) ->
     cameras = training_cameras(scene)
     if cameras:
         update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras))
-    update["photos"] = tuple(_photos(folder, scene, photos))
     return manifest.model_copy(update=update)
 
 
@@ -185,8 +188,12 @@ def _poster(path: Path, level: Level, camera: Camera) -> Poster:
     return Poster(**_stored(path), width=camera.width, height=camera.height)
 
 
-def _photos(folder: Path, scene: Scene, wanted: int) -> list[Photo]:
-    """Photos of held-out cameras, each with its own frame, spread over the sequence."""
+def _photos(folder: Path, scene: Scene, wanted: int, factor: int) -> list[Photo]:
+    """Photos of held-out cameras, each with its own frame, spread over the sequence.
+
+    Args:
+        factor: frames of the asset a frame of the scene.
+    """
     if wanted == 0:
         return []
     store, found = scene.open_frames(), []
@@ -201,7 +208,7 @@ def _photos(folder: Path, scene: Scene, wanted: int) -> list[Photo]:
                 width=camera.width,
                 height=camera.height,
                 camera=camera.name,
-                frame=key[1],
+                frame=key[1] * factor,
                 K=_rows(camera.K),
                 w2c=_rows(camera.w2c),
             )

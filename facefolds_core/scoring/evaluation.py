@@ -1,11 +1,13 @@
 """Score the shipped asset, and the model it came from, on the held-out cameras (docs/metrics.md).
 
+An asset at a multiple of the capture's frame rate is scored on the frames that have photos.
+
 One camera at a time, one frame at a time: memory is bounded by one camera's crossings, whatever the number of images.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +89,8 @@ def evaluate(
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
     held_out = scene.indices("holdout")
-    _check(scene, model, asset, held_out)
+    _check(scene, model, held_out)
+    step = frame_rate_factor(scene, asset)
     truths, masks = scene.open_frames(), scene.open_masks()
     on_sheet = sheet_frames(scene.num_frames, params.sheet_frames)
     caster = AssetCaster(asset)
@@ -98,7 +101,7 @@ def evaluate(
         for index in held_out:
             camera = scene.cameras[index]
             frames = [k for k in range(scene.num_frames) if (index, k) in truths]
-            for k, images in _rendered(model, asset, caster, camera, frames, params.background):
+            for k, images in _rendered(model, asset, caster, camera, frames, params.background, step):
                 frame = scene.frame_ids[k]
                 _check_finite(images, camera.name, frame)
                 pictures = {variant: shown(image) for variant, image in images.items()}
@@ -167,13 +170,13 @@ def _rendered(
     camera: Camera,
     frames: list[int],
     background: tuple[float, float, float],
+    step: int,
 ) -> Iterator[tuple[int, dict[str, NDArray[np.float32]]]]:
-    """The variants' images (H, W, 3) over `background`, frame by frame."""
+    """The variants' images (H, W, 3) over `background`, for each of the scene's `frames`."""
     view, hits = ModelView(model, camera), caster.cast(camera)
     maps = asset.effects()
     added = None if maps is None else added_colours(hits, to_eye(camera), maps)
-    whole = len(frames) == asset.num_frames
-    for k, textures in enumerate(asset.frames()) if whole else ((k, asset.frame(k)) for k in frames):
+    for k, textures in _shipped(asset, frames, step):
         with_view, without_view, alpha = view.render(float(k))
         behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
         shipped, _ = composite(hits, textures, background)
@@ -181,6 +184,35 @@ def _rendered(
         if added is not None:
             images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
         yield k, images
+
+
+def _shipped(asset: Asset, frames: list[int], step: int) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]]]]:
+    """The textures of the scene's `frames`; decoded in one go if that is all that have photos."""
+    if len(frames) * step == asset.num_frames:
+        return ((k // step, textures) for k, textures in enumerate(asset.frames()) if k % step == 0)
+    return ((k, asset.frame(k * step)) for k in frames)
+
+
+def frame_rate_factor(scene: Scene, asset: Asset) -> int:
+    """Frames of the asset a frame of the scene, whose frame k is the asset's k times this.
+
+    Raises:
+        UserError: if it is not a whole number.
+    """
+    factor, rest = divmod(asset.num_frames, scene.num_frames)
+    if rest or not factor:
+        raise _wrong_frames("asset", f"{scene.num_frames} frames, as in the scene, or a multiple", asset, scene)
+    return factor
+
+
+def _wrong_frames(what: str, expected: str, found: Asset | RadianceManifolds, scene: Scene) -> UserError:
+    return UserError(
+        f"the {what} and the scene have different numbers of frames",
+        file=scene.folder / "scene.json",
+        expected=expected,
+        found=f"{found.num_frames} in the {what}",
+        remedy="run `dvc repro`, which makes both from the same scene",
+    )
 
 
 def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:
@@ -191,7 +223,7 @@ def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Ar
     return [float(d) for d in metric(stack[1:], stack[0])]
 
 
-def _check(scene: Scene, model: RadianceManifolds, asset: Asset, held_out: list[int]) -> None:
+def _check(scene: Scene, model: RadianceManifolds, held_out: list[int]) -> None:
     if not held_out:
         raise UserError(
             "no held-out camera: there is nothing to score on",
@@ -200,15 +232,8 @@ def _check(scene: Scene, model: RadianceManifolds, asset: Asset, held_out: list[
             found=f"{len(scene.cameras)} cameras, all for training",
             remedy="name held-out cameras under subjects.<name>.holdout in params.yaml, or set {every: n} there",
         )
-    for what, frames in (("model", model.num_frames), ("asset", asset.num_frames)):
-        if frames != scene.num_frames:
-            raise UserError(
-                f"the {what} and the scene have different numbers of frames",
-                file=scene.folder / "scene.json",
-                expected=f"{scene.num_frames} frames, as in the scene",
-                found=f"{frames} in the {what}",
-                remedy="run `dvc repro`, which makes both from the same scene",
-            )
+    if model.num_frames != scene.num_frames:
+        raise _wrong_frames("model", f"{scene.num_frames} frames, as in the scene", model, scene)
 
 
 def _check_finite(images: dict[str, NDArray[np.float32]], camera: str, frame: str) -> None:

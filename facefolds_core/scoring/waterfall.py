@@ -26,6 +26,7 @@ from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.scoring.evaluation import frame_rate_factor
 from facefolds_core.scoring.metrics import Array, psnr, shown
 from facefolds_core.scoring.model_view import ModelView
 
@@ -76,7 +77,7 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
         folders: of the subject, with all export stages run.
         frames: indices of the frames that are rendered.
     """
-    sources = list(_sources(model, folders))
+    sources = list(_sources(scene, model, folders))
     truths, masks = scene.open_frames(), scene.open_masks()
     to_truth: dict[str, list[float]] = {name: [] for name in STEPS}
     to_model: dict[str, list[float]] = {name: [] for name in STEPS}
@@ -110,7 +111,7 @@ def _add(values: list[float], image: Array, truth: Array, mask: Array | None) ->
         values.append(value)
 
 
-def _sources(model: RadianceManifolds, folders: SubjectFolders) -> Iterator[_Source]:
+def _sources(scene: Scene, model: RadianceManifolds, folders: SubjectFolders) -> Iterator[_Source]:
     grids = read_grids(folders.samples / "grids.npz")
     surfaces, window = folders.surfaces / "surfaces.npz", grids.window(0)
     if holds_sheets(surfaces):
@@ -133,7 +134,7 @@ def _sources(model: RadianceManifolds, folders: SubjectFolders) -> Iterator[_Sou
         ("baked", coarse, stores[2]),
     ):
         yield _of_meshes(name, meshes, store)
-    yield _of_asset(read_asset(folders.asset))
+    yield _of_asset(read_asset(folders.asset), scene)
 
 
 def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> _Source:
@@ -143,12 +144,13 @@ def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> 
     return _Source(name, lambda camera: cast_layers(camera, meshes), _frame(store), triangles, sizes, texels)
 
 
-def _of_asset(asset: Asset) -> _Source:
-    caster = AssetCaster(asset)
+def _of_asset(asset: Asset, scene: Scene) -> _Source:
+    caster, step = AssetCaster(asset), frame_rate_factor(scene, asset)
     level = asset.manifest.full
     files = sum(layer.bytes for layer in level.layers)
     triangles = sum(layer.triangles for layer in level.layers)
-    return _Source("shipped", caster.cast, asset.frame, triangles, files, level.texture.videos[0].bytes)
+    textures = level.texture.videos[0].bytes
+    return _Source("shipped", caster.cast, lambda k: asset.frame(k * step), triangles, files, textures)
 
 
 def _frame(store: FrameStore) -> Frame:

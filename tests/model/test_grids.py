@@ -31,3 +31,16 @@ def test_a_sheet_is_what_shade_gives(layer: int, time: float) -> None:
     for shaded in (textures.shade(uv, layers, times, None), textures.shade(uv, layers, other, None)):
         torch.testing.assert_close(sheet.rgb[:299], shaded.rgb[:299], atol=1e-5, rtol=0)
         torch.testing.assert_close(sheet.alpha[:299], shaded.alpha[:299], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("frame", [0, 1, 2])
+def test_at_a_frames_time_it_shows_that_frame_and_nothing_of_others(frame: int) -> None:
+    textures = random_textures()
+    alone = GridTextures(WINDOW, textures.shape, 2, 1)
+    with torch.no_grad():
+        alone.colour.copy_(textures.colour)
+        alone.layers.copy_(textures.layers)
+        alone.frame_colour.copy_(textures.frame_colour[frame : frame + 1])
+        alone.frame_alpha.copy_(textures.frame_alpha[frame : frame + 1])
+    for layer in range(2):
+        torch.testing.assert_close(textures.image(layer, float(frame)), alone.image(layer, 0.0), atol=0, rtol=0)

@@ -66,6 +66,20 @@ def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
     assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
 
 
+def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
+    before = project.params
+    project.write_params(before.replace("compress: {}", "compress: {frame_rate_factor: 2}"))
+    status, output = project.repro("evaluate@actor")
+    assert status == 0, output
+    assert stages_run(output) == ["configure@actor", "compress@actor", "evaluate@actor"]
+    assert "2 of the asset's 4 frames have photos" in output
+    texture = json.loads((project.root / "data/actor/asset/manifest.json").read_text())["levels"][-1]["texture"]
+    assert (texture["frames"], texture["fps"]) == (4, 60)
+    project.write_params(before)
+    status, output = project.repro("evaluate@actor")
+    assert status == 0, output
+
+
 def test_a_killed_training_resumes(project: TinyProject) -> None:
     status, output = project.repro("normalize@killed")
     assert status == 0, output

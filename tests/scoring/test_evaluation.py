@@ -127,6 +127,13 @@ def test_an_asset_with_another_number_of_frames_is_refused(tmp_path: Path) -> No
         evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), NO_PERCEPTUAL)
 
 
+def test_frames_between_the_photos_are_not_scored(tmp_path: Path) -> None:
+    between = 255 - pictures()
+    twice = np.stack([pictures(), between], 1).reshape(2 * FRAMES, SIZE, SIZE, 3)
+    found = evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(twice), EvaluateParams(), NO_PERCEPTUAL)
+    assert [s.values["psnr"] for s in found.scores if s.variant == "asset"] == [MAX_PSNR] * FRAMES
+
+
 def test_nan_in_a_rendering_is_caught(tmp_path: Path) -> None:
     model = tiny_model(view_bias=float("nan"))
     with pytest.raises(UserError, match="not finite") as error:

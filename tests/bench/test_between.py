@@ -1,0 +1,74 @@
+"""Scores of frames between frames: sums, which pixels move, which intervals are fast, the table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.between import METHODS, Score, Truth, decibels, fast_intervals, measure, score, table
+from facefolds_core.errors import UserError
+from facefolds_core.export.between import between_rows
+from facefolds_core.files import write_json
+from facefolds_core.paths import SubjectFolders
+from tests.assets import write_store
+
+
+def entry(method: str, frame: int, moving: float, share: float) -> Score:
+    return Score(method, 0, frame, subject=0.01 * 100, subject_weight=100, moving=moving, moving_weight=100 * share)
+
+
+def test_errors_count_where_the_subject_is_and_where_it_moves() -> None:
+    pictures = np.full((3, 2, 2, 3), 100, np.uint8)
+    pictures[1, 0, 0] = 151  # between the frames only
+    pictures[2, 0, 1, 2] = 114  # a channel, by more than 0.05; (1, 1) by less
+    pictures[2, 1, 1, 2] = 112
+    opacity = np.full((3, 2, 2), 255, np.uint8)
+    opacity[:, 1, 0] = 0
+    black = np.zeros((2, 2, 3), np.float32)
+    found = score("ours", 0, 0, black, Truth(pictures, opacity), 1, 2)
+    still, moving = (100 / 255) ** 2, (151 / 255) ** 2
+    assert (found.subject_weight, found.moving_weight) == (3, 2)
+    assert found.subject == pytest.approx(moving + 2 * still)
+    assert found.moving == pytest.approx(moving + still)
+
+
+def test_decibels_are_over_all_pixels_together() -> None:
+    scores = [entry("a", 0, 1.0, 0.1), entry("a", 1, 0.2, 0.02)]
+    assert decibels(scores, "moving") == pytest.approx(-10 * np.log10(1.2 / 12))
+    assert decibels(scores, "subject") == pytest.approx(20)
+
+
+def test_the_faster_half_of_the_intervals() -> None:
+    shares = [0.1, 0.4, 0.2, 0.3, 0.05]
+    scores = [entry("repeat", k, 0.0, share) for k, share in enumerate(shares)]
+    assert fast_intervals(scores) == {1, 3}
+
+
+def test_the_table_has_a_row_a_method() -> None:
+    scores = [entry(method, k, 0.01 * k + 0.01, 0.1 * k + 0.1) for method in METHODS for k in range(2)]
+    rows = table(scores).splitlines()[2:]
+    assert [row.split("|")[1].strip() for row in rows] == list(METHODS)
+    assert rows[0].split("|")[2:4] == [" 30.00 ", " 30.00 "]
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_every_method_gives_all_times_between(tmp_path: Path, factor: int) -> None:
+    textures = np.random.default_rng(0).integers(0, 256, (3, 2, 32, 32, 4), dtype=np.uint8)
+    store = write_store(tmp_path / "textures.arrow", textures)
+    wanted = [k for k in range(2 * factor) if k % factor]
+    found = {name: dict(method(store, factor)) for name, method in METHODS.items()}
+    assert all(list(frames) == wanted for frames in found.values())
+    rows = {(layer, frame): image for layer, frame, image in between_rows(store, factor, progress=False)}
+    for k in wanted:
+        for layer in range(2):
+            np.testing.assert_array_equal(found["ours"][k][layer], rows[layer, k])
+            np.testing.assert_array_equal(found["repeat"][k][layer], textures[k // factor, layer])
+
+
+def test_only_the_actor_has_a_truth(tmp_path: Path) -> None:
+    folders = SubjectFolders(tmp_path)
+    write_json(folders.config / "subject.json", {"source": "multiface", "path": "somewhere"})
+    with pytest.raises(UserError, match="no truth between the frames"):
+        measure(folders, tmp_path / "work", "holdout", 2)
