@@ -14,15 +14,14 @@ from markupsafe import Markup
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage
-from facefolds_core.errors import UserError
 from facefolds_core.files import write_text
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
-from facefolds_core.reporting.facts import REMEDY, Facts, read_facts
+from facefolds_core.reporting.facts import Facts, read_facts
 from facefolds_core.reporting.measure import Measured, measure, radii, spacings
-from facefolds_core.scoring.evaluation import sheet_frames
+from facefolds_core.scoring.evaluation import frame_rate_factor, sheet_frames
 from facefolds_core.scoring.sheets import MAX_ERROR
 
 REPORT_NAME = "report.html"
@@ -63,14 +62,7 @@ def gather(folders: SubjectFolders) -> Subject:
     if not (folders.scene / "scene.json").is_file():
         return Subject(facts, asset, None, None)
     scene = read_scene(folders.scene)
-    if scene.num_frames != asset.num_frames:
-        raise UserError(
-            "the asset and the scene have different numbers of frames",
-            file=folders.root,
-            expected=f"{scene.num_frames} frames, as in the scene",
-            found=f"{asset.num_frames} in the asset",
-            remedy=REMEDY,
-        )
+    frame_rate_factor(scene, asset)
     params = read_stage(EvaluateParams, folders.config) if "evaluate" in facts.config else EvaluateParams()
     pairs = chosen_pairs(scene, params.sheet_frames)
     return Subject(facts, asset, scene, measure(scene, asset, pairs, params.background) if pairs else None)

@@ -15,6 +15,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 from facefolds_core.rendering.reference import Mesh, Texture, sample_texture
+from facefolds_core.scoring.evaluation import frame_rate_factor
 from facefolds_core.scoring.metrics import Array, psnr, shown
 
 VISIBLE = 1 / 255
@@ -85,7 +86,8 @@ def measure(
     """
     truths, masks = scene.open_frames(), scene.open_masks()
     caster, meshes = AssetCaster(asset), [EmbreeMesh(layer.vertices, layer.faces) for layer in asset.layers]
-    textures = {k: asset.frame(k) for k in sorted({k for _, k in pairs})}
+    factor = frame_rate_factor(scene, asset)
+    textures = {k: asset.frame(k * factor) for k in sorted({k for _, k in pairs})}
     sums, views = Sums(asset.num_layers), []
     for index in dict.fromkeys(camera for camera, _ in pairs):
         camera = scene.cameras[index]

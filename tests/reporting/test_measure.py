@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from facefolds_core.rendering import AssetCaster, Hits
+from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.intersection import EmbreeMesh
 from facefolds_core.reporting.build import MOST_PIXELS, chosen_pairs
 from facefolds_core.reporting.measure import Sums, measure, radii, spacings, view_angles, weights
 from facefolds_core.reporting.tables import place_of
+from facefolds_core.scoring.metrics import shown
 from tests.assets import CENTRE, cap_mesh, make_asset, radius_of
 from tests.scenes import look_at_origin, make_scene
 
@@ -116,6 +117,15 @@ def test_measured_of_an_asset(tmp_path: Path) -> None:
     assert found.masked
     assert sum(found.contribution) == pytest.approx(1)
     assert sum(one.share for one in found.angles) + found.bare.share == pytest.approx(1)
+
+
+def test_of_frames_between_frames_the_captures_own_are_measured(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path / "scene", frames=3)
+    make_asset(tmp_path / "asset", layers=2, frames=6, resolution=32)
+    asset = read_asset(tmp_path / "asset")
+    view = measure(scene, asset, [(3, 2)], (0, 0, 0)).views[0]
+    rgb, _ = composite(AssetCaster(asset).cast(scene.cameras[3]), asset.frame(4))
+    np.testing.assert_array_equal(view.image, shown(rgb))
 
 
 def test_large_pictures_are_fewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
