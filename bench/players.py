@@ -145,10 +145,10 @@ def prepare(
     flat = len(level.layers[layers - 1 - middle].faces)  # innermost first in the GLB
     rows = [Row(f"one opaque mesh, {flat:,} triangles", "mesh", f"layer={middle}")]
     for folder, count in zip(("few", "many"), counts, strict=True):
-        rows.append(Row(f"ours, {layers} x {count // layers:,} triangles", "ours", f"asset={folder}", both))
+        rows.append(Row(f"ours, {layers} x {count // layers:,} triangles", "ours", f"asset={folder}"))
     triangles = sum(len(mesh.faces) for mesh in full.layers)
     text = f"ours as it ships, {full.num_layers} x {triangles // full.num_layers:,} triangles"
-    rows.append(Row(text, "ours", "asset=default", both))
+    rows.append(Row(text, "ours", "asset=default", ("draw", "play")))
     for count in splats:
         (heads / f"{count}.splat").write_bytes(sample_splats(full, count).tobytes())
         rows.append(Row(f"{count:,} splats", "splats", f"file={count}.splat"))
