@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering import AssetCaster, composite
 from tests.scenes import look_at_origin
@@ -29,7 +30,7 @@ def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
 
 
 def expected_pictures(
-    asset: Asset, cameras: Sequence[Camera], frames: Sequence[int], background: float = GREY_VALUE
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], background: float = GREY_VALUE
 ) -> dict[tuple[str, int], NDArray[np.float32]]:
     """The reference renderer's pictures over grey, by camera's name and frame: (H, W, 3) in [0, 1]."""
     caster = AssetCaster(asset)
