@@ -1,8 +1,8 @@
 """Pictures a second in a browser: `python -m bench.players data/actor/asset`.
 
 Ours at few and at many triangles, a Gaussian-splat player from npm with splats of the same head, and one opaque mesh as
-the floor: in one browser, one after the other, from the same cameras. A picture's time runs until its pixels can be
-read back; nothing waits for a screen. Also: time and bytes to the first picture, and memory.
+the floor: in the same browser, one after the other, from the same cameras. A picture's time runs until its pixels can
+be read back; nothing waits for a screen. Also: time and bytes to the first picture, and memory.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class Loading:
         bytes: all that was fetched, scripts included, unpacked sizes.
         code_bytes: scripts and decoders thereof.
         computed_gpu_bytes: what the player says it keeps; None for others.
-        measured_bytes: how much the drawing process has grown, after a few pictures; None where it cannot be known.
+        measured_bytes: of the drawing process after a few pictures; None where it cannot be known. Most of it is the
+            browser's own: the difference to the floor's is what counts.
     """
 
     row: str
@@ -158,19 +159,19 @@ def prepare(
 def measure(
     address: str, rows: Sequence[Row], sizes: Sequence[tuple[int, int]], pictures: int, shots: Path | None
 ) -> Measured:
-    """All rows, one after the other, in one browser."""
+    """All rows, one after the other, each in a browser started anew: what one leaves in memory is not the next's."""
     timings: list[Timing] = []
     loadings: list[Loading] = []
-    device = ""
-    with chromium() as browser:
-        for row in rows:
+    version = device = ""
+    for row in rows:
+        with chromium() as browser:
             loading, more = measure_row(browser, address, row, sizes, pictures, shots)
-            loadings.append(loading)
-            timings += more
-            device = loading.device
-            for t in more:
-                typer.echo(f"players: {t.row}, {t.kind}, {t.width}x{t.height}: {t.milliseconds:.0f} ms")
-        return Measured(browser.version, device, loadings, timings)
+            version, device = browser.version, loading.device
+        loadings.append(loading)
+        timings += more
+        for t in more:
+            typer.echo(f"players: {t.row}, {t.kind}, {t.width}x{t.height}: {t.milliseconds:.0f} ms")
+    return Measured(version, device, loadings, timings)
 
 
 def measure_row(
@@ -184,14 +185,13 @@ def measure_row(
     said: list[str] = []
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
-    before = processes.gpu_memory()
     page.goto(f"{address}{row.page}.html?{row.query}")
     try:
         page.wait_for_function("() => window.loaded", timeout=PATIENCE)
     except Exception as error:
         raise UserError(f"the page of {row.name} did not come up", found="; ".join([*said, str(error)])[:600]) from None
     timings = [measure_size(page, processes, row, kind, size, pictures) for size in sizes for kind in row.kinds]
-    loading = describe_loading(page, row, processes.gpu_memory(), before)
+    loading = describe_loading(page, row, processes.gpu_memory())
     if shots:
         page.set_viewport_size({"width": sizes[0][0], "height": sizes[0][1]})
         page.evaluate("measure('draw', 2)")
@@ -212,7 +212,7 @@ def measure_size(page: Page, processes: Processes, row: Row, kind: str, size: tu
     return Timing(row.name, kind, *size, pictures, float(np.median(times)), spent)
 
 
-def describe_loading(page: Page, row: Row, after: int | None, before: int | None) -> Loading:
+def describe_loading(page: Page, row: Row, memory: int | None) -> Loading:
     entries: list[dict[str, Any]] = page.evaluate(
         "performance.getEntriesByType('resource').map((e) => ({ name: e.name, bytes: e.decodedBodySize }))"
     )
@@ -220,7 +220,6 @@ def describe_loading(page: Page, row: Row, after: int | None, before: int | None
     events = page.evaluate("window.loaded")
     picture = events.pop("picture")
     computed = page.evaluate("document.querySelector('facefolds-player')?.statistics.gpuBytes ?? null")
-    grown = after - before if after is not None and before is not None else None
     return Loading(
         row.name,
         page.evaluate("window.device"),
@@ -228,7 +227,7 @@ def describe_loading(page: Page, row: Row, after: int | None, before: int | None
         sum(entry["bytes"] for entry in entries),
         code,
         computed,
-        grown,
+        memory,
     )
 
 
@@ -269,7 +268,7 @@ def loading_table(loadings: Sequence[Loading]) -> str:
         "all MiB",
         "scripts MiB",
     ]
-    memory = ["GPU MiB, computed", "drawing process grew by MiB"]
+    memory = ["GPU MiB, computed", "drawing process, MiB"]
     lines = ["| | " + " | ".join([*heads, *memory]) + " |", "|---" * (1 + len(heads) + len(memory)) + "|"]
     for entry in loadings:
         times = [
@@ -290,7 +289,7 @@ def main(
     sizes: Annotated[str, typer.Option(help="Of the pictures.")] = "1280x720,2560x1440",
     pictures: Annotated[int, typer.Option(help="Pictures a measurement.", min=1)] = 8,
     shots: Annotated[Path | None, typer.Option(help="Folder for a picture of each page, to look at.")] = None,
-    out: Annotated[Path, typer.Option(help="JSON to write.")] = Path("bench/results/players.json"),
+    out: Annotated[Path, typer.Option(help="JSON to write.")] = Path("data/players.json"),
 ) -> None:
     """Compare players of the same head in one browser."""
     with report_user_errors("players"), tempfile.TemporaryDirectory() as temporary:
