@@ -284,7 +284,7 @@ def loading_table(loadings: Sequence[Loading]) -> str:
 def main(
     asset: Annotated[Path, typer.Argument(help="Folder of an asset with several levels of detail.")],
     few: Annotated[str, typer.Option(help="Level whose meshes are drawn as they are, and subdivided.")] = "medium",
-    subdivisions: Annotated[int, typer.Option(help="Each cuts a triangle into 4.")] = 4,
+    subdivisions: Annotated[int, typer.Option(help="Each cuts a triangle into 4.", min=1)] = 4,
     splats: Annotated[str, typer.Option(help="Numbers of splats.")] = "100000,300000",
     sizes: Annotated[str, typer.Option(help="Of the pictures.")] = "1280x720,2560x1440",
     pictures: Annotated[int, typer.Option(help="Pictures a measurement.", min=1)] = 8,
