@@ -54,4 +54,4 @@ blender: .venv-blender/.installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-blender viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock
+	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock
