@@ -4,15 +4,17 @@
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
+# make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
 # make clean   remove the environment and all results
 
 PYTHON ?= python3
 VENV   ?= .venv
+BLENDER_PYTHON ?= python3.11
 BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint bench clean
+.PHONY: repro test view report lint bench blender clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -47,5 +49,13 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/python -m stages.doctor
 	@touch $(READY)
 
+blender: .venv-blender/.installed
+
+.venv-blender/.installed: engines/blender/requirements.txt
+	@command -v $(BLENDER_PYTHON) >/dev/null || { echo "bpy needs Python 3.11: install it, or give make blender BLENDER_PYTHON=..."; exit 1; }
+	$(BLENDER_PYTHON) -m venv .venv-blender
+	.venv-blender/bin/python -m pip install --quiet --requirement engines/blender/requirements.txt
+	@touch $@
+
 clean:
-	rm -rf $(VENV) viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock
+	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock

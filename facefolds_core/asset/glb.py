@@ -1,6 +1,8 @@
 """One frame of an asset as a binary glTF 2.0 file (GLB), for programs that know nothing of the asset format.
 
-A node, mesh, material and PNG for each layer: KHR_materials_unlit, alphaMode BLEND, double-sided, edges clamped. The
+A node, mesh, material and PNG for each layer: KHR_materials_unlit, alphaMode BLEND, edges clamped. Programs blend every
+crossing of a sheet, where the format counts the nearest one: so backs are left out (not double-sided), and plain meshes
+list their triangles from the back to the front, as seen from before the face. Draco keeps the asset's own order. The
 root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x, y, z) -> (y, z, x). Nodes are listed
 from the innermost layer to the outermost: viewers draw blended objects at one distance in that order.
 
@@ -63,7 +65,7 @@ class Builder:
 
     def primitive(self, mesh: TexturedMesh, draco: bytes | None) -> dict[str, Any]:
         """A layer's triangles, plain or as the asset's own Draco bytes."""
-        indices = mesh.faces.astype("<u4").ravel()
+        indices = _back_to_front(mesh).astype("<u4").ravel()
         arrays = (("POSITION", "VEC3", mesh.vertices), ("TEXCOORD_0", "VEC2", mesh.st))
         attributes = {}
         for name, kind, values in arrays:
@@ -136,10 +138,16 @@ def _material(name: str, texture: int) -> dict[str, Any]:
     return {
         "name": name,
         "alphaMode": "BLEND",
-        "doubleSided": True,
+        "doubleSided": False,
         "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}, "metallicFactor": 0.0, "roughnessFactor": 1.0},
         "extensions": {UNLIT: {}},
     }
+
+
+def _back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
+    """The faces, farthest from a viewer before the face (+x) first: nearer folds of a sheet are drawn over farther."""
+    depth = mesh.vertices[mesh.faces, 0].mean(1)
+    return mesh.faces[np.argsort(depth, kind="stable")]
 
 
 def _png(texture: NDArray[np.uint8]) -> bytes:

@@ -84,6 +84,18 @@ def test_a_frame_that_is_not_there(asset: Asset, tmp_path: Path) -> None:
         write_glb(tmp_path / "a.glb", asset.full, "caps", frame=3)
 
 
+def test_backs_are_left_out_and_triangles_come_from_the_back_to_the_front(asset: Asset, tmp_path: Path) -> None:
+    write_glb(tmp_path / "a.glb", asset.full, "caps")
+    document, binary = opened(tmp_path / "a.glb")
+    assert not any(material.get("doubleSided") for material in document["materials"])
+    for place, layer in enumerate(reversed(asset.layers)):
+        (primitive,) = document["meshes"][place]["primitives"]
+        view = document["accessors"][primitive["indices"]]["bufferView"]
+        faces = np.frombuffer(part(document, binary, view), "<u4").reshape(-1, 3)
+        assert (np.diff(layer.vertices[faces, 0].mean(1)) >= 0).all()
+        assert sorted(map(tuple, faces)) == sorted(map(tuple, layer.faces))
+
+
 @pytest.mark.parametrize("draco", [False, True])
 def test_khronos_validator(asset: Asset, tmp_path: Path, draco: bool) -> None:
     if shutil.which("node") is None or not (ROOT / "node_modules" / "gltf-validator").is_dir():

@@ -125,7 +125,7 @@ def test_of_frames_between_frames_the_captures_own_are_measured(tmp_path: Path) 
     asset = read_asset(tmp_path / "asset")
     view = measure(scene, asset, [(3, 2)], (0, 0, 0)).views[0]
     rgb, _ = composite(AssetCaster(asset).cast(scene.cameras[3]), asset.frame(4))
-    np.testing.assert_array_equal(view.image, shown(rgb))
+    np.testing.assert_array_equal(view.asset, shown(rgb))
 
 
 def test_large_pictures_are_fewer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Assets for the player's tests, made once a session, and what the reference renderer shows of them."""
+"""Assets for the player's tests, made once a session."""
 
 from __future__ import annotations
 
@@ -14,33 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset import Asset
 from facefolds_core.asset.manifest import Manifest, parse_manifest, write_manifest
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CompressParams, VideoCodec
-from facefolds_core.rendering import AssetCaster, composite
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
 
 THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, keyframe_interval=4))
-GREY = "#7f7f7f"
-GREY_VALUE = 127 / 255
-
-
-def five_cameras(size: int) -> list[Camera]:
-    """Frontal, 45 degrees to both sides, from above, grazing."""
-    places = {"front": (0, 0), "left": (45, 0), "right": (-45, 10), "above": (15, 40), "grazing": (80, 5)}
-    return [look_at_origin(name, azimuth, elevation, size) for name, (azimuth, elevation) in places.items()]
-
-
-def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
-    error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
-    return -10 * np.log10(max(error, 1e-12))
-
-
-def reference(asset: Asset, camera: Camera, frame: int, background: float = GREY_VALUE) -> NDArray[np.float32]:
-    """The reference renderer's picture over grey."""
-    return composite(AssetCaster(asset).cast(camera), asset.frame(frame), (background,) * 3)[0]
 
 
 def file_entry(path: Path) -> dict[str, Any]:

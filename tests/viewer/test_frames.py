@@ -11,8 +11,9 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.rendering import AssetCaster, composite
 from tests.assets import make_asset
+from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
 from tests.viewer.conftest import NewPlayer, Player
-from tests.viewer.fixtures import GREY, GREY_VALUE, change_manifest, five_cameras, psnr
+from tests.viewer.fixtures import change_manifest
 
 CAMERA = five_cameras(64)[0]
 NO_WEBCODECS = "delete globalThis.VideoDecoder"

@@ -13,8 +13,8 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
 from tests.assets import make_asset
+from tests.pictures import GREY, GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NewPlayer
-from tests.viewer.fixtures import GREY, GREY_VALUE, five_cameras, psnr, reference
 
 SIZE = 160
 AGREE = 40.0
@@ -33,15 +33,13 @@ def check(new_player: NewPlayer, asset: Asset, allow: float = AGREE, script: str
     player = new_player({"asset": asset.folder}, script=script)
     player.open("asset")
     player.run("e.background = v; e.effects = false", GREY)
-    caster = AssetCaster(asset)
-    hits = [caster.cast(camera) for camera in five_cameras(SIZE)]
-    for frame in (0, asset.num_frames // 2, asset.num_frames - 1):
-        textures = asset.frame(frame)
+    cameras, frames = five_cameras(SIZE), (0, asset.num_frames // 2, asset.num_frames - 1)
+    expected = expected_pictures(asset, cameras, frames)
+    for frame in frames:
         assert player.run("return await e.seek(v)", frame)
-        for camera, hit in zip(five_cameras(SIZE), hits, strict=True):
-            expected = composite(hit, textures, (GREY_VALUE,) * 3)[0]
+        for camera in cameras:
             found = player.capture(camera)[..., :3]
-            assert psnr(found, expected) >= allow, (camera.name, frame)
+            assert psnr(found, expected[camera.name, frame]) >= allow, (camera.name, frame)
 
 
 def test_five_cameras_and_three_frames_agree_with_the_reference(new_player: NewPlayer, caps: Asset) -> None:
@@ -86,6 +84,6 @@ def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> No
     expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added_colours(hits, to_eye(camera), maps))
     assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
     player.run("e.effects = false")
-    plain = reference(asset, camera, 0)
+    plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
     assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
     assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test

@@ -11,7 +11,7 @@ import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, VERTEX, WIRE_FRAGMENT } from "./shader
 
 THREE.ColorManagement.enabled = false;
 
-const SPREAD = { step: 0.35, all: 2 }; // units from layer to layer when fully pulled apart, and at most from end to end
+const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
 
 export class LayerRenderer {
   /** @param {HTMLCanvasElement} canvas @throws {PlayerError} if there is no WebGL 2 */

@@ -1,0 +1,28 @@
+// The floor: one opaque textured mesh, a layer of the asset's GLB. ?layer=NUMBER
+import * as THREE from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { offer, position } from "./common.js";
+
+const wanted = Number(new URLSearchParams(location.search).get("layer"));
+const renderer = new THREE.WebGLRenderer({ antialias: false });
+renderer.setSize(innerWidth, innerHeight);
+document.body.append(renderer.domElement);
+const camera = new THREE.PerspectiveCamera(30, innerWidth / innerHeight, 0.01, 10);
+const { scene } = await new GLTFLoader().loadAsync("/heads/head.glb");
+const layers = [];
+scene.traverse((node) => node.isMesh && layers.push(node));
+layers.forEach((layer, i) => (layer.visible = i === wanted));
+Object.assign(layers[wanted].material, { transparent: false, depthWrite: true });
+addEventListener("resize", () => {
+  renderer.setSize(innerWidth, innerHeight);
+  camera.aspect = innerWidth / innerHeight;
+  camera.updateProjectionMatrix();
+});
+const draw = (degrees) => {
+  const [x, y, z] = position(degrees);
+  camera.position.set(y, z, x); // glTF's axes
+  camera.lookAt(0, 0, 0);
+  renderer.render(scene, camera);
+};
+draw(0);
+offer(renderer.getContext(), { draw });

@@ -1,0 +1,76 @@
+"""How near an engine comes to the reference on an asset: the figures and pictures of docs/engines.md.
+
+python -m tests.engines.agreement blender data/actor/asset --picture docs/images/blender.jpg
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.glb import write_glb
+from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.engines.godot import write_godot
+from facefolds_core.geometry.cameras import Camera
+from stages.render import pick_level
+from tests.engines import blender, godot
+from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
+
+Found = dict[tuple[str, int], NDArray[np.float64]]
+SHOWN = ("front", "left", "grazing")
+PANE, ZOOM = 360, 1.6
+"""Of the picture: pixels, and how much nearer than `five_cameras` it looks."""
+
+
+def in_blender(level: AssetLevel, cameras: list[Camera], frames: list[int], place: Path) -> Found:
+    found: Found = {}
+    for frame in frames:
+        write_glb(place / "head.glb", level, "head", frame)
+        pictures = blender.pictures(place / "head.glb", cameras, GREY_VALUE)
+        found |= {(name, frame): picture for name, picture in pictures.items()}
+    return found
+
+
+def in_godot(level: AssetLevel, cameras: list[Camera], frames: list[int], place: Path) -> Found:
+    write_godot(place / "asset", level, "head")
+    return godot.pictures(place / "asset", cameras, frames, GREY_VALUE)
+
+
+def main(
+    engine: Annotated[Literal["blender", "godot"], typer.Argument()],
+    asset: Annotated[Path, typer.Argument(help="Folder of the asset.")],
+    size: Annotated[int, typer.Option(help="Pixels of a side.")] = 320,
+    level: Annotated[str | None, typer.Option(help="Level of detail; the full one if left out.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="JPEG to write: front, 45 degrees, side.")] = None,
+) -> None:
+    """PSNR to the reference, five cameras, first, middle and last frame."""
+    whole = read_asset(asset)
+    shown = pick_level(whole, level)
+    render = {"blender": in_blender, "godot": in_godot}[engine]
+    cameras, frames = five_cameras(size), sorted({0, whole.num_frames // 2, whole.num_frames - 1})
+    with tempfile.TemporaryDirectory() as place:
+        found = render(shown, cameras, frames, Path(place))
+    expected = expected_pictures(shown, cameras, frames)
+    for camera in cameras:
+        scores = [psnr(found[camera.name, frame], expected[camera.name, frame]) for frame in frames]
+        typer.echo(f"{engine} {camera.name:8s} " + " ".join(f"{score:.1f}" for score in scores) + " dB")
+    if picture:
+        zoom = np.diag([ZOOM, ZOOM, 1])
+        zoom[:2, 2] = (1 - ZOOM) * PANE / 2
+        near = [replace(camera, K=zoom @ camera.K) for camera in five_cameras(PANE) if camera.name in SHOWN]
+        with tempfile.TemporaryDirectory() as place:
+            found = render(shown, near, [0], Path(place))
+        strip = np.concatenate([found[name, 0] for name in SHOWN], 1)
+        Image.fromarray(np.uint8(np.rint(255 * strip))).save(picture, quality=88)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,31 @@
+"""The GLB in Blender against the reference renderer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.glb import write_glb
+from tests.assets import make_asset
+from tests.engines.blender import REMEDY, find_blender, pictures
+from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
+
+SIZE = 96
+FRAME = 1
+AGREE = 40.0
+"""dB. Seen: 48 and more."""
+
+
+@pytest.mark.parametrize("draco", [False, True])
+def test_five_cameras_agree_with_the_reference(tmp_path: Path, draco: bool) -> None:
+    if find_blender() is None:
+        pytest.skip(f"no Blender: {REMEDY}")
+    make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96)
+    asset, cameras = read_asset(tmp_path / "asset"), five_cameras(SIZE)
+    write_glb(tmp_path / "a.glb", asset.full, "caps", frame=FRAME, draco=draco)
+    found = pictures(tmp_path / "a.glb", cameras, GREY_VALUE)
+    expected = expected_pictures(asset, cameras, [FRAME])
+    scores = {name: psnr(picture, expected[name, FRAME]) for name, picture in found.items()}
+    assert min(scores.values()) >= AGREE, scores

@@ -1,0 +1,42 @@
+"""What players' pictures are compared with: five cameras, and what the reference renderer shows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.asset import Asset
+from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering import AssetCaster, composite
+from tests.scenes import look_at_origin
+
+GREY = "#7f7f7f"
+GREY_VALUE = 127 / 255
+
+
+def five_cameras(size: int) -> list[Camera]:
+    """Frontal, 45 degrees to both sides, from above, grazing."""
+    places = {"front": (0, 0), "left": (45, 0), "right": (-45, 10), "above": (15, 40), "grazing": (80, 5)}
+    return [look_at_origin(name, azimuth, elevation, size) for name, (azimuth, elevation) in places.items()]
+
+
+def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
+    error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
+    return -10 * np.log10(max(error, 1e-12))
+
+
+def expected_pictures(
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], background: float = GREY_VALUE
+) -> dict[tuple[str, int], NDArray[np.float32]]:
+    """The reference renderer's pictures over grey, by camera's name and frame: (H, W, 3) in [0, 1]."""
+    caster = AssetCaster(asset)
+    hits = {camera.name: caster.cast(camera) for camera in cameras}
+    return {
+        (name, frame): composite(hit, textures, (background,) * 3)[0]
+        for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
+        for name, hit in hits.items()
+    }
