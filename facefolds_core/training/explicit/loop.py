@@ -167,7 +167,6 @@ class _Trainer:
             if self._attempt(level, number, live, bar):
                 return
             self.state.restore(saved)
-            self.state.steps[:] = 0
             self.rate /= 3
             self.events.append(f"level {number}: diverged, begun again with learning rate {self.rate:.3g}")
             bar.write(f"train: {self.events[-1]}")
@@ -264,6 +263,7 @@ class _Trainer:
         """The model, without the layers that show nothing."""
         assert self.state is not None
         state, n = self.state, self.params.layers
+        state.forget_moments()
         assert self.views is not None
         hidden = (state.contributions(self.views, self._stride()) < LEAST) | state.beside(BESIDE)
         state.hide(hidden)

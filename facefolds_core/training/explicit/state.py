@@ -211,16 +211,26 @@ class TextureState:
         self.frame_alpha[0] = torch.where(unseen, 0.0, self.frame_alpha[0])
 
     def snapshot(self) -> list[Tensor]:
-        return [x.clone() for x in self._all()]
+        """Copies of the values, for `restore`; of the moments there are none, which would triple them."""
+        return [x.clone() for x in self._values()]
 
     def restore(self, saved: list[Tensor]) -> None:
-        for tensor, value in zip(self._all(), saved, strict=True):
+        """The values of a `snapshot`; moments and steps start afresh."""
+        for tensor, value in zip(self._values(), saved, strict=True):
             tensor.copy_(value)
+        for tensor in (self.colour, self.layers, self.frame_colour, self.frame_alpha):
+            tensor[1:].zero_()
+        self.steps[:] = 0
         if self.device.type == "cpu":
             self.gradient.zero_()
 
-    def _all(self) -> list[Tensor]:
-        return [self.colour, self.layers, self.frame_colour, self.frame_alpha, self.background]
+    def forget_moments(self) -> None:
+        """Give their memory back, two thirds of the grids'; no `step` can follow."""
+        self.colour, self.layers = self.colour[:1].clone(), self.layers[:1].clone()
+        self.frame_colour, self.frame_alpha = self.frame_colour[:1].clone(), self.frame_alpha[:1].clone()
+
+    def _values(self) -> list[Tensor]:
+        return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0], self.background]
 
 
 def _with_moments(values: Tensor) -> Tensor:
