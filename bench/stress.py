@@ -1,7 +1,7 @@
 """Where methods fail: hazards in three strengths, measured as what they cost on clean held-out views of the actor.
 
 Every cell is a training; what is measured is kept in bench/results/stress.json as soon as it is there, and what is
-there is not measured again. Then a heat map, pictures of the worst cells, and tables for docs/limits.md.
+there is not measured again. Then a heat map, pictures of the worst cells, and the tables in docs/limits.md.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from bench.stress_cells import CUT, RESULTS, Cell, keep_cell, plan_cells, read_c
 from bench.stress_draw import draw_heat_map, draw_worst
 from bench.stress_tables import table
 from facefolds_core.errors import report_user_errors
+from facefolds_core.files import write_text
 
 HEAT_MAP = Path("docs/images/stress.png")
 WORST = Path("docs/images/stress_worst.jpg")
+PAGE = Path("docs/limits.md")
+START, END = "<!-- written by bench/stress.py -->", "<!-- end of what bench/stress.py writes -->"
 SEEDS = {"fast": 3, "paper": 1}
 """Of each preset, without --seeds: with these the matrix takes less than an hour on two idle cores."""
 
@@ -31,6 +34,12 @@ def describe(cell: Cell) -> str:
     return f"{what}: {cell.inner:.2f} dB after {cell.seconds:.1f} s" + ("" if cell.converged else ", not converged")
 
 
+def write_between(page: Path, text: str) -> None:
+    """Replace what stands between START and END."""
+    head, rest = page.read_text(encoding="utf-8").split(START)
+    write_text(page, f"{head}{START}\n{text}\n{END}{rest.split(END)[1]}")
+
+
 def main(
     only: Annotated[str, typer.Option(help="Rows, comma-separated: the keys in bench/stress_hazards.py.")] = "",
     presets: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(CUT),
@@ -40,7 +49,7 @@ def main(
     data: Annotated[Path, typer.Option(help="Folder for films and pictures.")] = Path("data/actor/bench/stress"),
     results: Annotated[Path, typer.Option(help="File that cells are added to.")] = RESULTS,
 ) -> None:
-    """Measure the matrix, draw it, print its tables."""
+    """Measure the matrix, draw it, print its tables and write them into docs/limits.md."""
     with report_user_errors("stress"):
         chosen = words(presets)
         wanted = {preset: seeds or SEEDS.get(preset, 1) for preset in chosen}
@@ -51,8 +60,10 @@ def main(
             keep_cell(results, cell)
             typer.echo(f"stress: {describe(cell)}")
         cells = read_cells(results)
-        typer.echo("\n" + table(cells, chosen))
-        draw_heat_map(cells, chosen, HEAT_MAP)
+        text = table(cells, list(CUT))
+        typer.echo(f"\n{text}")
+        write_between(PAGE, text)
+        draw_heat_map(cells, [preset for preset in CUT if any(c.preset == preset for c in cells)], HEAT_MAP)
         draw_worst(cells, "fast", data / "pictures", WORST)
 
 
