@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from bench.results import commit_name
 from bench.runs import check_train_params
 from bench.stress_film import Shots, held_out, shoot, training, write_shots
-from bench.stress_hazards import HAZARDS, Hazard, usual_values
+from bench.stress_hazards import HAZARDS, Hazard
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
@@ -164,9 +164,8 @@ def run_cell(blank: Cell, cache: Path, pictures: Path) -> Cell:
     """
     hazard = next((h for h in HAZARDS if h.key == blank.hazard), CLEAN)
     shots, truth = disturbed(hazard, blank.strength, blank.seed, cache)
-    usual = {**usual_values(blank.preset), **CUT[blank.preset]}
-    values = {**CUT[blank.preset], **hazard.train(blank.preset, blank.strength, usual)}
-    params = check_train_params({"preset": blank.preset, "seed": blank.seed, "device": "cpu", **values})
+    values = {"preset": blank.preset, "seed": blank.seed, "device": "cpu", **CUT[blank.preset]}
+    params = check_train_params({**values, **hazard.train(check_train_params(values), blank.strength)})
     found: dict[str, Any] = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit_name(Path(__file__).parent),

@@ -14,7 +14,7 @@ from facefolds_core.captures.actor import ActorOptions
 from facefolds_core.captures.frames import Image
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.presets import PRESETS
+from facefolds_core.params import TrainParams
 
 Random = np.random.Generator
 Disturb = Callable[[Shots, float, Random], Shots]
@@ -57,14 +57,10 @@ class Hazard:
     def label(self, strength: float) -> str:
         return self.unit.format(f"{strength:g}")
 
-    def train(self, preset: str, strength: float, usual: dict[str, float]) -> dict[str, float]:
-        """Values of `train` that differ; `usual` are the preset's."""
-        values = {}
-        if self.rate:
-            values[GEOMETRY_RATE[preset]] = strength * usual[GEOMETRY_RATE[preset]]
-        if self.spacing:
-            values["level_halfwidth"] = strength * usual["level_halfwidth"]
-        return values
+    def train(self, usual: TrainParams, strength: float) -> dict[str, float]:
+        """Values of `train` that differ from the usual ones."""
+        keys = [GEOMETRY_RATE[usual.preset]] if self.rate else ["level_halfwidth"] if self.spacing else []
+        return {key: strength * getattr(usual, key) for key in keys}
 
 
 def fewer_cameras(shots: Shots, count: float, random: Random) -> Shots:
@@ -196,8 +192,3 @@ HAZARDS: tuple[Hazard, ...] = (
     ),
 )
 """All rows but the extreme views, which are the clean case seen from elsewhere."""
-
-
-def usual_values(preset: str) -> dict[str, float]:
-    """The preset's numbers that hazards multiply."""
-    return {"lr_volume": 0.0, **{k: v for k, v in PRESETS[preset].items() if isinstance(v, int | float)}}
