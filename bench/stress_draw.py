@@ -19,10 +19,14 @@ from facefolds_core.files import atomic_file
 DARKEST = 8.0
 """dB at which the colour is darkest."""
 
-COLOURS = LinearSegmentedColormap.from_list("loss", ["#4f9d8b", "#f7f5f0", "#f2b872", "#d1495b", "#5c1a33"])
-GREY = "#8a8a94"
+COLOURS = LinearSegmentedColormap.from_list(
+    "loss", [(0.0, "#4f9d8b"), (0.5, "#f4f1e8"), (0.64, "#f2b872"), (0.82, "#d1495b"), (1.0, "#5c1a33")]
+)
+GREY, EMPTY = "#8a8a94", "#f4f4f6"
 NAMES = ("weak", "middle", "strong")
 WORST = 8
+LEAST = 0.5
+"""dB; rows that lose less are not shown."""
 
 
 def draw_heat_map(cells: Sequence[Cell], presets: Sequence[str], path: Path) -> None:
@@ -35,7 +39,7 @@ def draw_heat_map(cells: Sequence[Cell], presets: Sequence[str], path: Path) -> 
             for place, strength in enumerate(hazard.strengths):
                 loss = loss_of(cells, hazard, strength, preset)
                 value = None if loss is None else loss.mean
-                colour = GREY if loss is not None and value is None else "#ffffff"
+                colour = GREY if loss is not None and value is None else EMPTY
                 if value is not None:
                     colour = COLOURS(norm(min(value, DARKEST)))
                 _field(axes, 3.15 * block + place, row, colour, cell_text(loss), hazard.label(strength), value)
@@ -52,7 +56,7 @@ def draw_heat_map(cells: Sequence[Cell], presets: Sequence[str], path: Path) -> 
         axes.text(3.15 * block + 1.5, -0.95, text, ha="center", fontsize=10, weight="bold")
     for spine in axes.spines.values():
         spine.set_visible(False)
-    axes.set_title("dB lost on clean held-out views, against the clean case", fontsize=11, pad=26)
+    axes.set_title("dB lost on clean held-out views, against the clean case", fontsize=11, pad=42)
     axes.set_xlabel("* a seed did not converge or failed;  failed: none ended;  -: not measured", fontsize=8)
     with atomic_file(path) as temporary:
         figure.savefig(temporary, dpi=110, format="png")
@@ -62,20 +66,25 @@ def _field(axes: Axes, x: float, y: float, colour: object, text: str, label: str
     axes.add_patch(Rectangle((x, y), 1, 1, facecolor=colour, edgecolor="white", lw=1.5))  # type: ignore[arg-type]
     ink = "white" if value is not None and value > 3.5 else "#222222"
     axes.text(x + 0.5, y + 0.4, text, ha="center", va="center", fontsize=9, color=ink)
-    axes.text(x + 0.5, y + 0.79, label, ha="center", va="center", fontsize=5.5, color=ink)
+    axes.text(x + 0.5, y + 0.8, label, ha="center", va="center", fontsize=6, color=ink)
 
 
 def draw_worst(cells: Sequence[Cell], preset: str, pictures: Path, path: Path) -> None:
-    """Truth, clean case and hazard at its strong strength, of the rows that lose most at seed 0; their worst view
-    inside the rig."""
+    """Truth, clean case and hazard, of the rows that lose most at seed 0, each at the strongest strength that was
+    measured; the worst view inside the rig."""
     clean = next((c for c in cells if c.key == (CLEAN.key, 0.0, preset, 0)), None)
-    found = {c.key: c for c in cells if c.views and c.seed == 0 and c.preset == preset}
-    strong = [found.get((h.key, h.strengths[2], preset, 0)) for h in ROWS]
-    ready = [c for c in strong if c is not None and strip_path(pictures, c).exists()]
-    if clean is None or clean.inner is None or not ready or not strip_path(pictures, clean).exists():
+    found = {c.key: c for c in cells if c.views and strip_path(pictures, c).exists()}
+    if clean is None or clean.inner is None or clean.key not in found:
+        return
+    ready, titles = [], {}
+    for hazard in ROWS:
+        measured = [c for s in hazard.strengths if (c := found.get((hazard.key, s, preset, 0)))]
+        if measured and clean.inner - (measured[-1].inner or 0.0) > LEAST:
+            ready.append(measured[-1])
+            titles[hazard.key] = f"{hazard.title}, {hazard.label(measured[-1].strength)}"
+    if not ready:
         return
     ready.sort(key=lambda c: c.inner or 0.0)
-    titles = {h.key: f"{h.title}, {h.label(h.strengths[2])}" for h in ROWS}
     columns = 2
     rows = -(-min(WORST, len(ready)) // columns)
     figure = Figure(figsize=(8.4, 2.45 * rows), layout="constrained")

@@ -55,7 +55,7 @@ class Hazard:
     spacing: bool = False
 
     def label(self, strength: float) -> str:
-        return self.unit.format(f"{strength:g}")
+        return self.unit.format(f"{strength:.3g}")
 
     def train(self, usual: TrainParams, strength: float) -> dict[str, float]:
         """Values of `train` that differ from the usual ones."""

@@ -98,7 +98,10 @@ def table(cells: Sequence[Cell], presets: Sequence[str]) -> str:
             f"`{preset}`: clean {np.mean(values):.2f} dB (seeds {', '.join(f'{v:.2f}' for v in values)}; a flat "
             f"silhouette has {clean[0].flat:.2f}); {np.mean(seconds):.0f} s of processor time a training. dB lost:"
         )
-        lines = ["| | weak | middle | strong | seeds | worst view at strong |", "|---|---|---|---|---|---|"]
+        lines = [
+            "| | weak | middle | strong | seeds | worst view, at the strongest measured |",
+            "|---|---|---|---|---|---|",
+        ]
         lines += [line for hazard in ROWS if (line := _line(cells, hazard, preset))]
         parts.append("\n".join(lines))
     if not parts:
