@@ -8,13 +8,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
+from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from bench.stress_cells import CLEAN, Cell, strip_path
 from bench.stress_tables import ROWS, cell_text, loss_of
 from facefolds_core.files import atomic_file
+
+Colour = tuple[float, float, float, float]
 
 DARKEST = 8.0
 """dB at which the colour is darkest."""
@@ -39,9 +41,9 @@ def draw_heat_map(cells: Sequence[Cell], presets: Sequence[str], path: Path) -> 
             for place, strength in enumerate(hazard.strengths):
                 loss = loss_of(cells, hazard, strength, preset)
                 value = None if loss is None else loss.mean
-                colour = GREY if loss is not None and value is None else EMPTY
+                colour = to_rgba(GREY if loss is not None and value is None else EMPTY)
                 if value is not None:
-                    colour = COLOURS(norm(min(value, DARKEST)))
+                    colour = COLOURS(float(norm(min(value, DARKEST))))
                 _field(axes, 3.15 * block + place, row, colour, cell_text(loss), hazard.label(strength), value)
     ends = 3.15 * (len(presets) - 1) + 3
     axes.set(xlim=(0, ends), ylim=(len(ROWS), 0), yticks=np.arange(len(ROWS)) + 0.5)
@@ -62,8 +64,8 @@ def draw_heat_map(cells: Sequence[Cell], presets: Sequence[str], path: Path) -> 
         figure.savefig(temporary, dpi=110, format="png")
 
 
-def _field(axes: Axes, x: float, y: float, colour: object, text: str, label: str, value: float | None) -> None:
-    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=colour, edgecolor="white", lw=1.5))  # type: ignore[arg-type]
+def _field(axes: Axes, x: float, y: float, colour: Colour, text: str, label: str, value: float | None) -> None:
+    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=colour, edgecolor="white", lw=1.5))
     ink = "white" if value is not None and value > 3.5 else "#222222"
     axes.text(x + 0.5, y + 0.4, text, ha="center", va="center", fontsize=9, color=ink)
     axes.text(x + 0.5, y + 0.8, label, ha="center", va="center", fontsize=6, color=ink)
@@ -104,7 +106,7 @@ def draw_worst(cells: Sequence[Cell], preset: str, pictures: Path, path: Path) -
 
 def panels(path: Path, place: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """(truth, model) of one view from a strip of `count`, (H, W, 3) uint8."""
-    strip = cv2.imread(str(path))[..., ::-1]
+    strip = np.asarray(cv2.imread(str(path)))[..., ::-1]
     height, width = strip.shape[0] // 2, strip.shape[1] // count
     part = strip[:, place * width : (place + 1) * width]
     return part[:height], part[height:]

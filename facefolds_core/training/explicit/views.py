@@ -91,7 +91,7 @@ class Images:
         """(C, H W, 3)."""
         images = [self.store.image(c, index) for c in self.cameras]
         if self.tables is not None:
-            images = [cv2.LUT(image, table) for image, table in zip(images, self.tables, strict=True)]
+            images = [cv2.LUT(image, table).astype(np.uint8) for image, table in zip(images, self.tables, strict=True)]
         return np.stack([image.reshape(-1, 3) for image in images])
 
 

@@ -213,7 +213,7 @@ def _rays(cameras: list[Camera], images: list[NDArray[np.uint8]], voxel: float) 
         small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
         colours.append(small.reshape(-1, 3).astype(np.float32) / 255)
         numbers.append(np.full(width * height, number, np.int32))
-    return _Rays(*(np.concatenate(parts) for parts in (origins, directions, colours, numbers)))
+    return _Rays(np.concatenate(origins), np.concatenate(directions), np.concatenate(colours), np.concatenate(numbers))
 
 
 def _occupied(density: Array) -> NDArray[np.bool_]:
