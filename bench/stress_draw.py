@@ -90,7 +90,10 @@ def draw_worst(cells: Sequence[Cell], preset: str, pictures: Path, path: Path) -
     columns = 2
     rows = -(-min(WORST, len(ready)) // columns)
     figure = Figure(figsize=(8.4, 2.45 * rows), layout="constrained")
-    for axes, cell in zip(figure.subplots(rows, columns, squeeze=False).ravel(), ready[:WORST], strict=False):
+    fields = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in fields[len(ready) :]:
+        axes.set_visible(False)
+    for axes, cell in zip(fields, ready[:WORST], strict=False):
         inner = [name for name in cell.views if name.startswith("A")]
         name = max(inner, key=lambda n: clean.views[n] - cell.views[n])
         place = list(cell.views).index(name)

@@ -25,7 +25,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
-from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, recentre
+from facefolds_core.training.explicit.fit import LEAST_RADIUS, ROUNDS, Fit, fit_scene, recentre
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Images, Views, trace_views
@@ -218,7 +218,9 @@ class _Trainer:
         radii = self.manifolds().radii().detach().double().numpy()
         moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
         start = torch.from_numpy(self.fit.middle).float()
-        self.middle = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
+        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        self.middle = moved.clamp(min=LEAST_RADIUS)
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
