@@ -31,7 +31,8 @@ SCENE_VERSION = 1
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
 
-Split = Literal["train", "holdout"]
+Split = Literal["train", "holdout", "out"]
+"""What a camera is for; "out" is nothing: a trainer does not believe it. No scene on disk has that."""
 _REMEDY = "run `dvc repro` to make the normalised scene again"
 
 

@@ -193,6 +193,39 @@ def test_gloss_can_be_turned_up() -> None:
     assert _seen_from_two_sides(gloss=3.0) > 1.5 * _seen_from_two_sides(gloss=1.0)
 
 
+def test_clutter_changes_the_room_and_nothing_else(rest: Picture) -> None:
+    picture = render(frontal(), 0.0, ActorOptions(clutter=1.0))
+    subject, room = rest.opacity == 1, rest.opacity == 0
+    assert np.array_equal(picture.rgb[subject], rest.rgb[subject])
+    assert np.abs(picture.rgb[room].astype(float) - rest.rgb[room]).mean() > 20
+    assert np.array_equal(picture.opacity, rest.opacity)
+
+
+def test_a_longer_nose_stands_out_by_as_much(rest: Picture) -> None:
+    longer = render(frontal(), 0.0, ActorOptions(nose=20.0))
+    # Seen from the front its tip comes nearer by all of it, and the rest of the face stays.
+    assert np.nanmin(rest.depth) - np.nanmin(longer.depth) == pytest.approx(20.0, abs=1.0)
+    assert np.mean(longer.depth[:30] != rest.depth[:30]) == 0
+    assert np.ptp(tracked_mesh(0.0, 20.0).vertices[:, 2]) - np.ptp(tracked_mesh(0.0).vertices[:, 2]) > 15
+
+
+def test_a_ball_before_the_mouth_is_a_disc_of_its_size(rest: Picture) -> None:
+    picture = render(frontal(), 0.0, ActorOptions(ball=20.0))
+    changed = (picture.depth < rest.depth - 5).sum()
+    camera = frontal()
+    pixel = (1000 - 168) / camera.K[0, 0]
+    assert changed * pixel**2 == pytest.approx(np.pi * 20**2, rel=0.15)
+    assert picture.opacity[picture.depth < rest.depth - 5].min() == 1
+
+
+def test_an_open_shutter_is_the_mean_of_sharp_pictures() -> None:
+    shutter = 0.04
+    blurred = render(frontal(), OPEN_MOUTH, ActorOptions(shutter=shutter))
+    times = OPEN_MOUTH + shutter * np.linspace(-0.5, 0.5, 5)
+    mean = np.mean([render(frontal(), float(t)).rgb for t in times], 0)
+    assert np.abs(blurred.rgb - mean).max() <= 0.51
+
+
 @pytest.mark.parametrize(("azimuth", "elevation"), [(180.0, 0.0), (90.0, -60.0), (-120.0, 80.0)])
 def test_any_viewpoint_gives_a_whole_head(azimuth: float, elevation: float) -> None:
     picture = render(camera_at("odd", azimuth, elevation, WIDTH, HEIGHT), 0.0)

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
 from facefolds_core.training.volume import fit, kernel, outline, reference
+from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
 from facefolds_core.training.volume.fit import Volume
 from tests.scenes import OPAQUE, make_scene
@@ -82,7 +83,7 @@ def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -
     grid = np.zeros((91, 91, 91, 4), np.float32)
     grid[..., 0] = (inside / 0.01 * 10).clip(-kernel.LIMIT, kernel.LIMIT)
     grid[..., 1] = 1
-    return Volume(grid, np.full(3, -0.45), 0.01, Environment(np.zeros(3, np.float32), 1.0), 0, 30.0)
+    return Volume(grid, np.full(3, -0.45), 0.01, Environment(np.zeros(3, np.float32), 1.0), 0, 30.0, CameraFit.alike(1))
 
 
 def test_profile_of_a_ball() -> None:

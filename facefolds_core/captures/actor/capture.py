@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
 from facefolds_core.captures.actor.motion import PERIOD, head_pose
 from facefolds_core.captures.actor.render import ActorOptions, Picture, render
-from facefolds_core.captures.actor.rig import make_rig
+from facefolds_core.captures.actor.rig import ActorRig, make_rig
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams
@@ -69,7 +69,11 @@ def _write_mesh(folder: Path, frame: str, mesh: TrackedMesh, head_to_world: NDAr
 
 
 def write_capture(
-    folder: str | Path, params: CaptureParams, progress: Progress | None = None, options: ActorOptions | None = None
+    folder: str | Path,
+    params: CaptureParams,
+    progress: Progress | None = None,
+    options: ActorOptions | None = None,
+    rig: ActorRig | None = None,
 ) -> None:
     """Render and write a capture; `folder` appears whole or not at all.
 
@@ -78,9 +82,10 @@ def write_capture(
         params: cameras, frames, size, seed.
         progress: called after each of the cameras x frames pictures.
         options: see `ActorOptions`.
+        rig: other cameras than those of `make_rig`.
     """
     options = options or ActorOptions()
-    rig = make_rig(params)
+    rig = rig or make_rig(params)
     with atomic_folder(folder) as temporary:
         (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")
         frames = [(frame_name(k), float(time)) for k, time in enumerate(frame_times(params))]
@@ -89,7 +94,7 @@ def write_capture(
         for name, time in frames:
             rotation, translation = head_pose(time, options.head_motion)
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)
-            _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time), head_to_world)
+            _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time, options.nose), head_to_world)
             for camera in rig.cameras:
                 _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed))
                 if progress:

@@ -11,7 +11,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.jit import kernel, source_digest
-from facefolds_core.captures.actor.motion import pose_at
+from facefolds_core.captures.actor.motion import NOSE, pose_at
 from facefolds_core.captures.actor.shape import trace
 
 Array = NDArray[np.float64]
@@ -84,10 +84,16 @@ def _faces() -> NDArray[np.int32]:
     return np.ascontiguousarray(triangles.reshape(-1, 3))
 
 
-def tracked_mesh(time: float) -> TrackedMesh:
-    """The mesh at a time in seconds. Vertices are within 0.1 mm of the rendered surface (but slide on the skin)."""
+def tracked_mesh(time: float, nose: float = 0.0) -> TrackedMesh:
+    """The mesh at a time in seconds. Vertices are within 0.1 mm of the rendered surface (but slide on the skin).
+
+    Args:
+        nose: mm by which the nose is longer. What is not the head, as the ball, is not tracked.
+    """
     origins, directions, uv = _rays()
-    hits = _cut(origins, directions, pose_at(time), _STARTS[0])
+    pose = pose_at(time)
+    pose[NOSE] = nose
+    hits = _cut(origins, directions, pose, _STARTS[0])
     if not np.isfinite(hits).all():
         raise AssertionError("a ray of the tracked mesh misses the head")
     vertices = (origins + hits[:, None] * directions).astype(np.float32)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 PERIOD = 12 / 30
 """Seconds after which the performance repeats: twelve frames at thirty a second."""
 
-BLINK, JAW, BROW, SMILE, GAZE_X, GAZE_Y = range(6)
-"""Places in a pose."""
+BLINK, JAW, BROW, SMILE, GAZE_X, GAZE_Y, NOSE, BALL = range(8)
+"""Places in a pose; the last two are the subject's shape, still in time (`render.ActorOptions`)."""
 
 
 def _bump(phase: float, centre: float, halfwidth: float) -> float:
@@ -21,13 +21,13 @@ def _bump(phase: float, centre: float, halfwidth: float) -> float:
 
 
 def pose_at(time: float) -> NDArray[np.float64]:
-    """The pose at a time in seconds: (6,) blink, jaw, brow and smile in [0, 1], gaze right and up in radians.
+    """The pose at a time in seconds: (8,) blink, jaw, brow and smile in [0, 1], gaze right and up in radians, 0, 0.
 
     Phase 0 is a calm look with a slight smile; the jaw opens widest at 0.33 with raised brows, the eyes are shut at
     0.67, the smile is widest at 0.83.
     """
     phase = (time / PERIOD) % 1.0
-    pose = np.zeros(6)
+    pose = np.zeros(8)
     pose[BLINK] = _bump(phase, 8 / 12, 0.15)
     pose[JAW] = _bump(phase, 4 / 12, 0.27)
     pose[BROW] = _bump(phase, 4 / 12, 0.30)

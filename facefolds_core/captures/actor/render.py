@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import prange
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.hair import STEP, density, envelope, hair_colour
 from facefolds_core.captures.actor.jit import compiled, kernel, source_digest
-from facefolds_core.captures.actor.motion import head_pose, pose_at
+from facefolds_core.captures.actor.motion import BALL, NOSE, head_pose, pose_at
 from facefolds_core.captures.actor.noise import Vector
 from facefolds_core.captures.actor.room import room_colour
 from facefolds_core.captures.actor.shade import surface_colour
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 _DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
+EXPOSURES = 5
+"""Sharp pictures in one that is exposed for a while."""
 _BOUND = 480.0
 """Everything opaque lies within this distance of the head's origin, mm."""
 
@@ -53,12 +55,20 @@ class ActorOptions:
         hair_density: factor on the hair's extinction; 0 makes it bald.
         room_colour: 1 as painted, 0 a grey room.
         head_motion: amplitude of a rigid turn and nod, radians; 0 keeps the skull still.
+        clutter: 0 the room as painted, 1 tiles of random colours all over it.
+        nose: mm by which the nose is longer.
+        ball: radius of a striped ball before the mouth, mm; it is part of the subject. 0 is none.
+        shutter: seconds that a picture is exposed, half before and half after its time.
     """
 
     gloss: float = 1.0
     hair_density: float = 1.0
     room_colour: float = 1.0
     head_motion: float = 0.0
+    clutter: float = 0.0
+    nose: float = 0.0
+    ball: float = 0.0
+    shutter: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -143,7 +153,7 @@ def _sample(
         frame[0, 1] * wx + frame[1, 1] * wy + frame[2, 1] * wz,
         frame[0, 2] * wx + frame[1, 2] * wy + frame[2, 2] * wz,
     )
-    gloss, amount, colourfulness = settings[0], settings[1], settings[2]
+    gloss, amount, colourfulness, clutter = settings[0], settings[1], settings[2], settings[3]
     b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
     root = b * b - (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - _BOUND * _BOUND)
     hit = math.inf
@@ -160,7 +170,7 @@ def _sample(
         n = normal(p[0], p[1], p[2], pose)
         r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss, seed)
         return red + through * r, green + through * g, blue + through * bl, 1.0, hit
-    r, g, bl = room_colour(centre[0], centre[1], centre[2], wx, wy, wz, colourfulness)
+    r, g, bl = room_colour(centre[0], centre[1], centre[2], wx, wy, wz, colourfulness, clutter)
     return red + through * r, green + through * g, blue + through * bl, 1.0 - through, hit
 
 
@@ -232,20 +242,24 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
         seed: of skin, hair and freckles.
     """
     options = options or ActorOptions()
+    if options.shutter > 0:
+        return _exposed(camera, time, options, seed)
     rotation, translation = head_pose(time, options.head_motion)
     frame = np.concatenate([rotation, translation[:, None]], 1)
+    pose = pose_at(time)
+    pose[NOSE], pose[BALL] = options.nose, options.ball
     # The lights stand in the room: turn them into the head's frame.
     lights = _LIGHTS.copy()
     lights[:, :3] = _LIGHTS[:, :3] @ np.diag([1.0, -1.0, -1.0]) @ rotation
     to_world = np.ascontiguousarray(camera.rotation.T @ np.linalg.inv(camera.K))
-    settings = np.array([options.gloss, options.hair_density, options.room_colour])
+    settings = np.array([options.gloss, options.hair_density, options.room_colour, options.clutter])
     first, smooth = _render_samples(
         camera.height,
         camera.width,
         to_world,
         np.ascontiguousarray(camera.centre),
         frame,
-        pose_at(time),
+        pose,
         lights,
         settings,
         seed,
@@ -256,4 +270,16 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
         rgb=np.rint(255 * np.clip(smooth[..., :3], 0, 1)).astype(np.uint8),
         opacity=np.clip(smooth[..., 3], 0, 1).astype(np.float32),
         depth=(first[..., 4] * along_axis).astype(np.float32),
+    )
+
+
+def _exposed(camera: Camera, time: float, options: ActorOptions, seed: int) -> Picture:
+    """The mean of EXPOSURES sharp pictures, evenly spread over the time that the shutter is open; depth at `time`."""
+    sharp = replace(options, shutter=0.0)
+    times = time + options.shutter * (np.arange(EXPOSURES) / (EXPOSURES - 1) - 0.5)
+    pictures = [render(camera, float(t), sharp, seed) for t in times]
+    return Picture(
+        rgb=np.rint(np.mean([p.rgb for p in pictures], 0)).astype(np.uint8),
+        opacity=np.mean([p.opacity for p in pictures], 0).astype(np.float32),
+        depth=pictures[EXPOSURES // 2].depth,
     )

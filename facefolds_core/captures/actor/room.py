@@ -10,6 +10,7 @@ from facefolds_core.captures.actor.noise import Vector, clamp, hash3, mix, smoot
 _LEFT, _RIGHT = -1900.0, 1900.0
 _CEILING, _FLOOR = -1250.0, 1350.0
 _FRONT, _BACK = -900.0, 2700.0
+_TILE = 110.0
 
 
 @compiled
@@ -104,13 +105,16 @@ def _ceiling(u: float, v: float) -> Vector:
 
 
 @compiled
-def room_colour(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, colourfulness: float) -> Vector:
+def room_colour(
+    ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, colourfulness: float, clutter: float
+) -> Vector:
     """Colour of the wall that a ray meets from inside the room.
 
     Args:
         ox, oy, oz: origin, world mm.
         dx, dy, dz: direction.
         colourfulness: 1 as painted, 0 grey.
+        clutter: 0 as painted, 1 hung with tiles of random colours.
     """
     tx = ((_RIGHT if dx > 0 else _LEFT) - ox) / dx if abs(dx) > 1e-9 else math.inf
     ty = ((_FLOOR if dy > 0 else _CEILING) - oy) / dy if abs(dy) > 1e-9 else math.inf
@@ -123,6 +127,10 @@ def room_colour(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
         colour = _floor(x, z) if dy > 0 else _ceiling(x, z)
     else:
         colour = _back_wall(x, y)
+    if clutter > 0.0:
+        i, j, k = math.floor(x / _TILE), math.floor(y / _TILE), math.floor(z / _TILE)
+        tile = (hash3(i, j, k, 21), hash3(i, j, k, 22), hash3(i, j, k, 23))
+        colour = mix(colour, tile, clutter)
     # Darker towards edges and corners of the room.
     gap_x, gap_y, gap_z = min(x - _LEFT, _RIGHT - x), min(y - _CEILING, _FLOOR - y), min(z - _FRONT, _BACK - z)
     middle = gap_x + gap_y + gap_z - min(gap_x, gap_y, gap_z) - max(gap_x, gap_y, gap_z)

@@ -18,6 +18,7 @@ from facefolds_core.captures.actor.shape import (
     EYE_Z,
     MOUTH_HALFWIDTH,
     MOUTH_Y,
+    PROP,
     SHIRT,
     SKIN,
     TEETH,
@@ -186,6 +187,9 @@ def paint(
     if material == SHIRT:
         knit = 0.94 + 0.12 * value_noise(x / 2.5, y / 6.0, z / 2.5, seed + 51)
         return (0.16 * knit, 0.25 * knit, 0.40 * knit), 0.05, 10.0
+    if material == PROP:
+        stripe = smoothstep(-0.3, 0.3, math.sin(0.45 * (x + y)))
+        return mix((0.82, 0.68, 0.16), (0.14, 0.34, 0.30), stripe), 0.1, 20.0
     return (0.66, 0.27, 0.27), 0.5, 40.0
 
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.jit import compiled
-from facefolds_core.captures.actor.motion import BLINK, BROW, JAW, SMILE
+from facefolds_core.captures.actor.motion import BALL, BLINK, BROW, JAW, NOSE, SMILE
 from facefolds_core.captures.actor.noise import Vector, clamp, cone, ellipsoid, smooth_max, smooth_min, smoothstep
 
-SKIN, EYE, TEETH, TONGUE, SHIRT = range(5)
+SKIN, EYE, TEETH, TONGUE, SHIRT, PROP = range(6)
 """Materials."""
 
 EYE_X, EYE_Z, EYE_RADIUS = 32.0, 68.5, 13.5
@@ -28,6 +28,8 @@ _EYE_HALFWIDTH = 14.8
 MOUTH_Y = -67.0
 MOUTH_HALFWIDTH = 25.0
 _JAW_DROP = 21.0
+BALL_X, BALL_Y, BALL_Z = 22.0, -62.0, 168.0
+"""Centre of the ball before the mouth, some 70 mm in front of the lips."""
 
 
 @compiled
@@ -91,10 +93,10 @@ def to_rest(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
 
 
 @compiled
-def _nose(ax: float, y: float, z: float, d: float) -> float:
-    """Blend the nose into the skin distance d."""
-    d = smooth_min(d, cone(ax, y, z, 12.0, 81.0, -32.0, 97.0, 5.0, 8.0), 12.0)
-    d = smooth_min(d, ellipsoid(ax, y + 35.5, z - 99.5, 9.5, 8.4, 9.5), 7.0)
+def _nose(ax: float, y: float, z: float, longer: float, d: float) -> float:
+    """Blend the nose, by `longer` mm longer than usual, into the skin distance d."""
+    d = smooth_min(d, cone(ax, y, z, 12.0, 81.0, -32.0, 97.0 + longer, 5.0, 8.0), 12.0)
+    d = smooth_min(d, ellipsoid(ax, y + 35.5, z - 99.5 - longer, 9.5, 8.4, 9.5), 7.0)
     d = smooth_min(d, ellipsoid(ax - 11.0, y + 39.5, z - 90.0, 6.2, 6.6, 9.0), 5.0)
     return smooth_max(d, -ellipsoid(ax - 6.6, y + 47.5, z - 92.5, 2.6, 3.4, 4.0), 2.0)
 
@@ -137,17 +139,17 @@ def _eye_region(ax: float, y: float, z: float, brow: float, d: float) -> float:
 
 
 @compiled
-def skin_rest(x: float, y: float, z: float, brow: float) -> float:
-    """Signed distance to the closed skin (no slots) at rest, mm."""
+def skin_rest(x: float, y: float, z: float, brow: float, longer: float) -> float:
+    """Signed distance to the closed skin (no slots) at rest, mm, with a nose that is `longer` mm longer than usual."""
     d = ellipsoid(x, y - 32.0, z + 8.0, 73.0, 83.0, 97.0)
     d = smooth_min(d, ellipsoid(x, y + 38.0, z - 18.0, 57.0, 72.0, 66.0), 28.0)
     ax = math.sqrt(x * x + 0.5)
     neck = cone(x, y, z, -60.0, -24.0, -230.0, -40.0, 44.0, 52.0)
     d = smooth_min(d, neck, 18.0)
     d = smooth_min(d, _jaw(ax, y, z), 22.0)
-    if d > 65.0:
-        # The features stand out from this by less than 25 mm.
-        return d - (25.0 if z > 5.0 else 5.0)
+    if d > 65.0 + longer:
+        # The features stand out from this by less than 25 mm, the nose by what it is longer.
+        return d - (25.0 + longer if z > 5.0 else 5.0)
     if z < -12.0:
         return d
     # Each feature is measured only where it can change the blend.
@@ -164,7 +166,7 @@ def skin_rest(x: float, y: float, z: float, brow: float) -> float:
         d = _eye_region(ax, y, z, brow, d)
     # Away from the nose a bound will do: it lies within |x| < 20, -55 < y < 20, z > 80.
     aside = max(ax - 20.0, y - 20.0, -55.0 - y, 80.0 - z)
-    d = _nose(ax, y, z, d) if aside < 25.0 else min(d, aside)
+    d = _nose(ax, y, z, longer, d) if aside < 25.0 else min(d, aside)
     if y < -45.0 and z > 60.0:
         d = _lips(ax, y, z, d)
         # Philtrum.
@@ -199,7 +201,7 @@ def shirt(x: float, y: float, z: float) -> float:
 def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[float, int]:
     """Signed distance to all that is opaque, mm, and the material that is nearest."""
     xr, yr, zr = to_rest(x, y, z, pose)
-    skin = skin_rest(xr, yr, zr, pose[BROW])
+    skin = skin_rest(xr, yr, zr, pose[BROW], pose[NOSE])
     d, material = skin, SKIN
     if z > 40.0 and skin < 25.0:
         ex = abs(x) - EYE_X
@@ -227,6 +229,10 @@ def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[fl
         cloth = shirt(x, y, z)
         if cloth < d:
             d, material = cloth, SHIRT
+    if pose[BALL] > 0.0:
+        ball = math.sqrt((x - BALL_X) ** 2 + (y - BALL_Y) ** 2 + (z - BALL_Z) ** 2) - pose[BALL]
+        if ball < d:
+            d, material = ball, PROP
     return d, material
 
 

@@ -24,7 +24,8 @@ from facefolds_core.params import TrainParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
-from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, recentre
+from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
+from facefolds_core.training.explicit.fit import LEAST_RADIUS, ROUNDS, Fit, fit_scene, recentre
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Images, Views, trace_views
@@ -119,8 +120,11 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     with open_log(log) as live:
         bar = progress(total=iterations() + params.iterations, desc="train", unit="it")
         volume = largest_body(fit_volume(scene, params.seed, params.lr_volume, bar))
-        fit = fit_scene(scene, volume, params.level_halfwidth)
-        trainer = _Trainer(scene, params, fit, volume, device)
+        cameras = choose_cameras(scene, volume.cameras)
+        for note in cameras.notes:
+            bar.write(f"train: {note}")
+        fit = fit_scene(cameras.scene, volume, params.level_halfwidth)
+        trainer = _Trainer(cameras, params, fit, volume, device)
         levels = plan(fit, params.iterations)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
@@ -138,9 +142,12 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
 
 
 class _Trainer:
-    def __init__(self, scene: Scene, params: TrainParams, fit: Fit, volume: Volume, device: torch.device) -> None:
-        self.scene, self.params, self.fit, self.volume, self.device = scene, params, fit, volume, device
-        self.images = Images(scene)
+    def __init__(
+        self, cameras: CameraChoice, params: TrainParams, fit: Fit, volume: Volume, device: torch.device
+    ) -> None:
+        self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
+        self.scene = cameras.scene
+        self.images = Images(self.scene, cameras.gains)
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -152,7 +159,7 @@ class _Trainer:
         self.iteration = self.rays = 0
         self.rate = params.lr_texture
         self.psnr = 0.0
-        self.events: list[str] = []
+        self.events = list(cameras.notes)
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
@@ -210,7 +217,9 @@ class _Trainer:
         radii = self.manifolds().radii().detach().double().numpy()
         moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
         start = torch.from_numpy(self.fit.middle).float()
-        self.middle = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
+        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        self.middle = moved.clamp(min=LEAST_RADIUS)
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
@@ -312,6 +321,7 @@ class _Trainer:
             "reasons": list(self.fit.reasons),
             "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
             "volume_psnr": self.fit.volume_psnr,
+            "cameras": self.cameras.summary,
             "events": self.events,
         }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,11 +64,15 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
 class Images:
     """The training images of one frame at a time, from the memory-mapped store.
 
+    Args:
+        gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
+
     Raises:
         UserError: if a training image is missing.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
+        self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)
         self.store = scene.open_frames()
         self.cameras = scene.indices("train")
         for camera in self.cameras:
@@ -84,4 +89,13 @@ class Images:
 
     def frame(self, index: int) -> NDArray[np.uint8]:
         """(C, H W, 3)."""
-        return np.stack([self.store.image(c, index).reshape(-1, 3) for c in self.cameras])
+        images = [self.store.image(c, index) for c in self.cameras]
+        if self.tables is not None:
+            images = [cv2.LUT(image, table).astype(np.uint8) for image, table in zip(images, self.tables, strict=True)]
+        return np.stack([image.reshape(-1, 3) for image in images])
+
+
+def _tables(gains: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
+    """(1, 256, 3) for each camera: 8-bit values without its gains (3,)."""
+    values = np.arange(256)[None, :, None] / gains[:, None, None, :]
+    return list(np.rint(values.clip(0, 255)).astype(np.uint8))

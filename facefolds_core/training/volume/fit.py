@@ -6,7 +6,7 @@ environment (`environment.py`). Where cameras disagree the fog clears, where the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -18,6 +18,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
 
 Array = NDArray[np.float32]
@@ -68,6 +69,7 @@ class Volume:
         environment: what is behind.
         frame: index of the frame that it was fitted to.
         psnr: on the training rays of the last iterations, dB.
+        cameras: what single training cameras do differently.
     """
 
     grid: Array
@@ -76,6 +78,7 @@ class Volume:
     environment: Environment
     frame: int
     psnr: float
+    cameras: CameraFit
 
     def render(self, origins: Array, directions: Array) -> tuple[Array, Array, Array]:
         """Rays (R, 3) -> rgb over black (R, 3), alpha (R,), distance at which T falls to 1/2 or 0 (R,)."""
@@ -95,6 +98,7 @@ class _Rays:
     origins: Array
     directions: Array
     colours: Array
+    camera: NDArray[np.int32]
 
 
 def seen_share(cameras: list[Camera], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -149,6 +153,7 @@ def fit_volume(scene: Scene, seed: int, rate: float, bar: tqdm) -> Volume:
     mean = np.mean([image.mean((0, 1)) for image in images], 0) / 255
     environment = Environment(mean.astype(np.float32), max(float(np.linalg.norm(c.centre)) for c in cameras))
     grid, voxel, psnr = None, 0.0, 0.0
+    found = CameraFit.alike(len(cameras))
     for number, (resolution, iterations) in enumerate(LEVELS):
         finer = float((upper - lower).max()) / (resolution - 1)
         shape = tuple(np.ceil((upper - lower) / finer - 1e-6).astype(int) + 1)
@@ -157,11 +162,14 @@ def fit_volume(scene: Scene, seed: int, rate: float, bar: tqdm) -> Volume:
         voxel = finer
         grid[share == 0, 0] = -kernel.LIMIT
         rays = _rays(cameras, images, voxel)
+        rays = replace(rays, colours=found.corrected(rays.colours, rays.camera))
         last = number == len(LEVELS) - 1
         psnr = _train(grid, share, lower, voxel, rays, environment, iterations, last, rate, random, bar)
+        rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, STEP * voxel)
+        found = found.refined(rgb, alpha, rays.colours, rays.camera)
     assert grid is not None
     _clear(grid, lower, voxel, rays, environment)
-    return Volume(grid, lower, voxel, environment, frame, psnr)
+    return Volume(grid, lower, voxel, environment, frame, psnr, found)
 
 
 def iterations() -> int:
@@ -194,8 +202,8 @@ def _rays(cameras: list[Camera], images: list[NDArray[np.uint8]], voxel: float) 
     """One ray for each pixel of the reduced images."""
     pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
     factor = max(1, round(PIXEL * voxel / pixel))
-    origins, directions, colours = [], [], []
-    for camera, image in zip(cameras, images, strict=True):
+    origins, directions, colours, numbers = [], [], [], []
+    for number, (camera, image) in enumerate(zip(cameras, images, strict=True)):
         height, width = max(1, camera.height // factor), max(1, camera.width // factor)
         x, y = np.meshgrid((np.arange(width) + 0.5) * factor, (np.arange(height) + 0.5) * factor)
         origin, direction = camera.rays(np.stack([x, y], -1).reshape(-1, 2))
@@ -204,7 +212,8 @@ def _rays(cameras: list[Camera], images: list[NDArray[np.uint8]], voxel: float) 
         part = np.ascontiguousarray(image[: height * factor, : width * factor])
         small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
         colours.append(small.reshape(-1, 3).astype(np.float32) / 255)
-    return _Rays(np.concatenate(origins), np.concatenate(directions), np.concatenate(colours))
+        numbers.append(np.full(width * height, number, np.int32))
+    return _Rays(np.concatenate(origins), np.concatenate(directions), np.concatenate(colours), np.concatenate(numbers))
 
 
 def _occupied(density: Array) -> NDArray[np.bool_]:
@@ -267,7 +276,7 @@ def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, e
     target = rgb + (1 - alpha)[:, None] * background - wanted
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
-    seen = _Rays(rays.origins, rays.directions, target)
+    seen = replace(rays, colours=target)
     _shade(grid, occupied, lower, voxel, seen, half, background, gradient, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
@@ -299,7 +308,7 @@ def _train(
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         origins, directions = rays.origins[chosen], rays.directions[chosen]
         background, taps, weights = environment.look_up(origins, directions)
-        part = _Rays(origins, directions, rays.colours[chosen])
+        part = _Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
         squares, residual, through = _shade(
             grid[0], occupied, lower, voxel, part, jitter, background, gradient, VEIL, SOLID
