@@ -1,17 +1,21 @@
 """Bytes against quality on held-out cameras: the paper's export and ours, from the same trained model.
 
-python bench/rate_distortion.py data/actor --work build/rate [--chart docs/images/rate_distortion.png]
+python -m bench.rate_distortion --work build/rate                  # trains the actor on 60 frames first
+python -m bench.rate_distortion data/mugsy --work build/rate_mugsy  # a subject that was trained with `dvc repro`
 
 `paper`: the whole hemisphere, Poisson on 512 x 512 samples, 32 x 32 vertices a layer with the nearest sample's texture
 coordinates, Draco without loss, 1024 x 1024 texels, H.264. `ours`: the sections of the subject's own configuration, as
 `configure` left them, meshes by error in pixels. Both go through the same writer, which crops layers and leaves out
-what shows nothing: that flatters the paper's. A point is one constant rate factor; the export stages run once a series.
+what shows nothing: that flatters the paper's. A point is one constant rate factor; the export stages run once a series,
+and what is in --work from an earlier run is used again.
+
+Writes rate.json there, and with --chart a PNG; with --plot the points for `dvc plots show`.
 """
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,25 +23,35 @@ from typing import Annotated, Any
 import matplotlib
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
-from facefolds_core.asset import AssetSource, read_asset, write_asset
+from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
+from facefolds_core.asset.draco import encode_mesh
+from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
+from facefolds_core.asset.writer import LevelContent
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.config import write_configs
 from facefolds_core.errors import report_user_errors
-from facefolds_core.export.stores import read_centre, read_meshes, read_windows
+from facefolds_core.export.stores import read_meshes, read_windows
 from facefolds_core.files import atomic_file, read_json, write_json
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.meshbits import resolved
-from facefolds_core.packaging.views import training_cameras
-from facefolds_core.params import CompressParams
+from facefolds_core.packaging.views import spread, training_cameras
+from facefolds_core.params import MeshCodec, VideoCodec, load_params
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import composite
 from facefolds_core.scoring.metrics import psnr, shown
 from stages.bake import bake
+from stages.capture import capture
 from stages.decimate import decimate
+from stages.normalize import normalize
 from stages.reconstruct import reconstruct
 from stages.sample import sample
 from stages.texture import texture
+from stages.train import train_stage as train
 
 PAPER: dict[str, dict[str, Any]] = {
     "sample": {"resolution": 1024, "window": "full"},
@@ -46,10 +60,12 @@ PAPER: dict[str, dict[str, Any]] = {
     "texture": {"resolution": 1024},
     "bake": {"iterations": 0},
 }
-LOSSLESS_MESH = {"quantization_bits": 0, "compression_level": 0}
-QUANTISED_MESH = {"max_error_pixels": 0.2, "compression_level": 10}
+LOSSLESS_MESH = MeshCodec(quantization_bits=0, compression_level=0)
+QUANTISED_MESH = MeshCodec(max_error_pixels=0.2, compression_level=10)
 STAGES: tuple[Callable[[SubjectFolders], str], ...] = (sample, reconstruct, decimate, texture, bake)
-FACTORS = (14, 18, 22, 26, 30, 34)
+FACTORS = (16, 20, 24, 28, 33, 38)
+FRAMES = 60
+"""Of the actor: codecs are compared honestly only on sequences of real length."""
 SCORED_FRAMES = 6
 
 
@@ -87,40 +103,76 @@ def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> S
 
 
 def points(
-    series: str, folders: SubjectFolders, scene: Scene, sections: Iterable[tuple[int, dict[str, Any]]]
+    series: str, folders: SubjectFolders, scene: Scene, mesh: MeshCodec, codec: Codec, preset: str, crfs: Sequence[int]
 ) -> list[Point]:
-    """One asset for each (crf, section of compress)."""
-    meshes = read_meshes(folders.meshes / "meshes.npz")
-    windows = read_windows(folders.samples / "grids.npz")
-    textures = FrameStore(folders.textures / "textures.arrow")
-    centre = read_centre(folders.samples / "grids.npz")
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), centre)
-    found = []
-    for crf, section in sections:
-        params = CompressParams.model_validate(section)
-        layers = crop_layers(meshes, windows, textures, scene.num_frames)
-        mesh = resolved(params.mesh, layers, training_cameras(scene))
-        target = folders.root / "asset"
-        manifest = write_asset(target, meshes, windows, textures, source, params.model_copy(update={"mesh": mesh}))
-        sizes = sum(layer.bytes for layer in manifest.full.layers), manifest.full.texture.videos[0].bytes
-        found.append(Point(series, crf, *sizes, held_out_psnr(target, scene)))
-        typer.echo(f"{series}, crf {crf}: {sizes[0]} + {sizes[1]} bytes, {found[-1].psnr:.3f} dB")
+    """One point for each factor, on x264's scale: meshes are written once, pictures packed once."""
+    store = FrameStore(folders.textures / "textures.arrow")
+    layers = crop_layers(
+        read_meshes(folders.meshes / "meshes.npz"),
+        read_windows(folders.samples / "grids.npz"),
+        store,
+        scene.num_frames,
+    )
+    content = LevelContent(layers, store, scene.num_frames, scene.fps)
+    coded = [encode_mesh(layer.mesh, resolved(mesh, layers, training_cameras(scene))) for layer in layers]
+    meter = HeldOut(scene, [decoded for _, decoded in coded])
+    size = sum(len(data) for data, _ in coded)
+    layout, found = content.layout, []
+    pictures = np.memmap(folders.root / "pictures.yuv", np.uint8, "w+", shape=picture_shape(content))
+    for k in range(content.frames):
+        pictures[k] = pack_frame(content.frame(k), layout)
+    for crf in crfs:
+        options = codec.options(VideoCodec(codec=(codec.name,), preset=preset), codec.crf(crf))
+        path = folders.root / f"trial.{codec.container}"
+        encode_video(path, pictures, (layout.width, layout.height), content.rate, codec, options)
+        decoded = decode_video(path, (layout.width, layout.height), float(content.rate))
+        quality = meter.psnr((k, unpack_picture(frame, layout)) for k, frame in enumerate(decoded) if k in meter.frames)
+        found.append(Point(series, crf, size, path.stat().st_size, quality))
+        typer.echo(f"{series}, crf {crf}: {size} + {path.stat().st_size} bytes, {quality:.3f} dB")
+    Path(pictures.filename).unlink()
     return found
 
 
-def held_out_psnr(asset_folder: Path, scene: Scene) -> float:
-    """Mean over the held-out cameras and SCORED_FRAMES frames."""
-    asset, truths, masks = read_asset(asset_folder), scene.open_frames(), scene.open_masks()
-    frames = {round(float(k)) for k in np.linspace(0, scene.num_frames - 1, min(SCORED_FRAMES, scene.num_frames))}
-    cameras = scene.indices("holdout")
-    caster = AssetCaster(asset)
-    hits = {index: caster.cast(scene.cameras[index]) for index in cameras}
-    values = []
-    for k, pictures in enumerate(asset.frames()):
-        for index in cameras if k in frames else ():
-            mask = masks.image(index, k)[..., 0] / 255 if masks is not None and (index, k) in masks else None
-            values.append(psnr(shown(composite(hits[index], pictures)[0]), truths.image(index, k) / 255, mask))
-    return float(np.mean([value for value in values if value is not None]))
+def picture_shape(content: LevelContent) -> tuple[int, int, int]:
+    return content.frames, content.layout.height * 3 // 2, content.layout.width
+
+
+class HeldOut:
+    """PSNR on the held-out cameras, in at most SCORED_FRAMES frames: of the subject, where the capture has masks.
+
+    Args:
+        meshes: as they are decoded.
+    """
+
+    def __init__(self, scene: Scene, meshes: Sequence[TexturedMesh]) -> None:
+        self.frames = spread(scene.num_frames, SCORED_FRAMES)
+        self._truths, self._masks = scene.open_frames(), scene.open_masks()
+        self._hits = {index: cast_layers(scene.cameras[index], meshes) for index in scene.indices("holdout")}
+
+    def psnr(self, textures: Iterable[tuple[int, Sequence[NDArray[np.uint8]]]]) -> float:
+        """Mean over cameras and frames, dB. textures: (frame, those of all layers) of the scored frames."""
+        values = []
+        for k, layers in textures:
+            for index, hits in self._hits.items():
+                has_mask = self._masks is not None and (index, k) in self._masks
+                mask = self._masks.image(index, k)[..., 0] / 255 if self._masks is not None and has_mask else None
+                values.append(psnr(shown(composite(hits, layers)[0]), self._truths.image(index, k) / 255, mask))
+        return float(np.mean([value for value in values if value is not None]))
+
+
+def filmed(work: Path) -> Path:
+    """The actor in FRAMES frames, filmed, normalised and trained in a folder of its own; once. Returns the folder."""
+    folders = SubjectFolders(work / "actor")
+    if (folders.model / "model.json").exists():
+        return folders.root
+    params = load_params("params.yaml")
+    folders.config.mkdir(parents=True, exist_ok=True)
+    write_configs(params, "actor", folders.config)
+    path = folders.config / "capture.json"
+    write_json(path, read_json(path) | {"frames": FRAMES})
+    for run in (capture, normalize, train):
+        typer.echo(f"actor, {FRAMES} frames: {run(folders)}")
+    return folders.root
 
 
 def bytes_at(quality: float, series: list[Point]) -> float | None:
@@ -162,24 +214,25 @@ def draw(found: list[Point], path: Path, title: str) -> None:
 
 
 def main(
-    subject: Annotated[Path, typer.Argument(help="Folder of a trained subject: config, scene, model.")],
     work: Annotated[Path, typer.Option(help="Folder for the exports; a second run uses them again.")],
+    subject: Annotated[Path | None, typer.Argument(help="Folder of a trained subject; none: actor, 60 frames.")] = None,
     chart: Annotated[Path | None, typer.Option(help="Write a chart there (PNG).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write the points there, for `dvc plots show` (JSON).")] = None,
     codec: Annotated[list[str] | None, typer.Option(help="Codecs of ours (several: repeat).")] = None,
 ) -> None:
     """Compare the paper's export with ours: bytes against PSNR on held-out cameras, from one trained model."""
     with report_user_errors("rate_distortion"):
-        scene = read_scene(subject / "scene")
-        paper = exported(subject, work / "paper", PAPER)
-        medium = {"codec": "h264", "preset": "medium"}
-        found = points(
-            "paper", paper, scene, ((f, {"mesh": LOSSLESS_MESH, "video": medium | {"crf": f}}) for f in FACTORS)
-        )
-        ours = exported(subject, work / "ours", {})
+        folder = subject or filmed(work)
+        scene = read_scene(folder / "scene")
+        paper = exported(folder, work / "paper", PAPER)
+        found = points("paper", paper, scene, LOSSLESS_MESH, CODECS["h264"], "medium", FACTORS)
+        ours = exported(folder, work / "ours", {})
         for name in codec or ["h264", "vp9", "av1"]:
-            sections = ((f, {"mesh": QUANTISED_MESH, "video": {"codec": name, "crf": f}}) for f in FACTORS)
-            found += points(f"ours, {name}", ours, scene, sections)
-        write_json(work / "rate.json", [asdict(point) | {"bytes": point.bytes} for point in found])
+            found += points(f"ours, {name}", ours, scene, QUANTISED_MESH, CODECS[name], "slow", FACTORS)  # type: ignore[index]
+        rows = [asdict(point) | {"bytes": point.bytes} for point in found]
+        write_json(work / "rate.json", rows)
+        if plot:
+            write_json(plot, rows)
         typer.echo(f"\n{scene.subject}, {scene.num_frames} frames\n{table(found)}")
         if chart:
             draw(found, chart, f"{scene.subject}, {scene.num_frames} frames")

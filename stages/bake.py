@@ -9,6 +9,7 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
 from facefolds_core.export.bake import Baker, baked_rows, gather_rays
+from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets, read_grids, read_meshes
 from facefolds_core.files import atomic_folder
@@ -34,7 +35,13 @@ def bake(folders: SubjectFolders) -> str:
     baker = Baker(meshes, sheets, rays, textures.height)
     with atomic_folder(folders.textures) as temporary:
         shape = (textures.height, textures.width, 4)
-        write_frames(temporary / "textures.arrow", shape, baked_rows(baker, textures, samples, params.iterations))
+        path = temporary / "textures.arrow"
+        write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
+        if params.hold > 0 and scene.num_frames > 1:
+            baked = FrameStore(path.rename(temporary / "baked.arrow"))
+            weights = texel_weights(rays.shipped, baked, len(scene.indices("train")))
+            write_frames(path, shape, held_rows(baked, weights, params.hold))
+            baked.path.unlink()
     return f"{len(textures.keys())} textures fitted to {len(rays.shipped)} rays, in {folders.textures}"
 
 
