@@ -63,7 +63,7 @@ PAPER: dict[str, dict[str, Any]] = {
 LOSSLESS_MESH = MeshCodec(quantization_bits=0, compression_level=0)
 QUANTISED_MESH = MeshCodec(max_error_pixels=0.2, compression_level=10)
 STAGES: tuple[Callable[[SubjectFolders], str], ...] = (sample, reconstruct, decimate, texture, bake)
-FACTORS = (16, 20, 24, 28, 33, 38)
+FACTORS = (17, 22, 27, 32, 38)
 FRAMES = 60
 """Of the actor: codecs are compared honestly only on sequences of real length."""
 SCORED_FRAMES = 6
@@ -100,6 +100,25 @@ def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> S
     for run in STAGES:
         typer.echo(f"{work.name}: {run(folders)}")
     return folders
+
+
+def series(
+    name: str,
+    subject: Path,
+    work: Path,
+    changes: dict[str, dict[str, Any]],
+    mesh: MeshCodec,
+    codec: Codec,
+    preset: str,
+) -> list[Point]:
+    """All points of one series; measured once, then read."""
+    path = work / f"{name.replace(', ', '_')}.json"
+    if path.exists():
+        return [Point(**row) for row in read_json(path)]
+    folders = exported(subject, work / name.split(",")[0], changes)
+    found = points(name, folders, read_scene(subject / "scene"), mesh, codec, preset, FACTORS)
+    write_json(path, [asdict(point) for point in found])
+    return found
 
 
 def points(
@@ -224,11 +243,9 @@ def main(
     with report_user_errors("rate_distortion"):
         folder = subject or filmed(work)
         scene = read_scene(folder / "scene")
-        paper = exported(folder, work / "paper", PAPER)
-        found = points("paper", paper, scene, LOSSLESS_MESH, CODECS["h264"], "medium", FACTORS)
-        ours = exported(folder, work / "ours", {})
+        found = series("paper", folder, work, PAPER, LOSSLESS_MESH, CODECS["h264"], "medium")
         for name in codec or ["h264", "vp9", "av1"]:
-            found += points(f"ours, {name}", ours, scene, QUANTISED_MESH, CODECS[name], "slow", FACTORS)  # type: ignore[index]
+            found += series(f"ours, {name}", folder, work, {}, QUANTISED_MESH, CODECS[name], "slow")  # type: ignore[index]
         rows = [asdict(point) | {"bytes": point.bytes} for point in found]
         write_json(work / "rate.json", rows)
         if plot:
