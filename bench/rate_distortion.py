@@ -62,7 +62,14 @@ PAPER: dict[str, dict[str, Any]] = {
 }
 LOSSLESS_MESH = MeshCodec(quantization_bits=0, compression_level=0)
 QUANTISED_MESH = MeshCodec(max_error_pixels=0.2, compression_level=10)
-STAGES: tuple[Callable[[SubjectFolders], str], ...] = (sample, reconstruct, decimate, texture, bake)
+STAGES: dict[str, Callable[[SubjectFolders], str]] = {
+    "samples": sample,
+    "surfaces": reconstruct,
+    "meshes": decimate,
+    "resampled": texture,
+    "textures": bake,
+}
+"""Folder that a stage writes, whole or not at all -> the stage."""
 FACTORS = (17, 22, 27, 32, 38)
 FRAMES = 60
 """Of the actor: codecs are compared honestly only on sequences of real length."""
@@ -87,8 +94,6 @@ class Point:
 def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> SubjectFolders:
     """Run the export stages of a trained subject in a folder of their own, with changed sections; once."""
     folders = SubjectFolders(work)
-    if (folders.textures / "textures.arrow").exists():
-        return folders
     work.mkdir(parents=True, exist_ok=True)
     for name in ("scene", "model"):
         (work / name).unlink(missing_ok=True)
@@ -97,8 +102,9 @@ def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> S
     for stage, section in changes.items():
         path = folders.config / f"{stage}.json"
         write_json(path, (read_json(path) if path.exists() else {}) | section)
-    for run in STAGES:
-        typer.echo(f"{work.name}: {run(folders)}")
+    for name, run in STAGES.items():
+        if not (work / name).exists():
+            typer.echo(f"{work.name}: {run(folders)}")
     return folders
 
 

@@ -24,7 +24,7 @@ from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.scoring.metrics import Array, psnr, shown
 from facefolds_core.scoring.model_view import ModelView
@@ -144,11 +144,17 @@ def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> 
 
 
 def _of_asset(asset: Asset) -> _Source:
-    caster = AssetCaster(asset)
     level = asset.manifest.full
     files = sum(layer.bytes for layer in level.layers)
     triangles = sum(layer.triangles for layer in level.layers)
-    return _Source("shipped", caster.cast, asset.frame, triangles, files, level.texture.videos[0].bytes)
+    return _Source(
+        "shipped",
+        lambda camera: cast_layers(camera, asset.layers),
+        asset.frame,
+        triangles,
+        files,
+        level.texture.videos[0].bytes,
+    )
 
 
 def _frame(store: FrameStore) -> Frame:
