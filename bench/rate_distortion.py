@@ -25,7 +25,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from facefolds_core.asset.codecs import CODECS, Codec
+from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
@@ -114,21 +114,20 @@ def series(
     work: Path,
     changes: dict[str, dict[str, Any]],
     mesh: MeshCodec,
-    codec: Codec,
-    preset: str,
+    video: VideoCodec,
 ) -> list[Point]:
     """All points of one series; measured once, then read."""
     path = work / f"{name.replace(', ', '_')}.json"
     if path.exists():
         return [Point(**row) for row in read_json(path)]
     folders = exported(subject, work / name.split(",")[0], changes)
-    found = points(name, folders, read_scene(subject / "scene"), mesh, codec, preset, FACTORS)
+    found = points(name, folders, read_scene(subject / "scene"), mesh, video, FACTORS)
     write_json(path, [asdict(point) for point in found])
     return found
 
 
 def points(
-    series: str, folders: SubjectFolders, scene: Scene, mesh: MeshCodec, codec: Codec, preset: str, crfs: Sequence[int]
+    series: str, folders: SubjectFolders, scene: Scene, mesh: MeshCodec, video: VideoCodec, crfs: Sequence[int]
 ) -> list[Point]:
     """One point for each factor, on x264's scale: meshes are written once, pictures packed once."""
     store = FrameStore(folders.textures / "textures.arrow")
@@ -142,19 +141,20 @@ def points(
     coded = [encode_mesh(layer.mesh, resolved(mesh, layers, training_cameras(scene))) for layer in layers]
     meter = HeldOut(scene, [decoded for _, decoded in coded])
     size = sum(len(data) for data, _ in coded)
-    layout, found = content.layout, []
-    pictures = np.memmap(folders.root / "pictures.yuv", np.uint8, "w+", shape=picture_shape(content))
+    layout, codec, found = content.layout, CODECS[video.codec[0]], []
+    packed = folders.root / "pictures.yuv"
+    pictures = np.memmap(packed, np.uint8, "w+", shape=picture_shape(content))
     for k in range(content.frames):
         pictures[k] = pack_frame(content.frame(k), layout)
     for crf in crfs:
-        options = codec.options(VideoCodec(codec=(codec.name,), preset=preset), codec.crf(crf))
+        options = codec.options(video, codec.crf(crf))
         path = folders.root / f"trial.{codec.container}"
         encode_video(path, pictures, (layout.width, layout.height), content.rate, codec, options)
         decoded = decode_video(path, (layout.width, layout.height), float(content.rate))
         quality = meter.psnr((k, unpack_picture(frame, layout)) for k, frame in enumerate(decoded) if k in meter.frames)
         found.append(Point(series, crf, size, path.stat().st_size, quality))
         typer.echo(f"{series}, crf {crf}: {size} + {path.stat().st_size} bytes, {quality:.3f} dB")
-    Path(pictures.filename).unlink()
+    packed.unlink()
     return found
 
 
@@ -249,9 +249,11 @@ def main(
     with report_user_errors("rate_distortion"):
         folder = subject or filmed(work)
         scene = read_scene(folder / "scene")
-        found = series("paper", folder, work, PAPER, LOSSLESS_MESH, CODECS["h264"], "medium")
+        video = VideoCodec(codec=("h264",), preset="medium")
+        found = series("paper", folder, work, PAPER, LOSSLESS_MESH, video)
         for name in codec or ["h264", "vp9", "av1"]:
-            found += series(f"ours, {name}", folder, work, {}, QUANTISED_MESH, CODECS[name], "slow")  # type: ignore[index]
+            video = VideoCodec.model_validate({"codec": name})
+            found += series(f"ours, {name}", folder, work, {}, QUANTISED_MESH, video)
         rows = [asdict(point) | {"bytes": point.bytes} for point in found]
         write_json(work / "rate.json", rows)
         if plot:
