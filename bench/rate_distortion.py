@@ -5,9 +5,9 @@ python -m bench.rate_distortion data/mugsy --work build/rate_mugsy  # a subject 
 
 `paper`: the whole hemisphere, Poisson on 512 x 512 samples, 32 x 32 vertices a layer with the nearest sample's texture
 coordinates, Draco without loss, 1024 x 1024 texels, H.264. `ours`: the sections of the subject's own configuration, as
-`configure` left them, meshes by error in pixels. Both go through the same writer, which crops layers and leaves out
-what shows nothing: that flatters the paper's. A point is one constant rate factor; the export stages run once a series,
-and what is in --work from an earlier run is used again.
+`configure` left them, meshes by error in pixels; `ours32` the same with as few vertices as the paper's. All go through
+the same writer, which crops layers and leaves out what shows nothing: that flatters the paper's. A point is one
+constant rate factor; the export stages run once a series, and what is in --work from an earlier run is used again.
 
 Writes rate.json there, and with --chart a PNG; with --plot the points for `dvc plots show`.
 """
@@ -60,6 +60,7 @@ PAPER: dict[str, dict[str, Any]] = {
     "texture": {"resolution": 1024},
     "bake": {"iterations": 0},
 }
+FEWER_VERTICES: dict[str, dict[str, Any]] = {"decimate": {"resolution": 32}}
 LOSSLESS_MESH = MeshCodec(quantization_bits=0, compression_level=0)
 QUANTISED_MESH = MeshCodec(max_error_pixels=0.2, compression_level=10)
 STAGES: dict[str, Callable[[SubjectFolders], str]] = {
@@ -124,6 +125,14 @@ def series(
     found = points(name, folders, read_scene(subject / "scene"), mesh, video, FACTORS)
     write_json(path, [asdict(point) for point in found])
     return found
+
+
+def link(source: Path, target: Path, names: Sequence[str]) -> None:
+    """Let an export start from what another one, of the same settings up to there, has made."""
+    target.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        if not (target / name).exists():
+            (target / name).symlink_to((source / name).resolve())
 
 
 def points(
@@ -209,15 +218,42 @@ def bytes_at(quality: float, series: list[Point]) -> float | None:
     return float(np.exp(np.interp(quality, [point.psnr for point in ordered], logs)))
 
 
+def psnr_at(size: int, series: list[Point]) -> float | None:
+    """PSNR of a series at a number of bytes, linear in their logarithm; None beyond its ends."""
+    ordered = sorted(series, key=lambda point: point.bytes)
+    if not ordered or not ordered[0].bytes <= size <= ordered[-1].bytes:
+        return None
+    return float(np.interp(np.log(size), np.log([point.bytes for point in ordered]), [point.psnr for point in ordered]))
+
+
+def quality_table(found: list[Point]) -> str:
+    """Markdown: PSNR of each series at the bytes of the paper's points."""
+    names = list(dict.fromkeys(point.series for point in found))
+    by_name = {name: [point for point in found if point.series == name] for name in names}
+    lines = [f"| bytes | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
+    for anchor in by_name[names[0]]:
+        cells = []
+        for name in names:
+            value = psnr_at(anchor.bytes, by_name[name])
+            smaller = [point.psnr for point in by_name[name] if point.bytes <= anchor.bytes]
+            least = f"at least {max(smaller):.2f} dB" if smaller else "larger"
+            cells.append(least if value is None else f"{value:.2f} dB")
+        lines.append(f"| {anchor.bytes / 1000:.0f} kB | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def table(found: list[Point]) -> str:
     """Markdown: bytes of each series at the qualities of the paper's points."""
     names = list(dict.fromkeys(point.series for point in found))
     by_name = {name: [point for point in found if point.series == name] for name in names}
     lines = [f"| held-out PSNR | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
     for anchor in by_name[names[0]]:
-        sizes = [bytes_at(anchor.psnr, by_name[name]) for name in names]
-        best = min(point.bytes for point in found if point.psnr >= anchor.psnr)
-        cells = [f"at most {best / 1000:.0f} kB" if size is None else f"{size / 1000:.0f} kB" for size in sizes]
+        cells = []
+        for name in names:
+            size = bytes_at(anchor.psnr, by_name[name])
+            better = [point.bytes for point in by_name[name] if point.psnr >= anchor.psnr]
+            most = f"at most {min(better) / 1000:.0f} kB" if better else "out of reach"
+            cells.append(most if size is None else f"{size / 1000:.0f} kB")
         lines.append(f"| {anchor.psnr:.2f} dB | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -225,13 +261,17 @@ def table(found: list[Point]) -> str:
 def draw(found: list[Point], path: Path, title: str) -> None:
     matplotlib.use("agg")
     from matplotlib import pyplot
+    from matplotlib.ticker import LogLocator, NullLocator
 
     figure, axes = pyplot.subplots(figsize=(7, 4.5))
     for name in dict.fromkeys(point.series for point in found):
         line = sorted((point.bytes / 1000, point.psnr) for point in found if point.series == name)
         axes.plot(*zip(*line, strict=True), "o-", label=name)
     axes.set(xscale="log", xlabel="kB, meshes and video", ylabel="PSNR on held-out cameras, dB", title=title)
-    axes.grid(True, which="both", alpha=0.3)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.grid(True, alpha=0.3)
     axes.legend()
     with atomic_file(path) as temporary:
         figure.savefig(temporary, dpi=120, bbox_inches="tight")
@@ -254,11 +294,13 @@ def main(
         for name in codec or ["h264", "vp9", "av1"]:
             video = VideoCodec.model_validate({"codec": name})
             found += series(f"ours, {name}", folder, work, {}, QUANTISED_MESH, video)
+        link(work / "ours", work / "ours32", ("samples", "surfaces", "resampled"))
+        found += series("ours32, h264", folder, work, FEWER_VERTICES, QUANTISED_MESH, VideoCodec())
         rows = [asdict(point) | {"bytes": point.bytes} for point in found]
         write_json(work / "rate.json", rows)
         if plot:
             write_json(plot, rows)
-        typer.echo(f"\n{scene.subject}, {scene.num_frames} frames\n{table(found)}")
+        typer.echo(f"\n{scene.subject}, {scene.num_frames} frames\n{table(found)}\n\n{quality_table(found)}")
         if chart:
             draw(found, chart, f"{scene.subject}, {scene.num_frames} frames")
 
