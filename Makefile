@@ -5,6 +5,7 @@
 # make lint    ruff, mypy and the layer check
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
+# make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
 # make clean   remove the environment and all results
 
 PYTHON ?= python3
@@ -14,7 +15,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint bench blender clean
+.PHONY: repro test view report lint bench charts blender clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -41,6 +42,11 @@ lint: $(READY)
 bench: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
 	$(BIN)/python -m bench.speed_accuracy
+
+charts: repro
+	$(BIN)/python bench/export_waterfall.py $(foreach subject,$(notdir $(patsubst %/asset.glb,%,$(wildcard data/*/asset.glb))),--subjects $(subject)) \
+	  --chart docs/images/export_waterfall.png --plot bench/results/waterfall.json
+	$(BIN)/python -m bench.rate_distortion --work data/rate --chart docs/images/rate_distortion.png --plot bench/results/rate_distortion.json
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'

@@ -211,9 +211,12 @@ class BakeParams(Section):
 
     Attributes:
         iterations: passes over the training cameras' rays, in each frame; 0 leaves the textures as `texture` made them.
+        hold: how dear a change of a texel from one frame to the next is, against the error that keeping still makes in
+            training views (export/hold.py); larger values make smaller videos. 0 lets all texels tremble.
     """
 
     iterations: Annotated[int, Field(ge=0)] = 2
+    hold: Annotated[float, Field(ge=0)] = 0.02
 
 
 class MeshCodec(Section):

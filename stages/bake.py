@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
-from facefolds_core.export.bake import Baker, baked_rows, gather_rays
+from facefolds_core.export.bake import Baker, Codes, baked_rows, gather_rays
+from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets, read_grids, read_meshes
 from facefolds_core.files import atomic_folder
@@ -25,17 +27,36 @@ def bake(folders: SubjectFolders) -> str:
         with atomic_folder(folders.textures) as temporary:
             shutil.copyfile(source, temporary / "textures.arrow")
         return f"textures as they were resampled, in {folders.textures}"
+    with atomic_folder(folders.textures) as temporary:
+        path = temporary / "textures.arrow"
+        rays, cameras = _fit(folders, params, path)
+        baked = FrameStore(path)
+        count = len(baked.keys())
+        if params.hold > 0 and any(frame > 0 for _, frame in baked):
+            baked = FrameStore(path.rename(temporary / "baked.arrow"))
+            weights = texel_weights(rays, baked, cameras)
+            write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
+            baked.path.unlink()
+    return f"{count} textures fitted to {len(rays)} rays, in {folders.textures}"
+
+
+def _fit(folders: SubjectFolders, params: BakeParams, path: Path) -> tuple[Codes, int]:
+    """Write the fitted textures; the rays on the meshes that ship, and of how many cameras they are.
+
+    What it maps into memory, it lets go.
+    """
     scene = read_scene(folders.scene)
     sheets = grid_sheets(read_grids(folders.samples / "grids.npz"), None).sheets
     meshes = read_meshes(folders.meshes / "meshes.npz")
-    textures, samples = FrameStore(source), FrameStore(folders.samples / "textures.arrow")
+    textures = FrameStore(folders.resampled / "textures.arrow")
+    samples = FrameStore(folders.samples / "textures.arrow")
     check_match(meshes, sheets, textures, samples, folders)
-    rays = gather_rays([scene.cameras[i] for i in scene.indices("train")], meshes, sheets)
+    cameras = [scene.cameras[i] for i in scene.indices("train")]
+    rays = gather_rays(cameras, meshes, sheets)
     baker = Baker(meshes, sheets, rays, textures.height)
-    with atomic_folder(folders.textures) as temporary:
-        shape = (textures.height, textures.width, 4)
-        write_frames(temporary / "textures.arrow", shape, baked_rows(baker, textures, samples, params.iterations))
-    return f"{len(textures.keys())} textures fitted to {len(rays.shipped)} rays, in {folders.textures}"
+    shape = (textures.height, textures.width, 4)
+    write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
+    return rays.shipped, len(cameras)
 
 
 def check_match(

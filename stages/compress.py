@@ -8,7 +8,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
-from facefolds_core.export.collapse import decimate_sheets
+from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.stores import (
     holds_sheets,
@@ -35,10 +35,13 @@ def compress(folders: SubjectFolders) -> str:
     centre = read_centre(folders.samples / "grids.npz")
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), centre)
 
+    path, ladder = folders.surfaces / "surfaces.npz", {}
+    if params.levels and holds_sheets(path):
+        ladder = decimated_ladder(read_sheets(path), [level.mesh_resolution**2 for level in params.levels])
+
     def decimate(resolution: int) -> list[TexturedMesh]:
-        path = folders.surfaces / "surfaces.npz"
-        if holds_sheets(path):
-            return decimate_sheets(read_sheets(path), resolution**2)
+        if ladder:
+            return ladder[resolution**2]
         grids = read_grids(folders.samples / "grids.npz")
         section = read_stage(DecimateParams, folders.config).model_copy(update={"resolution": resolution})
         return decimate_layers(read_surfaces(path), grids, grids.centre, section)

@@ -9,6 +9,7 @@ straight. Then each layer's radii at the vertices are fitted to all samples (`re
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,11 @@ def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
     A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
     frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
     """
+    return decimated_ladder(sheets, [max_vertices])[max_vertices]
+
+
+def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
+    """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
     st, towards, faces = sheets.st.reshape(-1, 2), directions(sheets), sheet_faces(sheets)
     groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
     shows = contribution(sheets.opacity)
@@ -50,11 +56,23 @@ def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
     points = np.stack([_positions(sheets, int(group[len(group) // 2]), towards) for group in groups], 1)
     quadrics = build_quadrics(points, faces, weights[faces].max(1) + EMPTY)
     cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
-    alive = collapse(st, towards, _borders(len(sheets.st)), points, faces, quadrics, max_vertices, LEAST_AREA * cell)
-    faces = faces[alive]
-    fitted = refit_radii(sheets, shows, faces, towards)
+    targets = sorted(set(counts), reverse=True)
+    borders = _borders(len(sheets.st))
+    left = collapse(st, towards, borders, points, faces, quadrics, np.array(targets), LEAST_AREA * cell)
     opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
-    kept = covers(faces, len(sheets.st), np.ascontiguousarray(opaque.transpose(1, 2, 0)))
+    near = np.ascontiguousarray(opaque.transpose(1, 2, 0))
+    return {
+        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], towards)
+        for target, corners in zip(targets, left, strict=True)
+    }
+
+
+def _meshes(
+    sheets: Sheets, shows: Array, near: NDArray[np.bool_], faces: NDArray[np.int64], towards: Array
+) -> list[TexturedMesh]:
+    """The layers over a triangulation, radii fitted, what holds nothing left out."""
+    fitted = refit_radii(sheets, shows, faces, towards)
+    kept = covers(faces, len(sheets.st), near)
     meshes = []
     for layer in range(sheets.num_layers):
         own = kept[:, layer] if kept[:, layer].any() else np.ones(len(faces), bool)

@@ -195,10 +195,12 @@ def collapse(  # type: ignore[no-untyped-def]
     points,  # (V, L, 5) float64
     faces,  # (F, 3) int64, changed in place
     quadrics,  # (V, L, 21) float64, changed in place
-    target,  # vertices wanted
+    targets,  # (T,) numbers of vertices wanted, descending
     least,  # twice the area in (s, t) that a triangle keeps
 ):
-    """(F,) bool: the faces that are left when at most `target` vertices are, or no vertex may move any more."""
+    """(T, F, 3) int64: the faces when at most so many vertices are left, or no vertex may move any more; -1: gone."""
+    found = np.empty((targets.shape[0], faces.shape[0], 3), np.int64)
+    step = 0
     count = st.shape[0]
     alive = np.ones(faces.shape[0], np.bool_)
     head = np.full(count, -1, np.int64)
@@ -223,7 +225,13 @@ def collapse(  # type: ignore[no-untyped-def]
     size, left = count, 0
     for v in range(count):
         left += head[v] >= 0
-    while left > target and keys[heap[0]] < np.inf:
+    while step < targets.shape[0]:
+        if left <= targets[step] or keys[heap[0]] == np.inf:
+            for f in range(faces.shape[0]):
+                for k in range(3):
+                    found[step, f, k] = faces[f, k] if alive[f] else -1
+            step += 1
+            continue
         v = heap[0]
         w = onto[v]
         size -= 1
@@ -254,7 +262,7 @@ def collapse(  # type: ignore[no-untyped-def]
                 x, faces, alive, head, after, st, directions, borders, points, quadrics, least, others
             )
             _sift(heap, place, keys, place[x], size)
-    return alive
+    return found
 
 
 @numba.njit(error_model="numpy", cache=True, inline="always")

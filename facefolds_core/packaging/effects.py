@@ -22,10 +22,11 @@ from scipy.sparse.linalg import LinearOperator, cg
 from facefolds_core.asset.effects import EffectsPicture, Map
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.captures.scene import Scene
-from facefolds_core.packaging.views import Shown, spread
+from facefolds_core.packaging.views import spread
 from facefolds_core.progress import progress
 from facefolds_core.rendering.effects import bilinear, to_eye
-from facefolds_core.rendering.reference import AssetCaster, Hits, Texture, sample_texture
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import Hits, Texture, sample_texture
 
 FRAMES = 3
 ROWS = 240_000
@@ -138,11 +139,11 @@ def _views(
     content: LevelContent, scene: Scene, cameras: Sequence[int], frames: Sequence[int], rays: int
 ) -> list[Pixels]:
     """Of each camera, `rays` pixels that hit anything, and what its photos show there."""
-    caster, photos = AssetCaster(Shown([layer.mesh for layer in content.layers])), scene.open_frames()
+    meshes, photos = [layer.mesh for layer in content.layers], scene.open_frames()
     rng, views = np.random.default_rng(0), []
     for index in progress(cameras, desc="view effects", unit="camera"):
         camera = scene.cameras[index]
-        hits = caster.cast(camera)
+        hits = cast_layers(camera, meshes)
         count = hits.hit.shape[2]
         seen = np.flatnonzero(hits.hit.any(2))
         chosen = np.sort(rng.choice(seen, min(rays, len(seen)), replace=False))

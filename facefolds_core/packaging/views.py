@@ -1,13 +1,12 @@
 """The yardstick of packaging: rendered training views of what ships against those of what came in.
 
-Quality is counted where an eye sees it, not on texels: rays of some training cameras, in some frames, through the
-reference renderer. Held-out cameras are never looked at.
+Quality is counted where an eye sees it, not on texels: rays of some training cameras, in some frames. Held-out cameras
+are never looked at.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.rendering.reference import AssetCaster, Hits, Texture, composite
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import Hits, Texture, composite
 
 Image = NDArray[np.float32]
 
@@ -23,16 +23,6 @@ CAMERAS = 6
 FRAMES = 3
 RAYS_A_CAMERA = 16_000
 MAX_PSNR = 100.0
-
-
-@dataclass(frozen=True)
-class Shown:
-    """Meshes as the renderer takes them."""
-
-    layers: Sequence[TexturedMesh]
-
-    def frame(self, k: int, /) -> Sequence[Texture]:
-        raise NotImplementedError
 
 
 def spread(count: int, wanted: int) -> list[int]:
@@ -64,10 +54,9 @@ class ViewMeter:
         self._cameras = [cameras[i] for i in spread(len(cameras), CAMERAS)]
         rng = np.random.default_rng(seed)
         self._pixels: list[NDArray[np.intp]] = []
-        caster = AssetCaster(Shown(meshes))
         hits = []
         for camera in self._cameras:
-            cast = caster.cast(camera)
+            cast = cast_layers(camera, meshes)
             seen = np.flatnonzero(cast.hit.any(2))
             chosen = np.sort(rng.choice(seen, min(RAYS_A_CAMERA, len(seen)), replace=False))
             self._pixels.append(chosen)
@@ -78,9 +67,8 @@ class ViewMeter:
 
     def hits(self, meshes: Sequence[TexturedMesh]) -> Hits:
         """Where the meter's rays hit other meshes."""
-        caster = AssetCaster(Shown(meshes))
         parts = zip(self._cameras, self._pixels, strict=True)
-        return _joined([_subset(caster.cast(camera), pixels) for camera, pixels in parts])
+        return _joined([_subset(cast_layers(camera, meshes), pixels) for camera, pixels in parts])
 
     def psnr(self, textures: Iterable[tuple[int, Sequence[Texture]]], hits: Hits | None = None) -> float:
         """dB over all rays and the meter's frames, each ray weighted with the reference's opacity; black background.

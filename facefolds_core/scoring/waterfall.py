@@ -24,7 +24,7 @@ from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.scoring.evaluation import frame_rate_factor
 from facefolds_core.scoring.metrics import Array, psnr, shown
@@ -145,12 +145,18 @@ def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> 
 
 
 def _of_asset(asset: Asset, scene: Scene) -> _Source:
-    caster, step = AssetCaster(asset), frame_rate_factor(scene, asset)
+    step = frame_rate_factor(scene, asset)
     level = asset.manifest.full
     files = sum(layer.bytes for layer in level.layers)
     triangles = sum(layer.triangles for layer in level.layers)
-    textures = level.texture.videos[0].bytes
-    return _Source("shipped", caster.cast, lambda k: asset.frame(k * step), triangles, files, textures)
+    return _Source(
+        "shipped",
+        lambda camera: cast_layers(camera, asset.layers),
+        lambda k: asset.frame(k * step),
+        triangles,
+        files,
+        level.texture.videos[0].bytes,
+    )
 
 
 def _frame(store: FrameStore) -> Frame:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.rate_distortion import Point, bytes_at, draw, table
+from bench.rate_distortion import Point, bytes_at, draw, psnr_at, quality_table, table
 
 PAPER = [Point("paper", crf, 1000, size, db) for crf, size, db in ((14, 9000, 30.0), (22, 3000, 28.0), (30, 0, 25.0))]
 OURS = [Point("ours", crf, 100, size, db) for crf, size, db in ((14, 3900, 30.5), (22, 900, 28.0))]
@@ -24,6 +24,15 @@ def test_table_has_a_row_for_each_quality_of_the_paper() -> None:
     assert lines[0] == "| held-out PSNR | paper | ours |"
     assert lines[3] == "| 28.00 dB | 4 kB | 1 kB |"
     assert lines[4] == "| 25.00 dB | 1 kB | at most 1 kB |"
+
+
+def test_quality_at_bytes_is_the_way_back() -> None:
+    assert psnr_at(round((4000 * 10000) ** 0.5), PAPER) == pytest.approx(29.0, abs=1e-3)
+    assert psnr_at(20_000, PAPER) is None
+    assert quality_table(PAPER + OURS).splitlines()[3:] == [
+        "| 4 kB | 28.00 dB | 30.50 dB |",
+        "| 1 kB | 25.00 dB | 28.00 dB |",
+    ]
 
 
 def test_chart_is_written(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from facefolds_core.export.collapse import contribution, decimate_sheets
+from facefolds_core.export.collapse import contribution, decimate_sheets, decimated_ladder
 from facefolds_core.export.decimation import exact_st, layer_order
 from facefolds_core.export.poisson import boundary_loops
 from facefolds_core.export.refit import radial_cosines, refit_radii
@@ -172,3 +172,10 @@ def test_a_layer_that_shows_nowhere_keeps_its_faces(sheets: Sheets) -> None:
 def test_contributions_are_compositing_weights_with_a_floor() -> None:
     opacity = np.array([51, 255, 255], np.uint8)[:, None, None]
     assert contribution(opacity)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
+
+
+def test_a_ladder_is_what_each_number_of_vertices_gives_alone(sheets: Sheets) -> None:
+    for count, meshes in decimated_ladder(sheets, [100, 400, 200]).items():
+        for mesh, alone in zip(meshes, decimate_sheets(sheets, count), strict=True):
+            assert np.array_equal(mesh.faces, alone.faces)
+            assert np.array_equal(mesh.vertices, alone.vertices)

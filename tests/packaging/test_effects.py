@@ -13,9 +13,9 @@ from facefolds_core.asset.writer import LevelContent
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.packaging.effects import fit_effects
-from facefolds_core.packaging.views import Shown
 from facefolds_core.rendering.effects import added_colours, to_eye
-from facefolds_core.rendering.reference import AssetCaster, Hits, composite
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import Hits, composite
 from tests.assets import WINDOW, cap_mesh
 from tests.scenes import look_at_origin, make_scene
 
@@ -47,10 +47,11 @@ def filmed(folder: Path, table: np.ndarray | None, cameras: int = 15) -> None:
     """A scene whose photos show `content` with the effects of `table`; without one, with noise for each photo."""
     make_scene(folder, cameras=cameras, size=SIZE)
     scene = read_scene(folder)
-    caster, rng = AssetCaster(Shown([layer.mesh for layer in content().layers])), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
+    meshes = [layer.mesh for layer in content().layers]
     rows = []
     for i, camera in enumerate(scene.cameras):
-        hits = caster.cast(camera)
+        hits = cast_layers(camera, meshes)
         added = None if table is None else added_colours(hits, to_eye(camera), [table])
         rgb, _ = composite(hits, content().frame(0), added=added)
         if table is None:
@@ -91,7 +92,7 @@ def test_the_fit_finds_what_was_there(tmp_path: Path) -> None:
     picture = fit_effects(content(), scene, 1e6)
     assert picture is not None
     camera = scene.cameras[scene.indices("holdout")[0]]
-    hits = AssetCaster(Shown([layer.mesh for layer in content().layers])).cast(camera)
+    hits = cast_layers(camera, [layer.mesh for layer in content().layers])
     truth = scene.open_frames().image(scene.indices("holdout")[0], 0) / 255
     errors = [
         np.abs(composite(hits, content().frame(0), added=added)[0] - truth).mean()

@@ -1,0 +1,60 @@
+"""Texels that keep still, but for changes that show: what a video codec spends its bits on is to be seen.
+
+A model's texels tremble from frame to frame, most where they show least: half transparent, behind others, seen by few
+pixels. For each channel of each texel, over the frames,
+
+    1/2 W sum_k (x_k - y_k)^2 + price sum_k |x_k - x_(k-1)|
+
+is made least. y are the codes (of 255) as they were baked; W says how much the texel shows: the mean over the training
+cameras of the sum over the pixels of (dC/dx)^2, so that the first term is an error summed over the pixels of a picture.
+What shows follows its frames; what does not stays constant, and what lies between moves in few steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.frames import FrameStore
+from facefolds_core.export.bake_kernel import PARTS
+from facefolds_core.export.hold_kernel import add_weights, hold
+from facefolds_core.progress import progress as progress_bar
+
+WEIGHED = 6
+"""Frames, evenly spread, in which it is looked how much a texel shows; the greatest counts."""
+
+
+def texel_weights(codes: NDArray[np.uint16], textures: FrameStore, cameras: int) -> NDArray[np.float32]:
+    """(N, S, S, 2): W of colour and of alpha.
+
+    Args:
+        codes: (P, N, 2) rays of all training cameras (`bake.Rays.shipped`).
+        textures: layered frame store.
+        cameras: how many those are.
+    """
+    layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
+    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, min(WEIGHED, len(frames)))})
+    weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
+    for frame in chosen:
+        sums = np.zeros((PARTS, *weights.shape), np.float32)
+        add_weights(codes, np.stack([textures.image(n, frame) for n in layers]).astype(np.float32), sums)
+        np.maximum(weights, sums.sum(0) / np.float32(cameras), out=weights)
+    return weights
+
+
+def held_rows(
+    textures: FrameStore, weights: NDArray[np.float32], price: float, progress: bool = True
+) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+    """All textures, held; all frames of one layer are in memory at a time.
+
+    Yields:
+        (layer, frame, (S, S, 4) uint8).
+    """
+    layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
+    for layer in progress_bar(layers, desc="hold", unit="layer", disable=not progress):
+        images = np.stack([textures.image(layer, frame) for frame in frames])
+        hold(images, weights[layer], price)
+        for frame, image in zip(frames, images, strict=True):
+            yield layer, frame, image

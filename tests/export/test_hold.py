@@ -1,0 +1,81 @@
+"""Texels kept still: the weights are squared derivatives of the rendering, the minimum is one, and extremes hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from facefolds_core.captures.frames import FrameStore, write_frames
+from facefolds_core.export.bake_kernel import PARTS, render
+from facefolds_core.export.hold import held_rows, texel_weights
+from facefolds_core.export.hold_kernel import add_weights, steady
+
+
+def kept(y: np.ndarray, price: float) -> np.ndarray:
+    x = np.empty(len(y))
+    steady(y, price, x)
+    return x
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_minimum_is_that_of_the_dual(seed: int) -> None:
+    """x = y - D' z, where z minimises |y - D' z|^2 within [-price, price]."""
+    rng = np.random.default_rng(seed)
+    y = rng.normal(0, 10, rng.integers(2, 25)).round() + 30 * (np.arange(1) > 0)
+    price = float(rng.uniform(0.1, 15))
+    difference = np.diff(np.eye(len(y)), axis=0)
+    dual = lsq_linear(difference.T, y, (-price, price), tol=1e-14, method="bvls").x
+    assert kept(y, price) == pytest.approx(y - difference.T @ dual, abs=1e-6)
+
+
+def test_nothing_is_held_for_nothing_and_all_at_any_price() -> None:
+    y = np.array([3.0, 9.0, 1.0, 7.0])
+    assert kept(y, 0.0) == pytest.approx(y)
+    assert kept(y, 1e9) == pytest.approx([5.0] * 4)
+    assert kept(y[:1], 4.0) == pytest.approx(y[:1])
+
+
+def test_a_step_loses_the_price_at_both_sides() -> None:
+    assert kept(np.repeat([10.0, 50.0], 4), 8.0) == pytest.approx(np.repeat([12.0, 48.0], 4))
+
+
+def test_weights_are_squared_derivatives() -> None:
+    """One ray in the middle of a texel of each of three layers: its share is 1, the derivatives those of `render`."""
+    rng = np.random.default_rng(1)
+    texture = rng.uniform(30, 200, (3, 5, 5, 4)).astype(np.float32)
+    codes = np.full((1, 3, 2), round(1 + 65534 * 0.5), np.uint16)
+    sums = np.zeros((PARTS, 3, 5, 5, 2), np.float32)
+    add_weights(codes, texture, sums)
+    weights = sums.sum(0)
+
+    def colour(layer: int, channel: int, change: float) -> np.ndarray:
+        moved, out = texture.copy(), np.empty((1, 4), np.float32)
+        moved[layer, :, :, channel] += change
+        render(codes, moved, out)
+        return out[0, :3] * 255
+
+    for layer in range(3):
+        by_red, by_alpha = ((colour(layer, q, 10) - colour(layer, q, -10)) / 20 for q in (0, 3))
+        assert weights[layer, 2, 2, 0] == pytest.approx(by_red[0] ** 2, rel=2e-2)
+        assert weights[layer, 2, 2, 1] == pytest.approx((by_alpha**2).mean(), rel=2e-2)
+
+
+def test_what_shows_moves_and_what_does_not_stays(tmp_path: Path) -> None:
+    """A trembling layer behind an opaque one becomes constant; the one in front, much looked at, stays as it is."""
+    rng = np.random.default_rng(2)
+    textures = rng.integers(100, 110, (2, 8, 16, 16, 4)).astype(np.uint8)
+    textures[0, ..., 3] = 255
+    path = tmp_path / "textures.arrow"
+    write_frames(path, (16, 16, 4), ((n, k, textures[n, k]) for n in range(2) for k in range(8)))
+    codes = np.repeat(rng.integers(1, 65536, (30_000, 1, 2)), 2, 1).astype(np.uint16)
+    store = FrameStore(path)
+    weights = texel_weights(codes, store, 1)
+    found = np.empty_like(textures)
+    for layer, frame, image in held_rows(store, weights, 1.0, progress=False):
+        found[layer, frame] = image
+    assert (found[0] == textures[0]).mean() > 0.99
+    assert (found[1] == found[1, :1]).all()
+    assert np.abs(found[1, 0] - textures[1].mean(0)).max() <= 0.5
