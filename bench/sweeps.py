@@ -1,0 +1,230 @@
+"""The paper's three ablations on our own subjects: number of layers, mesh resolution R^m, texture resolution R^t.
+
+python -m bench.sweeps layers          N = 12, 8, 4, 1: trains again
+python -m bench.sweeps mesh            R^m = 512 ... 8, from the trained model
+python -m bench.sweeps texture         R^t = 1024 ... 128, from the trained model
+python -m bench.sweeps draw            the tables of docs/results.md and the charts, from what is there
+
+A cell is the subject's own configuration with one value changed. It is kept in bench/results/sweeps.json and not
+measured again while configuration, code and data are the same; stages that cells share run once (bench/sweep_cells.py).
+A cell that fails is recorded and the others go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bench.common import OWN_SUBJECTS, words
+from bench.results import commit_name, machine_name
+from bench.runs import in_a_process
+from bench.sweep_cells import Cell, measure, plan, run_stages
+from bench.sweep_rows import Name, Row, add_row, read_rows
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.model.device import pick_device
+from facefolds_core.training.report import device_name
+
+PROJECT = Path(__file__).resolve().parents[1]
+RESULTS = Path("bench/results/sweeps.json")
+ONE_LEVEL: dict[str, dict[str, Any]] = {"compress": {"levels": []}}
+"""Coarser levels of detail are not measured, and cost time."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One ablation.
+
+    Attributes:
+        stage, key: of the parameter whose values are compared.
+        values: the paper's, and 8 layers.
+        overrides: what is changed in all its cells.
+        first: the first stage that runs in a folder of the sweep's own.
+        timed: export stages that a change of the parameter reruns.
+    """
+
+    name: Name
+    stage: str
+    key: str
+    values: tuple[int, ...]
+    overrides: Mapping[str, Mapping[str, Any]]
+    first: str
+    timed: tuple[str, ...]
+
+    def cell(self, value: int, subject: Path, work: Path) -> Cell:
+        overrides = {stage: dict(section) for stage, section in self.overrides.items()}
+        overrides.setdefault(self.stage, {})[self.key] = value
+        return Cell(subject, work, overrides, self.first, PROJECT)
+
+
+SWEEPS: dict[str, Sweep] = {
+    "layers": Sweep(
+        "layers", "train", "layers", (12, 8, 4, 1), ONE_LEVEL, "train",
+        ("sample", "reconstruct", "decimate", "texture", "bake", "compress"),
+    ),
+    "mesh": Sweep(
+        "mesh", "decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ONE_LEVEL, "decimate",
+        ("decimate", "bake", "compress"),
+    ),
+    # As in the paper, textures are sampled once at the highest resolution and made smaller from there. The surfaces keep
+    # 512 x 512 samples.
+    "texture": Sweep(
+        "texture", "texture", "resolution", (1024, 512, 256, 128),
+        {**ONE_LEVEL, "sample": {"resolution": 1024}, "reconstruct": {"resolution": 512}}, "sample",
+        ("texture", "bake", "compress"),
+    ),
+}  # fmt: skip
+
+
+def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
+    """Measure one cell, whatever it takes; called in a process of its own."""
+    key = plan(cell)["evaluate"]
+    folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
+    scores, cost = measure(folders)
+    return Row(
+        **identity(sweep, cell.subject.name, value, key),
+        scores=scores,
+        cost=cost,
+        train_seconds=seconds.get("train", 0.0),
+        export_seconds=round(sum(seconds[stage] for stage in sweep.timed), 3),
+    )
+
+
+def identity(sweep: Sweep, subject: str, value: int, key: str) -> dict[str, Any]:
+    return {
+        "sweep": sweep.name,
+        "subject": subject,
+        "value": value,
+        "key": key,
+        "commit": commit_name(PROJECT),
+        "machine": machine_name(device_name(pick_device("auto"))),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def run_sweep(sweep: Sweep, subject: Path, values: list[int], work: Path, results: Path, force: bool) -> list[str]:
+    """Measure what is missing of a sweep on one subject, telling of each cell.
+
+    Returns:
+        the failed cells, in words.
+    """
+    failed = []
+    for i, value in enumerate(values):
+        title = f"[{i + 1}/{len(values)}] {sweep.name} {value}, {subject.name}"
+        cell = sweep.cell(value, subject, work)
+        key = plan(cell)["evaluate"]
+        if not force and any(r.key == key and r.value == value and not r.failure for r in read_rows(results)):
+            typer.echo(f"{title}: measured already")
+            continue
+        typer.echo(f"{title}: ...")
+        try:
+            row: Row = in_a_process(run_cell, sweep, value, cell)
+        except Exception as error:  # whatever it is, it concerns this cell alone
+            first = (str(error) or repr(error)).splitlines()[0]
+            row = Row(**identity(sweep, subject.name, value, key), failure=f"{type(error).__name__}: {first}"[:300])
+            failed.append(f"{title}: {error}")
+        add_row(results, row)
+        typer.echo(f"{title}: {describe(row)}")
+    return failed
+
+
+def describe(row: Row) -> str:
+    if row.failure:
+        return f"failed: {row.failure}"
+    psnr, ssim, st_lpips = (row.score(name) for name in ("psnr", "ssim", "st_lpips"))
+    shown = [f"{psnr:.2f} dB" if psnr is not None else "", f"SSIM {ssim:.3f}" if ssim is not None else ""]
+    shown += [f"ST-LPIPS {st_lpips:.3f}" if st_lpips is not None else "", f"{row.cost['triangles']} triangles"]
+    shown += [f"{row.cost['mesh_bytes']} + {row.cost['texture_bytes']} bytes"]
+    shown += [f"{row.train_seconds + row.export_seconds:.0f} s of processor time"]
+    return ", ".join(part for part in shown if part)
+
+
+def chosen_subjects(names: str, data: Path) -> list[Path]:
+    """Folders of the subjects; without names, `actor`, and `mugsy` where it is there."""
+    found = words(names) or [name for name in OWN_SUBJECTS if (data / name / "model").exists()] or [OWN_SUBJECTS[0]]
+    for name in found:
+        if not (data / name / "model").exists():
+            raise UserError("no trained model", file=data / name, remedy=f"run `dvc repro evaluate@{name}` first")
+    return [data / name for name in found]
+
+
+def chosen_values(text: str, sweep: Sweep) -> list[int]:
+    try:
+        values = [int(part) for part in words(text)] or list(sweep.values)
+    except ValueError:
+        values = [0]
+    if min(values) < 1:
+        raise UserError("not a list of whole numbers", place="--values", expected="such as 64,32,16", found=text)
+    return values
+
+
+Subjects = Annotated[str, typer.Option(help="Comma-separated names; by default actor, and mugsy where it is there.")]
+Values = Annotated[str, typer.Option(help="Comma-separated, in place of the paper's.")]
+Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject, as `dvc repro` left it.")]
+Work = Annotated[Path | None, typer.Option(help="Folder for the cells; <data>/<subject>/sweeps if left out.")]
+ResultsFile = Annotated[Path, typer.Option(help="File that the rows are added to.")]
+Force = Annotated[bool, typer.Option("--force", help="Score again what is there (stages that ran are not run again).")]
+
+HELP = (__doc__ or "").replace("\n\n", "\n\n\b\n")
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, help=HELP)
+
+
+def sweep_command(
+    sweep: Sweep, subjects: str, values: str, data: Path, work: Path | None, results: Path, force: bool
+) -> None:
+    with report_user_errors("sweeps"):
+        chosen = chosen_values(values, sweep)
+        failed = []
+        for subject in chosen_subjects(subjects, data):
+            failed += run_sweep(sweep, subject, chosen, work or subject / "sweeps", results, force)
+        typer.echo(f"sweeps: rows in {results}; `python -m bench.sweeps draw` makes tables and charts of them")
+        if failed:
+            raise UserError("cells that failed:\n" + "\n".join(failed))
+
+
+@app.command()
+def layers(
+    subjects: Subjects = "",
+    values: Values = "",
+    data: Data = Path("data"),
+    work: Work = None,
+    results: ResultsFile = RESULTS,
+    force: Force = False,
+) -> None:
+    """Number of layers N: 12, 8, 4, 1. Trains a model for each, with the subject's own preset."""
+    sweep_command(SWEEPS["layers"], subjects, values, data, work, results, force)
+
+
+@app.command()
+def mesh(
+    subjects: Subjects = "",
+    values: Values = "",
+    data: Data = Path("data"),
+    work: Work = None,
+    results: ResultsFile = RESULTS,
+    force: Force = False,
+) -> None:
+    """Mesh resolution R^m: 512, 256, 128, 64, 32, 16, 8. Runs decimate, bake and compress for each."""
+    sweep_command(SWEEPS["mesh"], subjects, values, data, work, results, force)
+
+
+@app.command()
+def texture(
+    subjects: Subjects = "",
+    values: Values = "",
+    data: Data = Path("data"),
+    work: Work = None,
+    results: ResultsFile = RESULTS,
+    force: Force = False,
+) -> None:
+    """Texture resolution R^t: 1024, 512, 256, 128. Samples at 1024 once, then texture, bake, compress for each."""
+    sweep_command(SWEEPS["texture"], subjects, values, data, work, results, force)
+
+
+if __name__ == "__main__":
+    app()
