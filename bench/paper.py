@@ -60,8 +60,8 @@ PAPER: dict[str, tuple[PaperPoint, ...]] = {
         PaperPoint(128, 27.32, 0.791, 0.404, 6261920, "183 KB"),
     ),
 }
-"""Ablations: number of manifolds (disk: meshes and video, 240 images of two subjects); R^m (disk: meshes) and R^t (disk: video),
-120 images of subject 002914589."""
+"""Ablations: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk: meshes) and R^t
+(disk: video), 120 images of subject 002914589."""
 
 
 def total_bytes(sweep: str, point: PaperPoint) -> float:

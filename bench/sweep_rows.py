@@ -96,8 +96,8 @@ def table(rows: list[Row], sweep: Name, subject: str) -> str:
     paper = {point.value: point for point in PAPER[sweep]}
     disk = {"layers": "disk", "mesh": "disk (mesh)", "texture": "disk (texture)"}[sweep]
     header = (
-        f"| {AXES[sweep]} | PSNR of the subject | SSIM | ST-LPIPS | whole frame: PSNR | SSIM | ST-LPIPS | triangles | mesh "
-        f"| texture | GPU | seconds | paper: PSNR | SSIM | LPIPS | triangles | {disk} |"
+        f"| {AXES[sweep]} | PSNR of the subject | SSIM | ST-LPIPS | whole frame: PSNR | SSIM | ST-LPIPS | triangles "
+        f"| mesh | texture | GPU | seconds | paper: PSNR | SSIM | LPIPS | triangles | {disk} |"
     )
     lines = [header, "|---" * 17 + "|"]
     for value in sorted({*own, *paper}, reverse=True):

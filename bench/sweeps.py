@@ -70,8 +70,8 @@ SWEEPS: dict[str, Sweep] = {
         "mesh", "decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ONE_LEVEL, "decimate",
         ("decimate", "bake", "compress"),
     ),
-    # As in the paper, textures are sampled once at the highest resolution and made smaller from there. The surfaces keep
-    # 512 x 512 samples.
+    # As in the paper, textures are sampled once at the highest resolution and made smaller from there. The surfaces
+    # keep 512 x 512 samples.
     "texture": Sweep(
         "texture", "texture", "resolution", (1024, 512, 256, 128),
         {**ONE_LEVEL, "sample": {"resolution": 1024}, "reconstruct": {"resolution": 512}}, "sample",
