@@ -135,3 +135,20 @@ def _published(sweep: Name, value: int) -> list[str]:
 
 def number(value: float | None, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f}"
+
+
+def with_tables(text: str, rows: list[Row]) -> str:
+    """The document with the tables of all subjects between each sweep's markers.
+
+    Raises:
+        UserError: if a marker is missing.
+    """
+    for sweep in AXES:
+        start, end = f"<!-- {sweep}: written by bench/sweeps.py draw -->", f"<!-- end of {sweep} -->"
+        if start not in text or end not in text:
+            raise UserError("no place for a table", expected=f"{start} ... {end}", remedy="put the markers back")
+        head, rest = text.split(start)
+        subjects = sorted({row.subject for row in rows if row.sweep == sweep})
+        tables = "\n\n".join(f"`{subject}`:\n\n{table(rows, sweep, subject)}" for subject in subjects)
+        text = f"{head}{start}\n{tables}\n{end}{rest.split(end)[1]}"
+    return text

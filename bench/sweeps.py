@@ -24,13 +24,18 @@ from bench.common import OWN_SUBJECTS, words
 from bench.results import commit_name, machine_name
 from bench.runs import in_a_process
 from bench.sweep_cells import Cell, measure, plan, run_stages
-from bench.sweep_rows import Name, Row, add_row, read_rows
+from bench.sweep_chart import draw, write_plot_data
+from bench.sweep_rows import Name, Row, add_row, read_rows, with_tables
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files import write_text
 from facefolds_core.model.device import pick_device
+from facefolds_core.sweeps.table import Run, write_runs
 from facefolds_core.training.report import device_name
 
 PROJECT = Path(__file__).resolve().parents[1]
 RESULTS = Path("bench/results/sweeps.json")
+PICTURE = Path("docs/images/sweeps.png")
+DOCUMENT = Path("docs/results.md")
 ONE_LEVEL: dict[str, dict[str, Any]] = {"compress": {"levels": []}}
 """Coarser levels of detail are not measured, and cost time."""
 
@@ -224,6 +229,41 @@ def texture(
 ) -> None:
     """Texture resolution R^t: 1024, 512, 256, 128. Samples at 1024 once, then texture, bake, compress for each."""
     sweep_command(SWEEPS["texture"], subjects, values, data, work, results, force)
+
+
+@app.command("draw")
+def draw_all(
+    results: ResultsFile = RESULTS,
+    picture: Annotated[Path, typer.Option(help="The chart; an SVG is written beside it.")] = PICTURE,
+    document: Annotated[Path, typer.Option(help="Its tables are replaced, between their markers.")] = DOCUMENT,
+) -> None:
+    """Tables, charts, points for `dvc plots`, and a table for `stages.recommend`, from what has been measured."""
+    with report_user_errors("sweeps"):
+        rows = read_rows(results)
+        draw(rows, picture)
+        draw(rows, picture.with_suffix(".svg"))
+        write_plot_data(rows, results.parent)
+        write_runs(results.with_suffix(".csv"), [as_run(row) for row in rows])
+        write_text(document, with_tables(document.read_text(encoding="utf-8"), rows))
+        typer.echo(
+            f"sweeps: {picture}, {picture.with_suffix('.svg')}, tables in {document}, {results.with_suffix('.csv')}"
+        )
+
+
+def as_run(row: Row) -> Run:
+    """A row as `stages.recommend` reads it; what is not under `params` is as the subject has it."""
+    sweep = SWEEPS[row.sweep]
+    params = {
+        f"{stage}.{key}": value
+        for stage, section in sweep.cell(row.value, Path(row.subject), Path()).overrides.items()
+        for key, value in section.items()
+        if stage != "compress"
+    }
+    figures = {name: value for name, value in row.scores.items() if value is not None}
+    figures |= {name: float(value) for name, value in row.cost.items()}
+    if not row.failure:
+        figures["bytes"] = float(row.bytes + row.cost["view_effects_bytes"])
+    return Run(f"{row.sweep} {row.value}", row.subject, row.commit, params, figures, row.failure)
 
 
 if __name__ == "__main__":
