@@ -21,6 +21,7 @@ class Row(BaseModel):
 
     Attributes:
         sweep, subject, value: which cell.
+        params: "section.key" -> value of what differs from the subject's configuration.
         key: digest of its configuration, code and data: a cell of the same key need not be measured again.
         commit: of the code, "+" if tracked files had been changed since.
         scores: of the shipped asset, docs/metrics.md; empty if it failed.
@@ -36,6 +37,7 @@ class Row(BaseModel):
     sweep: Name
     subject: str
     value: Annotated[int, Field(ge=1)]
+    params: dict[str, int]
     key: str
     commit: str
     machine: str

@@ -12,7 +12,6 @@ A cell that fails is recorded and the others go on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,9 +25,12 @@ from bench.runs import in_a_process
 from bench.sweep_cells import Cell, measure, plan, run_stages
 from bench.sweep_chart import draw, write_plot_data
 from bench.sweep_rows import Name, Row, add_row, read_rows, with_tables
+from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_text
 from facefolds_core.model.device import pick_device
+from facefolds_core.params import SampleParams
+from facefolds_core.paths import SubjectFolders
 from facefolds_core.sweeps.table import Run, write_runs
 from facefolds_core.training.report import device_name
 
@@ -36,8 +38,6 @@ PROJECT = Path(__file__).resolve().parents[1]
 RESULTS = Path("bench/results/sweeps.json")
 PICTURE = Path("docs/images/sweeps.png")
 DOCUMENT = Path("docs/results.md")
-ONE_LEVEL: dict[str, dict[str, Any]] = {"compress": {"levels": []}}
-"""Coarser levels of detail are not measured, and cost time."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,6 @@ class Sweep:
     Attributes:
         stage, key: of the parameter whose values are compared.
         values: the paper's, and 8 layers.
-        overrides: what is changed in all its cells.
-        first: the first stage that runs in a folder of the sweep's own.
         timed: export stages that a change of the parameter reruns.
     """
 
@@ -56,32 +54,33 @@ class Sweep:
     stage: str
     key: str
     values: tuple[int, ...]
-    overrides: Mapping[str, Mapping[str, Any]]
-    first: str
     timed: tuple[str, ...]
 
     def cell(self, value: int, subject: Path, work: Path) -> Cell:
-        overrides = {stage: dict(section) for stage, section in self.overrides.items()}
-        overrides.setdefault(self.stage, {})[self.key] = value
-        return Cell(subject, work, overrides, self.first, PROJECT)
+        """The subject's own configuration with the value; a coarser level of detail is not measured and left out.
+
+        Textures finer than the subject's samples would show no more: then it is sampled as finely, once, and its
+        surfaces keep the vertices that they had.
+        """
+        overrides: dict[str, dict[str, Any]] = {self.stage: {self.key: value}, "compress": {"levels": []}}
+        first = self.stage
+        if self.name == "texture":
+            samples = read_stage(SampleParams, SubjectFolders(subject).config).resolution
+            if value > samples:
+                overrides |= {"sample": {"resolution": value}, "reconstruct": {"resolution": samples}}
+                first = "sample"
+        return Cell(subject, work, overrides, first, PROJECT)
 
 
 SWEEPS: dict[str, Sweep] = {
     "layers": Sweep(
-        "layers", "train", "layers", (12, 8, 4, 1), ONE_LEVEL, "train",
+        "layers", "train", "layers", (12, 8, 4, 1),
         ("sample", "reconstruct", "decimate", "texture", "bake", "compress"),
     ),
     "mesh": Sweep(
-        "mesh", "decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ONE_LEVEL, "decimate",
-        ("decimate", "bake", "compress"),
+        "mesh", "decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ("decimate", "bake", "compress"),
     ),
-    # As in the paper, textures are sampled once at the highest resolution and made smaller from there. The surfaces
-    # keep 512 x 512 samples.
-    "texture": Sweep(
-        "texture", "texture", "resolution", (1024, 512, 256, 128),
-        {**ONE_LEVEL, "sample": {"resolution": 1024}, "reconstruct": {"resolution": 512}}, "sample",
-        ("texture", "bake", "compress"),
-    ),
+    "texture": Sweep("texture", "texture", "resolution", (1024, 512, 256, 128), ("texture", "bake", "compress")),
 }  # fmt: skip
 
 
@@ -91,7 +90,7 @@ def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
     folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
     scores, cost = measure(folders)
     return Row(
-        **identity(sweep, cell.subject.name, value, key),
+        **identity(sweep, value, cell, key),
         scores=scores,
         cost=cost,
         train_seconds=seconds.get("train", 0.0),
@@ -99,11 +98,14 @@ def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
     )
 
 
-def identity(sweep: Sweep, subject: str, value: int, key: str) -> dict[str, Any]:
+def identity(sweep: Sweep, value: int, cell: Cell, key: str) -> dict[str, Any]:
+    """Of a row: which cell, and where and when it was measured."""
+    changed = {f"{stage}.{k}": v for stage, keys in cell.overrides.items() for k, v in keys.items()}
     return {
         "sweep": sweep.name,
-        "subject": subject,
+        "subject": cell.subject.name,
         "value": value,
+        "params": {name: v for name, v in changed.items() if isinstance(v, int)},
         "key": key,
         "commit": commit_name(PROJECT),
         "machine": machine_name(device_name(pick_device("auto"))),
@@ -130,7 +132,7 @@ def run_sweep(sweep: Sweep, subject: Path, values: list[int], work: Path, result
             row: Row = in_a_process(run_cell, sweep, value, cell)
         except Exception as error:  # whatever it is, it concerns this cell alone
             first = (str(error) or repr(error)).splitlines()[0]
-            row = Row(**identity(sweep, subject.name, value, key), failure=f"{type(error).__name__}: {first}"[:300])
+            row = Row(**identity(sweep, value, cell, key), failure=f"{type(error).__name__}: {first}"[:300])
             failed.append(f"{title}: {error}")
         add_row(results, row)
         typer.echo(f"{title}: {describe(row)}")
@@ -227,7 +229,7 @@ def texture(
     results: ResultsFile = RESULTS,
     force: Force = False,
 ) -> None:
-    """Texture resolution R^t: 1024, 512, 256, 128. Samples at 1024 once, then texture, bake, compress for each."""
+    """Texture resolution R^t: 1024, 512, 256, 128. Runs texture, bake and compress for each, above the samples' also sample."""
     sweep_command(SWEEPS["texture"], subjects, values, data, work, results, force)
 
 
@@ -252,18 +254,11 @@ def draw_all(
 
 def as_run(row: Row) -> Run:
     """A row as `stages.recommend` reads it; what is not under `params` is as the subject has it."""
-    sweep = SWEEPS[row.sweep]
-    params = {
-        f"{stage}.{key}": value
-        for stage, section in sweep.cell(row.value, Path(row.subject), Path()).overrides.items()
-        for key, value in section.items()
-        if stage != "compress"
-    }
     figures = {name: value for name, value in row.scores.items() if value is not None}
     figures |= {name: float(value) for name, value in row.cost.items()}
     if not row.failure:
         figures["bytes"] = float(row.bytes + row.cost["view_effects_bytes"])
-    return Run(f"{row.sweep} {row.value}", row.subject, row.commit, params, figures, row.failure)
+    return Run(f"{row.sweep} {row.value}", row.subject, row.commit, row.params, figures, row.failure)
 
 
 if __name__ == "__main__":
