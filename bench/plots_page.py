@@ -1,4 +1,4 @@
-"""Make .dvc/plots_page.html, the page that `dvc plots` fills, with the Vega library in it, so that no network is needed.
+"""Make .dvc/plots_page.html, the page that `dvc plots` fills, with the Vega library in it: no network is needed.
 
 python -m bench.plots_page FOLDER/node_modules
 

@@ -229,7 +229,7 @@ def texture(
     results: ResultsFile = RESULTS,
     force: Force = False,
 ) -> None:
-    """Texture resolution R^t: 1024, 512, 256, 128. Runs texture, bake and compress for each, above the samples' also sample."""
+    """Texture resolution R^t: 1024, 512, 256, 128. Texture, bake and compress for each."""
     sweep_command(SWEEPS["texture"], subjects, values, data, work, results, force)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
@@ -35,7 +36,8 @@ def set_for_subject(path: Path, subject: str, values: Mapping[str, Any]) -> None
         place = tree["subjects"][subject]
         for folder in folders:
             if not isinstance(place.get(folder), dict):
-                place[folder] = {}
+                place[folder] = CommentedMap()
+                place[folder].fa.set_flow_style()
             place = place[folder]
         place[key] = value
     text = StringIO()
