@@ -60,6 +60,17 @@ MADE = {
 }
 """What each stage leaves in a subject's folder."""
 
+SIZES = (
+    "vertices",
+    "triangles",
+    "mesh_bytes",
+    "texture_bytes",
+    "video_bits_per_second",
+    "view_effects_bytes",
+    "gpu_bytes",
+)
+"""Keys of `cost` in metrics.json that are about the asset."""
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -180,6 +191,19 @@ def _prepare(folders: SubjectFolders, before: Path, stage: str, cell: Cell) -> N
             (folders.root / name).symlink_to((before / name).resolve())
     for name in [*RUN, "evaluate"]:
         write_json(folders.config / f"{name}.json", cell.section(name))
+
+
+def own_metrics(cell: Cell) -> tuple[dict[str, float | None], dict[str, int]] | None:
+    """Scores and sizes of the subject's asset, if the cell is its configuration; coarser levels make no difference."""
+    folders = SubjectFolders(cell.subject)
+    values = [(stage, key, value) for stage, keys in cell.overrides.items() for key, value in keys.items()]
+    for stage, key, value in values:
+        if (stage, key) != ("compress", "levels") and read_json(folders.config / f"{stage}.json").get(key) != value:
+            return None
+    if not folders.metrics.exists():
+        return None
+    metrics = read_json(folders.metrics)
+    return metrics["asset"], {name: value for name, value in metrics["cost"].items() if name in SIZES}
 
 
 def measure(folders: SubjectFolders) -> tuple[dict[str, float | None], dict[str, int]]:

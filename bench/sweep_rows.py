@@ -27,7 +27,7 @@ class Row(BaseModel):
         scores: of the shipped asset, docs/metrics.md; empty if it failed.
         cost: its sizes, docs/metrics.md; empty if it failed.
         train_seconds, export_seconds: processor seconds, on all threads together, of the stages that the sweep's axis
-            concerns.
+            concerns; 0 where they were not run for it.
         failure: the error's first line, or "".
         date: UTC, ISO 8601.
     """
@@ -123,7 +123,7 @@ def _ours(row: Row | None) -> list[str]:
         size(cost["mesh_bytes"]),
         size(cost["texture_bytes"]),
         size(cost["gpu_bytes"]),
-        f"{row.train_seconds:.0f} + {row.export_seconds:.0f}" if row.train_seconds else f"{row.export_seconds:.0f}",
+        " + ".join(f"{seconds:.0f}" for seconds in (row.train_seconds, row.export_seconds) if seconds),
     ]
 
 

@@ -22,7 +22,7 @@ import typer
 from bench.common import OWN_SUBJECTS, words
 from bench.results import commit_name, machine_name
 from bench.runs import in_a_process
-from bench.sweep_cells import Cell, measure, plan, run_stages
+from bench.sweep_cells import Cell, measure, own_metrics, plan, run_stages
 from bench.sweep_chart import draw, write_plot_data
 from bench.sweep_rows import Name, Row, add_row, read_rows, with_tables
 from facefolds_core.config import read_stage
@@ -85,8 +85,14 @@ SWEEPS: dict[str, Sweep] = {
 
 
 def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
-    """Measure one cell, whatever it takes; called in a process of its own."""
+    """Measure one cell, whatever it takes; called in a process of its own.
+
+    The subject's own configuration is not run again: its figures are those of `dvc repro`, without our seconds.
+    """
     key = plan(cell)["evaluate"]
+    own = own_metrics(cell)
+    if own is not None:
+        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1])
     folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
     scores, cost = measure(folders)
     return Row(
@@ -146,7 +152,8 @@ def describe(row: Row) -> str:
     shown = [f"{psnr:.2f} dB" if psnr is not None else "", f"SSIM {ssim:.3f}" if ssim is not None else ""]
     shown += [f"ST-LPIPS {st_lpips:.3f}" if st_lpips is not None else "", f"{row.cost['triangles']} triangles"]
     shown += [f"{row.cost['mesh_bytes']} + {row.cost['texture_bytes']} bytes"]
-    shown += [f"{row.train_seconds + row.export_seconds:.0f} s of processor time"]
+    seconds = row.train_seconds + row.export_seconds
+    shown += [f"{seconds:.0f} s of processor time" if seconds else "the subject's own, as `dvc repro` left it"]
     return ", ".join(part for part in shown if part)
 
 

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bench import sweep_cells, sweeps
-from bench.sweep_cells import MADE, RUN, Cell, plan, run_stages
+from bench.sweep_cells import MADE, RUN, Cell, own_metrics, plan, run_stages
 from bench.sweep_rows import Row, read_rows
 from bench.sweeps import SWEEPS, as_run, chosen_values, run_sweep
 from facefolds_core.errors import UserError
@@ -84,6 +84,16 @@ def test_an_interrupted_stage_runs_again(subject: Path, tmp_path: Path, ran: lis
     ran.clear()
     run(cell)
     assert ran == ["compress"]
+
+
+def test_the_subjects_own_configuration_is_taken_as_it_is(subject: Path, tmp_path: Path) -> None:
+    (subject / "metrics.json").write_text(
+        json.dumps({"asset": {"psnr": 20.0}, "cost": {"triangles": 7, "device": "cpu", "train_seconds": 1.5}})
+    )
+    assert own_metrics(SWEEPS["mesh"].cell(64, subject, tmp_path)) == ({"psnr": 20.0}, {"triangles": 7})
+    assert own_metrics(SWEEPS["mesh"].cell(32, subject, tmp_path)) is None
+    (subject / "metrics.json").unlink()
+    assert own_metrics(SWEEPS["mesh"].cell(64, subject, tmp_path)) is None
 
 
 def test_the_key_follows_configuration_and_data(subject: Path, tmp_path: Path) -> None:
