@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from bench.chart import FRONTIER, FRONTIER_COLOUR, RING
 from bench.paper import PAPER, total_bytes
@@ -81,10 +82,12 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                 grid[-1, j].set_xlabel(AXES[axis])
             grid[i, 0].set_ylabel("PSNR, dB (higher is better)")
             grid[i, 0].set_title(subject, loc="left", fontsize=9, fontweight="bold")
-        figure.suptitle("Held-out quality of the asset against what it costs", fontsize=11, x=0.01, ha="left")
+        figure.suptitle("Held-out quality against cost", fontsize=11, x=0.01, ha="left")
         lines = {str(line.get_label()): line for axes in grid.flat for line in axes.get_lines()}
         names = [name for name in (FRONTIER, *NAMES.values(), PAPER_NAME) if name in lines]
-        figure.legend([lines[n] for n in names], names, loc="upper right", ncols=len(names), frameon=False, fontsize=8)
+        figure.legend(
+            [lines[n] for n in names], names, loc="upper right", ncols=len(names), frameon=False, fontsize=7.5
+        )
         figure.supxlabel(f"{NOTE}\n{origin(rows)}", fontsize=6.5, x=0.01, ha="left", color="#555555")
         with atomic_file(path) as temporary:
             figure.savefig(temporary, metadata={"Date": None} if path.suffix == ".svg" else None)
@@ -94,6 +97,9 @@ def _panel(axes: Axes, own: list[Point], paper: list[Point]) -> None:
     for sweep in COLOURS:
         line = sorted((p for p in paper if p.sweep == sweep), key=lambda p: p.value)
         axes.plot([p.x for p in line], [p.psnr for p in line], "D-", color=PAPER_COLOUR, lw=0.8, ms=3, label=PAPER_NAME)
+        text: dict[str, Any] = {"color": PAPER_COLOUR, "fontsize": 6.5, "textcoords": "offset points", "ha": "right"}
+        for p in (line[0], line[-1]):
+            axes.annotate(f"{sweep} {p.value}", (p.x, p.psnr), (-4, 3), **text)
     front = [own[i] for i in best(own)]
     steps: dict[str, Any] = {"drawstyle": "steps-post", "solid_capstyle": "butt"}
     axes.plot(
@@ -106,11 +112,20 @@ def _panel(axes: Axes, own: list[Point], paper: list[Point]) -> None:
         axes.plot([p.x for p in line], [p.psnr for p in line], "o-", color=colour, lw=1.4, ms=4, label=NAMES[sweep])
         for p in line:
             offset = {"layers": (0, -11), "mesh": (0, 6), "texture": (6, -9)}[sweep]
-            text: dict[str, Any] = {"color": colour, "fontsize": 6.5, "ha": "center", "textcoords": "offset points"}
+            text = {"color": colour, "fontsize": 6.5, "ha": "center", "textcoords": "offset points"}
             axes.annotate(str(p.value), (p.x, p.psnr), offset, **text)
     axes.plot([p.x for p in front], [p.psnr for p in front], "o", **RING)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: _short(x)))
     axes.grid(color="#e6e6e6", lw=0.6, zorder=0)
+
+
+def _short(count: float) -> str:
+    """1e6 -> "1 M"."""
+    for unit, factor in (("M", 1e6), ("k", 1e3)):
+        if count >= factor:
+            return f"{count / factor:g} {unit}"
+    return f"{count:g}"
 
 
 def origin(rows: Sequence[Row]) -> str:

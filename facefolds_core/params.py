@@ -6,7 +6,6 @@ Nothing below `stages/` reads a raw dictionary of parameters.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -430,18 +429,17 @@ class Params(Section):
     def stage(self, stage: str, subject: str) -> Section:
         """The section of `stage` for `subject`: params.yaml's values, then the subject's overrides."""
         overrides: dict[str, Any] = getattr(self.subject(subject), stage)
-        section = merged(self.sections.get(stage, {}), overrides)
+        merged = _merge(self.sections.get(stage, {}), overrides)
         place = f"{stage} (for subject {subject})" if overrides else stage
-        return _validate(STAGE_SECTIONS[stage], section, self.path, place)
+        return _validate(STAGE_SECTIONS[stage], merged, self.path, place)
 
 
-def merged(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, Any]:
-    """A section with a subject's overrides: key by key, within mappings too."""
-    result = dict(base)
+def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
     for key, value in override.items():
-        both = isinstance(value, dict) and isinstance(result.get(key), dict)
-        result[key] = merged(result[key], value) if both else value
-    return result
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged
 
 
 def _validate(kind: type[T], value: Any, file: str | Path, place: str) -> T:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from facefolds_core.errors import UserError
-from facefolds_core.params import STAGE_SECTIONS, merged
+from facefolds_core.params import STAGE_SECTIONS
 from facefolds_core.sweeps.table import Run
 
 PARAMS = "params.yaml"
@@ -91,11 +91,11 @@ def figures_of(metrics: Mapping[str, Any]) -> dict[str, float]:
 
 
 def sections_of(params: Mapping[str, Any], subject: str) -> dict[str, Any]:
-    """ "section.key" -> value for one subject, from a whole params.yaml."""
+    """ "section.key" -> value for one subject, from a whole params.yaml; overrides beat sections."""
     found: dict[str, Any] = {}
-    for stage in STAGE_SECTIONS:
-        section = merged(params.get(stage) or {}, params["subjects"][subject].get(stage) or {})
-        found |= dict(_leaves(stage, section))
+    for values in (params, params["subjects"][subject]):
+        for stage in STAGE_SECTIONS:
+            found |= dict(_leaves(stage, values.get(stage) or {}))
     return found
 
 
