@@ -73,7 +73,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     subjects = sorted({row.subject for row in rows if not row.failure})
     if not subjects:
         raise UserError("nothing measured yet", remedy="run `python -m bench.sweeps mesh`, `texture` or `layers`")
-    with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+    with matplotlib.rc_context(
+        {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "0"}
+    ):
         figure = Figure(figsize=(10.5, 1.3 + 3.7 * len(subjects)), dpi=150, layout="constrained")
         grid = figure.subplots(len(subjects), len(AXES), sharex="col", sharey="row", squeeze=False)
         for i, subject in enumerate(subjects):
@@ -97,9 +99,8 @@ def _panel(axes: Axes, own: list[Point], paper: list[Point]) -> None:
     for sweep in COLOURS:
         line = sorted((p for p in paper if p.sweep == sweep), key=lambda p: p.value)
         axes.plot([p.x for p in line], [p.psnr for p in line], "D-", color=PAPER_COLOUR, lw=0.8, ms=3, label=PAPER_NAME)
-        text: dict[str, Any] = {"color": PAPER_COLOUR, "fontsize": 6.5, "textcoords": "offset points", "ha": "right"}
-        for p in (line[0], line[-1]):
-            axes.annotate(f"{sweep} {p.value}", (p.x, p.psnr), (-4, 3), **text)
+        text: dict[str, Any] = {"color": PAPER_COLOUR, "fontsize": 6.5, "textcoords": "offset points", "ha": "center"}
+        axes.annotate(f"{sweep} {line[0].value}", (line[0].x, line[0].psnr), (0, -10), **text)
     front = [own[i] for i in best(own)]
     steps: dict[str, Any] = {"drawstyle": "steps-post", "solid_capstyle": "butt"}
     axes.plot(
