@@ -30,11 +30,11 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.export.between import Moved, between_rows, sources
 from facefolds_core.export.stores import read_meshes
 from facefolds_core.files import atomic_file, read_json, write_json
-from facefolds_core.packaging.views import Shown
 from facefolds_core.params import CaptureParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.rendering import Hits, composite
+from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.scoring.metrics import shown
 
 MOVES = 0.05
@@ -230,8 +230,8 @@ def measure(folders: SubjectFolders, work: Path, split: Split, factor: int) -> l
         path = work / f"{split}_{factor}_{method}.json"
         if not path.exists():
             if not hits:
-                caster = AssetCaster(Shown(read_meshes(folders.meshes / "meshes.npz")))
-                hits = {camera: caster.cast(scene.cameras[camera]) for camera in cameras}
+                meshes = read_meshes(folders.meshes / "meshes.npz")
+                hits = {camera: cast_layers(scene.cameras[camera], meshes) for camera in cameras}
             start = time.process_time()
             scores = list(scores_of(method, store, hits, truths, factor))
             typer.echo(f"between: {method}: {time.process_time() - start:.1f} processor seconds, rendering included")
@@ -244,7 +244,7 @@ def draw(path: Path, folders: SubjectFolders, truth: Truth, camera: int, interva
     """Rows: truth, cross-fade, ours, over black; columns: the middle of the intervals. Cut to what moves, enlarged."""
     store = FrameStore(folders.textures / "textures.arrow")
     meshes, scene = read_meshes(folders.meshes / "meshes.npz"), read_scene(folders.scene)
-    cast = AssetCaster(Shown(meshes)).cast(scene.cameras[camera])
+    cast = cast_layers(scene.cameras[camera], meshes)
     wanted = [k * factor + factor // 2 for k in intervals]
     rows = [[truth.pictures[at] / 255.0 * (truth.opacity[at] / 255.0)[..., None] for at in wanted]]
     for method in ("cross-fade", "ours"):

@@ -16,6 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from bench.results import Measurement
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file, write_json
+from facefolds_core.sweeps.frontier import frontier
 
 COLOURS = {"fast": "#d1495b", "quick": "#00798c", "paper": "#5b5b66"}
 SPARE_COLOURS = ("#edae49", "#66a182", "#8d6a9f")
@@ -75,17 +76,6 @@ def chart_data(measurements: Sequence[Measurement]) -> list[Measurement]:
     for candidates in series.values():
         best = max(candidates.values(), key=lambda ms: max(m.date for m in ms))
         chosen += sorted({m.iterations: m for m in best}.values(), key=lambda m: m.seconds)
-    return chosen
-
-
-def frontier(points: Sequence[tuple[float, float]], up: bool = True) -> list[int]:
-    """Indices of the points (seconds, value) that no other point beats in one and equals in the other, by seconds."""
-    sign = 1 if up else -1
-    best, chosen = float("-inf"), []
-    for i in sorted(range(len(points)), key=lambda i: (points[i][0], -sign * points[i][1])):
-        if sign * points[i][1] > best:
-            best = sign * points[i][1]
-            chosen.append(i)
     return chosen
 
 

@@ -32,14 +32,14 @@ from facefolds_core.asset.video import decode_video, encode_video, pack_frame, u
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.config import write_configs
 from facefolds_core.errors import report_user_errors
 from facefolds_core.export.stores import read_meshes, read_windows
 from facefolds_core.files import atomic_file, read_json, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.views import spread, training_cameras
-from facefolds_core.params import MeshCodec, VideoCodec, load_params
+from facefolds_core.params import MeshCodec, VideoCodec
+from facefolds_core.params_file import load_params, write_configs
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite

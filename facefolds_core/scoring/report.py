@@ -82,18 +82,27 @@ def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
     """
     training = _read(Training, folders.model / "training.json")
     timings = [_read(Timing, folders.timing(stage)) for stage in EXPORT_STAGES]
-    level = manifest.full
-    vertices, triangles = sum(x.vertices for x in level.layers), sum(x.triangles for x in level.layers)
-    picture = level.texture.width * level.texture.height
     return {
         "train_seconds": round(training.seconds, 3),
         "iterations": training.iterations,
         "device": training.device,
         "export_seconds": round(sum(t.seconds for t in timings), 3),
+        **asset_cost(manifest),
+    }
+
+
+def asset_cost(manifest: Manifest) -> dict[str, int]:
+    """What the full level costs a player (docs/metrics.md, `cost`)."""
+    level = manifest.full
+    vertices, triangles = sum(x.vertices for x in level.layers), sum(x.triangles for x in level.layers)
+    picture = level.texture.width * level.texture.height
+    video = level.texture.videos[0].bytes
+    return {
         "vertices": vertices,
         "triangles": triangles,
         "mesh_bytes": sum(x.bytes for x in level.layers),
-        "texture_bytes": level.texture.videos[0].bytes,
+        "texture_bytes": video,
+        "video_bits_per_second": round(8 * video * level.texture.fps / level.texture.frames),
         "view_effects_bytes": level.view_effects.bytes if level.view_effects else 0,
         "gpu_bytes": VERTEX_BYTES * vertices + 3 * INDEX_BYTES * triangles + PIXEL_BYTES * picture,
     }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.chart import chart_data, draw, frontier, write_plot_data
+from bench.chart import chart_data, draw, write_plot_data
 from bench.results import Conditions, Measurement, Scores
 from facefolds_core.errors import UserError
 
@@ -27,13 +27,6 @@ def measurement(preset: str, seconds: float, psnr: float, **values: object) -> M
             **values,
         }
     )
-
-
-def test_frontier_holds_what_nothing_beats() -> None:
-    points = [(30.0, 24.0), (10.0, 20.0), (20.0, 19.0), (10.0, 18.0), (60.0, 24.0), (90.0, 25.0)]
-    assert frontier(points) == [1, 0, 5]
-    assert frontier([(t, -v) for t, v in points], up=False) == [1, 0, 5]
-    assert frontier([]) == []
 
 
 def test_the_newest_series_of_a_preset_is_drawn_on_one_clock() -> None:

@@ -33,6 +33,7 @@ COST_KEYS = [
     "triangles",
     "mesh_bytes",
     "texture_bytes",
+    "video_bits_per_second",
     "view_effects_bytes",
     "gpu_bytes",
 ]

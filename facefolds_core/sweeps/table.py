@@ -1,0 +1,152 @@
+"""The table of a sweep: one row a configuration of a subject, measured or failed, as Parquet or CSV.
+
+Columns: `experiment`, `revision`, `subject`, `error` (strings); then one a parameter, whose name has a dot
+("decimate.resolution"), null where the row leaves it as the subject has it; then one a measured figure, null where
+there is none. Columns of parameters hold numbers where all their values are numbers, else JSON text.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pa_parquet
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_file
+
+NAMES = ("experiment", "revision", "subject", "error")
+SUFFIXES = (".parquet", ".csv")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One configuration of a subject.
+
+    Attributes:
+        experiment: its name.
+        revision: of the experiment, "" for what lies in the working folder.
+        subject: name in params.yaml.
+        params: "section.key" -> value; what is left out is as the subject has it.
+        figures: "psnr", "triangles", "bytes", ...
+        error: why it failed, or "".
+    """
+
+    experiment: str
+    subject: str
+    revision: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+    figures: Mapping[str, float] = field(default_factory=dict)
+    error: str = ""
+
+    def figure(self, name: str) -> float | None:
+        return self.figures.get(name)
+
+    @property
+    def quality(self) -> float | None:
+        """PSNR on held-out cameras, dB: of the subject where the capture has masks, else of the whole frame."""
+        return self.figures.get("psnr_subject", self.figures.get("psnr"))
+
+
+def write_runs(path: Path, runs: Sequence[Run]) -> None:
+    """Write the table in the format that the suffix names.
+
+    Raises:
+        UserError: if it names none.
+    """
+    _check_suffix(path)
+    columns: dict[str, pa.Array] = {name: pa.array([getattr(run, name) for run in runs], pa.string()) for name in NAMES}
+    for name in _union(run.params for run in runs):
+        values = [run.params.get(name) for run in runs]
+        columns[name] = _numbers(values) or pa.array(
+            [None if v is None else json.dumps(v) for v in values], pa.string()
+        )
+    for name in _union(run.figures for run in runs):
+        columns[name] = pa.array([run.figures.get(name) for run in runs], pa.float64())
+    with atomic_file(path) as temporary:
+        table = pa.table(columns)
+        if path.suffix == ".csv":
+            pa_csv.write_csv(table, temporary)
+        else:
+            pa_parquet.write_table(table, temporary)
+
+
+def read_runs(path: Path) -> list[Run]:
+    """Read a table again.
+
+    Raises:
+        UserError: if it is missing or not such a table.
+    """
+    _check_suffix(path)
+    remedy = "`python -m stages.collect` writes one"
+    try:
+        if path.suffix == ".csv":
+            texts = pa_csv.ConvertOptions(strings_can_be_null=True, column_types=dict.fromkeys(NAMES, pa.string()))
+            table = pa_csv.read_csv(path, convert_options=texts)
+        else:
+            table = pa_parquet.read_table(path)
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy=remedy) from None
+    except (pa.ArrowInvalid, OSError) as error:
+        raise UserError("not a table of a sweep", file=path, found=str(error)[:200], remedy=remedy) from None
+    missing = [name for name in NAMES if name not in table.column_names]
+    if missing:
+        raise UserError("not a table of a sweep", file=path, expected=f"columns {', '.join(missing)}", remedy=remedy)
+    return [_run(row, path) for row in table.to_pylist()]
+
+
+def _run(row: dict[str, Any], path: Path) -> Run:
+    named = {name: row.pop(name) or "" for name in NAMES}
+    params, figures = {}, {}
+    for name, value in row.items():
+        if value is None:
+            continue
+        if "." in name:
+            params[name] = _value(value, name, path)
+        elif isinstance(value, (int, float)) and math.isfinite(value):
+            figures[name] = float(value)
+        else:
+            raise UserError("not a number", file=path, place=f"column {name}", found=value, remedy="collect it again")
+    return Run(**named, params=params, figures=figures)
+
+
+def _value(value: Any, name: str, path: Path) -> Any:
+    if not isinstance(value, str):
+        return value
+    try:
+        return json.loads(value)
+    except json.JSONDecodeError:
+        raise UserError(
+            "garbled parameter",
+            file=path,
+            place=f"column {name}",
+            expected="JSON",
+            found=value,
+            remedy="collect it again",
+        ) from None
+
+
+def _union(mappings: Any) -> list[str]:
+    """Keys in the order in which they come first."""
+    return list(dict.fromkeys(key for mapping in mappings for key in mapping))
+
+
+def _numbers(values: list[Any]) -> pa.Array | None:
+    """None if something else than numbers is among them."""
+    known = [value for value in values if value is not None]
+    if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in known):
+        return None
+    return pa.array(values, pa.int64() if all(isinstance(value, int) for value in known) else pa.float64())
+
+
+def _check_suffix(path: Path) -> None:
+    if path.suffix not in SUFFIXES:
+        raise UserError(
+            "an unknown kind of table", file=path, expected=" or ".join(SUFFIXES), found=path.suffix or "none"
+        )

@@ -1,0 +1,69 @@
+"""Pick a configuration from a sweep: `python -m stages.recommend --max-bytes 1e6 [--write]`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.sweeps.edit import set_for_subject
+from facefolds_core.sweeps.recommend import Budget, recommend
+from facefolds_core.sweeps.table import Run, read_runs
+
+SHOWN = ("psnr_subject", "psnr", "triangles", "bytes", "gpu_bytes", "video_bits_per_second")
+
+
+def choose(
+    table: Annotated[Path, typer.Argument(help="Written by `python -m stages.collect`: Parquet or CSV.")] = Path(
+        "sweep.parquet"
+    ),
+    subject: Annotated[str, typer.Option(help="Name of the subject; needed where the table has several.")] = "",
+    max_bytes: Annotated[float | None, typer.Option(help="Of meshes and video together.")] = None,
+    max_triangles: Annotated[float | None, typer.Option(help="Of all layers.")] = None,
+    max_gpu_bytes: Annotated[float | None, typer.Option(help="Of vertices, indices and a decoded picture.")] = None,
+    max_bit_rate: Annotated[float | None, typer.Option(help="Of the texture video, bits a second.")] = None,
+    min_psnr: Annotated[
+        float | None, typer.Option(help="dB on held-out cameras, of the subject where there are masks.")
+    ] = None,
+    write: Annotated[bool, typer.Option("--write", help="Put it into params.yaml, for this subject.")] = False,
+    params: Annotated[Path, typer.Option(help="The file that --write changes.")] = Path("params.yaml"),
+) -> None:
+    """The best measured configuration within a budget, or the smallest one that is good enough."""
+    with report_user_errors("recommend"):
+        runs = of_subject(read_runs(table), subject, table)
+        run = recommend(runs, Budget(max_bytes, max_triangles, max_gpu_bytes, max_bit_rate), min_psnr)
+        typer.echo(f"recommend: {run.subject}, {run.experiment}")
+        for name, value in run.params.items():
+            typer.echo(f"  {name}: {json.dumps(value)}")
+        typer.echo("  " + ", ".join(f"{name} {value:g}" for name in SHOWN if (value := run.figure(name)) is not None))
+        if write:
+            set_for_subject(params, run.subject, run.params)
+            typer.echo(f"recommend: written into {params}; `dvc repro evaluate@{run.subject}` makes the asset")
+
+
+def of_subject(runs: list[Run], subject: str, table: Path) -> list[Run]:
+    """Rows of the subject; without a name, of the only one.
+
+    Raises:
+        UserError: if there is none, or several and no name.
+    """
+    names = sorted({run.subject for run in runs})
+    if subject not in names and (subject or len(names) != 1):
+        raise UserError(
+            "which subject?" if not subject else "no rows of this subject",
+            file=table,
+            place="--subject",
+            expected=", ".join(names) or "a table with rows",
+            found=subject or None,
+            remedy="name one of these, or collect the sweep again",
+        )
+    return [run for run in runs if run.subject == (subject or names[0])]
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command()(choose)
+    app()

@@ -1,0 +1,98 @@
+"""A grid of experiments with DVC itself, on the real dvc.yaml and `configure`, with stand-ins for the other stages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.sweeps.table import Run, read_runs
+from tests.pipeline.test_dvc_yaml import STAGES
+
+COMPUTING = STAGES[1:]
+STUB = Path(__file__).with_name("stub_stage.py")
+
+
+class GridProject:
+    """A git checkout with the project's pipeline, whose stages are stubs.
+
+    Attributes:
+        root: its folder.
+    """
+
+    def __init__(self, source: Path, root: Path) -> None:
+        self.root, self.ran = root, root.parent / "ran.txt"
+        skip = shutil.ignore_patterns("__pycache__", "tmp", "cache", "config.local")
+        for name in ("facefolds_core", ".dvc"):
+            shutil.copytree(source / name, root / name, ignore=skip)
+        for name in ("params.yaml", ".gitignore", ".dvcignore"):
+            shutil.copy(source / name, root)
+        (root / "dvc.yaml").write_text((source / "dvc.yaml").read_text().split("\nplots:")[0] + "\n")
+        (root / "stages").mkdir()
+        for name in ("__init__", "common", "configure", "collect"):
+            shutil.copy(source / "stages" / f"{name}.py", root / "stages")
+        for name in COMPUTING:
+            shutil.copy(STUB, root / "stages" / f"{name}.py")
+        self.run("git", "init", "--quiet")
+        self.run("git", "add", "--all")
+        self.run("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")
+
+    def run(self, *command: str) -> str:
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+        # Not PYTHONPATH: an experiment's own copy of the project must be the one that runs.
+        kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        variables = {**kept, "PATH": path, "RAN": str(self.ran), "DVC_NO_ANALYTICS": "1"}
+        done = subprocess.run(command, cwd=self.root, env=variables, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    def stages_run(self) -> Counter[str]:
+        """How often each stub ran since this was last asked."""
+        lines = self.ran.read_text().split() if self.ran.exists() else []
+        self.ran.write_text("")
+        return Counter(lines)
+
+
+@pytest.fixture(scope="module")
+def grid(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], Counter[str]]:
+    """Rows of a grid of two texture resolutions, one of which fails, and which stages it ran."""
+    root = tmp_path_factory.mktemp("grid") / "project"
+    project = GridProject(project_root, root)
+    project.run("dvc", "repro", "evaluate@actor")
+    assert project.stages_run() == Counter(COMPUTING)
+    # The actor overrides `texture`, and an override beats the section.
+    values = "subjects.actor.texture.resolution=13,128"
+    project.run("dvc", "exp", "run", "--queue", "-S", values, "-S", "decimate.resolution=16", "evaluate@actor")
+    project.run("dvc", "queue", "start", "-j", "2")
+    end = time.monotonic() + 240
+    while any(word in project.run("dvc", "queue", "status") for word in ("Queued", "Running")):
+        assert time.monotonic() < end
+        time.sleep(2)
+    project.run("dvc", "queue", "stop", "--kill")
+    project.run("python", "-m", "stages.collect", "--out", "sweep.parquet")
+    return read_runs(root / "sweep.parquet"), project.stages_run()
+
+
+def test_a_failed_cell_does_not_lose_the_others(grid: tuple[list[Run], Counter[str]]) -> None:
+    found = {run.params["texture.resolution"]: run for run in grid[0] if run.params["decimate.resolution"] == 16}
+    assert set(found) == {13, 128}
+    assert found[13].error and not found[13].figures
+    assert not found[128].error
+    assert found[128].figure("psnr") == pytest.approx(10 + 16 / 10 + 128 / 100)
+    assert found[128].figure("bytes") == 16 + 100 * 128
+
+
+def test_the_working_folder_has_a_row_too(grid: tuple[list[Run], Counter[str]]) -> None:
+    own = [run for run in grid[0] if run.experiment == "workspace"]
+    assert [dict(run.params) for run in own] == [{"decimate.resolution": 64, "texture.resolution": 256}]
+
+
+def test_cached_stages_do_not_run_again(grid: tuple[list[Run], Counter[str]]) -> None:
+    assert not set(grid[1]) & {"capture", "normalize", "train", "sample", "reconstruct"}
+    assert grid[1]["texture"] == 2 and grid[1]["evaluate"] == 1
