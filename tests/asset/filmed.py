@@ -13,9 +13,9 @@ from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package
-from facefolds_core.packaging.views import Shown
 from facefolds_core.params import CompressParams
-from facefolds_core.rendering.reference import AssetCaster, composite
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import composite
 from tests.assets import SOURCE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
@@ -38,10 +38,10 @@ def filmed(folder: Path) -> Scene:
         folder=folder,
     )
     folder.mkdir(parents=True)
-    caster = AssetCaster(Shown([cap_mesh(radius_of(i)) for i in range(LAYERS)]))
+    meshes = [cap_mesh(radius_of(i)) for i in range(LAYERS)]
     rows = []
     for i, camera in enumerate(cameras):
-        hits = caster.cast(camera)
+        hits = cast_layers(camera, meshes)
         for k in range(FRAMES):
             rgb, alpha = composite(hits, list(cap_textures(LAYERS, k, R)))
             gloss = (0.15 * camera.centre[1] * alpha)[..., None]
