@@ -60,22 +60,21 @@ METRICS = (
 
 
 def chart_data(measurements: Sequence[Measurement]) -> list[Measurement]:
-    """Of each subject and preset the newest series, all on the clock of the newest measurement.
+    """Of each subject, preset and training time asked for the newest measurement, on the clock of the newest of all.
 
-    A series are measurements of one commit and one way to measure; by seconds, of equal ones the last.
+    By seconds; of equal ones the last. They may be of several commits, which `draw` names.
     """
-    usable = [m for m in measurements if m.scores is not None and not m.variant]
+    usable = sorted((m for m in measurements if m.scores is not None and not m.variant), key=lambda m: m.date)
     if not usable:
         return []
-    newest = max(usable, key=lambda m: m.date).conditions
-    series: dict[tuple[str, str], dict[tuple[str, ...], list[Measurement]]] = defaultdict(lambda: defaultdict(list))
-    for m in usable:
-        if m.conditions.clock == newest.clock:
-            series[m.subject, m.preset][m.key()].append(m)
+    clock = usable[-1].conditions.clock
+    newest = {(m.subject, m.preset, m.budget): m for m in usable if m.conditions.clock == clock}
+    series: dict[tuple[str, str], list[Measurement]] = defaultdict(list)
+    for m in newest.values():
+        series[m.subject, m.preset].append(m)
     chosen = []
-    for candidates in series.values():
-        best = max(candidates.values(), key=lambda ms: max(m.date for m in ms))
-        chosen += sorted({m.iterations: m for m in best}.values(), key=lambda m: m.seconds)
+    for points in series.values():
+        chosen += sorted({m.iterations: m for m in points}.values(), key=lambda m: m.seconds)
     return chosen
 
 

@@ -29,19 +29,19 @@ def measurement(preset: str, seconds: float, psnr: float, **values: object) -> M
     )
 
 
-def test_the_newest_series_of_a_preset_is_drawn_on_one_clock() -> None:
+def test_the_newest_point_of_each_budget_is_drawn_on_one_clock() -> None:
     newer = {"commit": "bbb", "date": "2026-01-02T00:00:00+00:00"}
     measurements = [
         measurement("fast", 10, 20.0),
         measurement("fast", 30, 21.0),
-        measurement("fast", 11, 22.0, **newer),
+        measurement("fast", 11, 22.0, budget=10, **newer),
         measurement("quick", 10, 18.0),
         measurement("quick", 10, 17.0, clock="processor"),
         measurement("quick", 10, 5.0, variant="seed 1"),
         measurement("paper", 60, 9.0, scores=None, failure="diverged"),
     ]
     drawn = [(m.preset, m.seconds, m.scores.psnr) for m in chart_data(measurements) if m.scores]
-    assert drawn == [("fast", 11, 22.0), ("quick", 10, 18.0)]
+    assert drawn == [("fast", 11, 22.0), ("fast", 30, 21.0), ("quick", 10, 18.0)]
 
 
 def test_budgets_that_one_step_passes_are_one_point() -> None:
