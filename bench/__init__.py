@@ -1,1 +1,1 @@
-"""Measurements of the trainers: speed against accuracy, robustness, and a profile of one step."""
+"""Measurements: training time against accuracy, robustness and hazards, export, bytes, sweeps, and players."""
