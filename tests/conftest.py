@@ -41,10 +41,7 @@ def chromium() -> Iterator[Chromium]:
 
 @pytest.fixture
 def browser(chromium: Chromium) -> Iterator[Browser]:
-    """A browser that is killed when the test hangs; the test then fails, and is run once more in a new one.
-
-    Two hangs are the machine's: the tests that follow are skipped, aloud.
-    """
+    """A browser that is killed when the test hangs; the test then fails, and is run once more in a new one."""
     with chromium.watched():
         yield chromium.browser()
 
@@ -53,4 +50,4 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A browser that hung, and was killed, gets one more chance; a test that found something wrong gets none."""
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.flaky(reruns=2, only_rerun=["TargetClosedError"]))
+            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["TargetClosedError"]))

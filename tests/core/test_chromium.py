@@ -37,5 +37,5 @@ def test_a_browser_that_stands_still_is_killed(own: Chromium) -> None:
 
 def test_it_is_not_tried_for_ever(own: Chromium) -> None:
     own.kills = ALLOWED_KILLS
-    with pytest.raises(pytest.skip.Exception, match="not tried again"):
+    with pytest.raises(pytest.fail.Exception, match="not tried again"):
         own.browser()
