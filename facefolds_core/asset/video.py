@@ -26,6 +26,7 @@ from facefolds_core.asset.codecs import Codec, level_and_mime
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
 from facefolds_core.asset.packing import GUTTER, AtlasLayout, cut, fill_cell
 from facefolds_core.errors import UserError
+from facefolds_core.scheduling import kept_scheduling
 
 _PRIMARIES_BT709 = 1
 _TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273
@@ -115,6 +116,8 @@ def encode_video(
             stream: Any = container.add_stream(codec.encoder, rate=fps, options=options)
             _describe(stream, size, fps)
             sound = None if audio is None or codec.container != "mp4" else SoundTrack(container, audio)
+            with kept_scheduling():
+                container.start_encoding()
             for picture in pictures:
                 frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
                 frame.colorspace, frame.color_range = Colorspace.ITU709, ColorRange.MPEG
