@@ -26,6 +26,8 @@ class Row(BaseModel):
         commit: of the code, "+" if tracked files had been changed since.
         scores: of the shipped asset, docs/metrics.md; empty if it failed.
         cost: its sizes, docs/metrics.md; empty if it failed.
+        pictures_a_second: that the OpenGL renderer draws, bench/drawing_speed.py; 0 where not measured.
+        renderer: what drew them.
         train_seconds, export_seconds: processor seconds, on all threads together, of the stages that the sweep's axis
             concerns; 0 where they were not run for it.
         failure: the error's first line, or "".
@@ -43,6 +45,8 @@ class Row(BaseModel):
     machine: str
     scores: dict[str, float | None] = {}
     cost: dict[str, int] = {}
+    pictures_a_second: Annotated[float, Field(ge=0)] = 0.0
+    renderer: str = ""
     train_seconds: float = 0.0
     export_seconds: float = 0.0
     failure: str = ""
@@ -99,9 +103,9 @@ def table(rows: list[Row], sweep: Name, subject: str) -> str:
     disk = {"layers": "disk", "mesh": "disk (mesh)", "texture": "disk (texture)"}[sweep]
     header = (
         f"| {AXES[sweep]} | PSNR of the subject | SSIM | ST-LPIPS | whole frame: PSNR | SSIM | ST-LPIPS | triangles "
-        f"| mesh | texture | GPU | seconds | paper: PSNR | SSIM | LPIPS | triangles | {disk} |"
+        f"| mesh | texture | GPU | pictures a second | seconds | paper: PSNR | SSIM | LPIPS | triangles | {disk} |"
     )
-    lines = [header, "|---" * 17 + "|"]
+    lines = [header, "|---" * 18 + "|"]
     for value in sorted({*own, *paper}, reverse=True):
         lines.append(f"| {value} | " + " | ".join([*_ours(own.get(value)), *_published(sweep, value)]) + " |")
     return "\n".join(lines)
@@ -109,9 +113,9 @@ def table(rows: list[Row], sweep: Name, subject: str) -> str:
 
 def _ours(row: Row | None) -> list[str]:
     if row is None:
-        return ["not measured", *[""] * 10]
+        return ["not measured", *[""] * 11]
     if row.failure:
-        return [f"failed: {row.failure}", *[""] * 10]
+        return [f"failed: {row.failure}", *[""] * 11]
     cost = row.cost
     return [
         *(
@@ -123,6 +127,7 @@ def _ours(row: Row | None) -> list[str]:
         size(cost["mesh_bytes"]),
         size(cost["texture_bytes"]),
         size(cost["gpu_bytes"]),
+        f"{row.pictures_a_second:.1f}" if row.pictures_a_second else "",
         " + ".join(f"{seconds:.0f}" for seconds in (row.train_seconds, row.export_seconds) if seconds),
     ]
 

@@ -20,6 +20,7 @@ from typing import Annotated, Any
 import typer
 
 from bench.common import OWN_SUBJECTS, words
+from bench.drawing_speed import pictures_a_second
 from bench.results import commit_name, machine_name
 from bench.runs import in_a_process
 from bench.sweep_cells import Cell, measure, own_metrics, plan, run_stages
@@ -92,16 +93,27 @@ def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
     key = plan(cell)["evaluate"]
     own = own_metrics(cell)
     if own is not None:
-        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1])
+        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1], **speed(SubjectFolders(cell.subject)))
     folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
     scores, cost = measure(folders)
     return Row(
         **identity(sweep, value, cell, key),
         scores=scores,
         cost=cost,
+        **speed(folders),
         train_seconds=seconds.get("train", 0.0),
         export_seconds=round(sum(seconds[stage] for stage in sweep.timed), 3),
     )
+
+
+def speed(folders: SubjectFolders) -> dict[str, Any]:
+    """How fast the asset is drawn; nothing where there is no OpenGL."""
+    try:
+        pictures, renderer = pictures_a_second(folders)
+    except UserError as error:
+        typer.echo(f"  not drawn: {error}")
+        return {}
+    return {"pictures_a_second": round(pictures, 3), "renderer": renderer}
 
 
 def identity(sweep: Sweep, value: int, cell: Cell, key: str) -> dict[str, Any]:
@@ -154,6 +166,7 @@ def describe(row: Row) -> str:
     shown += [f"{row.cost['mesh_bytes']} + {row.cost['texture_bytes']} bytes"]
     seconds = row.train_seconds + row.export_seconds
     shown += [f"{seconds:.0f} s of processor time" if seconds else "the subject's own, as `dvc repro` left it"]
+    shown += [f"{row.pictures_a_second:.1f} pictures/s" if row.pictures_a_second else ""]
     return ", ".join(part for part in shown if part)
 
 
@@ -263,6 +276,7 @@ def as_run(row: Row) -> Run:
     """A row as `stages.recommend` reads it; what is not under `params` is as the subject has it."""
     figures = {name: value for name, value in row.scores.items() if value is not None}
     figures |= {name: float(value) for name, value in row.cost.items()}
+    figures |= {"pictures_a_second": row.pictures_a_second} if row.pictures_a_second else {}
     if not row.failure:
         figures["bytes"] = float(row.bytes + row.cost["view_effects_bytes"])
     return Run(f"{row.sweep} {row.value}", row.subject, row.commit, row.params, figures, row.failure)

@@ -27,6 +27,8 @@ def row(sweep: Name, value: int, psnr: float, size: int, subject: str = "actor",
         machine="one",
         scores={} if failure else scores,
         cost={} if failure else cost,
+        pictures_a_second=0.0 if failure else 20_000 / size,
+        renderer="a card",
         export_seconds=12.0,
         failure=failure,
         date="2026-01-01T00:00:00+00:00",
@@ -53,14 +55,14 @@ def test_a_table_has_ours_and_the_papers_rows() -> None:
     assert len(lines) == 2 + 7
     assert (
         lines[2]
-        == "| 512 | not measured |  |  |  |  |  |  |  |  |  |  | 30.10 | 0.858 | 0.284 | 6 261 920 | 118.1 MB |"
+        == "| 512 | not measured |  |  |  |  |  |  |  |  |  |  |  | 30.10 | 0.858 | 0.284 | 6 261 920 | 118.1 MB |"
     )
     assert lines[5] == (
-        "| 64 | 24.00 |  |  | 10.00 | 0.500 |  | 20 000 | 2 KB | 2 KB | 10 KB | 12 "
+        "| 64 | 24.00 |  |  | 10.00 | 0.500 |  | 20 000 | 2 KB | 2 KB | 10 KB | 10.0 | 12 "
         "| 29.49 | 0.837 | 0.289 | 43 224 | 721 KB |"
     )
     assert lines[6].startswith("| 32 | failed: out of memory |")
-    assert {line.count("|") for line in lines} == {18}
+    assert {line.count("|") for line in lines} == {19}
     assert [line.split("|")[1].strip() for line in table(ROWS, "layers", "actor").splitlines()[2:]] == ["12", "4", "1"]
 
 
@@ -102,6 +104,13 @@ def test_pictures_and_plot_data_come_out(tmp_path: Path) -> None:
     points = json.loads((tmp_path / "sweeps_bytes.json").read_text())
     ringed = {(p["subject"], p["series"], p["value"]) for p in points if p["frontier"]}
     assert ringed == {("actor", "mesh", 8), ("actor", "layers", 4), ("actor", "mesh", 64), ("mugsy", "mesh", 16)}
+    speeds = json.loads((tmp_path / "sweeps_pictures_a_second.json").read_text())
+    assert {(p["subject"], p["value"]) for p in speeds if p["frontier"]} == {
+        ("actor", 8),
+        ("actor", 4),
+        ("actor", 64),
+        ("mugsy", 16),
+    }
     published = [p for p in points if p["series"].startswith("paper") and p["subject"] == "actor"]
     assert len(published) == sum(len(points) for points in PAPER.values())
     with pytest.raises(UserError, match="nothing measured"):
