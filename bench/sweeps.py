@@ -93,7 +93,8 @@ def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
     key = plan(cell)["evaluate"]
     own = own_metrics(cell)
     if own is not None:
-        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1], **speed(SubjectFolders(cell.subject)))
+        drawn = speed(SubjectFolders(cell.subject))
+        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1], **drawn)
     folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
     scores, cost = measure(folders)
     return Row(
