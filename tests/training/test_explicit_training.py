@@ -96,6 +96,8 @@ def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     np.testing.assert_allclose(radii[:, :10], volume[:, :10])
     np.testing.assert_allclose(radii[:, 30:], 0.31)
     assert radii[20, 20] == 0.3
+    deep = np.where(np.arange(41) == 20, 0.3 - 2 * fit.MESH_REACH, volume)
+    np.testing.assert_array_equal(fit.blend(mesh, deep)[0][5, 20], 0.3)  # a hole of the volume
     assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
 
 

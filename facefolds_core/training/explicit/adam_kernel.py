@@ -39,7 +39,7 @@ def adam_step(  # type: ignore[no-untyped-def]
     texture,  # (M, N, 4) as activated
     gradient,  # (PARTS, M, N, 4) with respect to `texture`; zero afterwards
     rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
-    keep,  # (2,) factors by which layer colour and the frames' parts shrink each step
+    keep,  # factor by which the frames' parts shrink each step
     correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
 ):
     """Adam on the texels that the rays have met; the others stay as they are, moments included."""
@@ -76,16 +76,16 @@ def adam_step(  # type: ignore[no-untyped-def]
             sum2 += g2
             for q in range(3):
                 g = g0 if q == 0 else (g1 if q == 1 else g2)
-                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], keep[0])
+                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one)
             alpha = texture[k, n, 3]
             g = g3 * alpha * (1 - alpha)
             _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one)
             layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
-            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep[1])
+            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep)
         if not met:
             continue
         for q in range(3):
             g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
             _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one)
             colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
-            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep[1])
+            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep)

@@ -37,7 +37,8 @@ PIXELS_PER_TEXEL = 1.5
 cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
 
 MESH_REACH = 0.03
-"""Where tracked mesh and volume differ by more, units, the volume is believed: a mesh knows no hair and no clothes."""
+"""Where the volume lies outside the tracked mesh by more, units, it is believed: a mesh knows no hair and no clothes.
+Deeper than the mesh it never is: it has holes at dark eyes, open mouths and where few cameras look."""
 
 MESH_TRUST = 0.004
 """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
@@ -113,7 +114,7 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         known, kept = blend(mesh, seen.radius)
         trust = MESH_TRUST * kept
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH_OPACITY), opacity)
-        source = f"the tracked mesh, mean over frames, where it lies within {MESH_REACH} of the volume; else the volume"
+        source = f"the tracked mesh, mean over frames, but where the volume lies over {MESH_REACH} outside it"
     middle = extrapolate(known).clip(LEAST_RADIUS)
     widths = spread(seen, middle, halfwidth, volume.voxel)
     texels = texel_count(scene, window, float(np.quantile(middle[opacity >= SURE], 0.9)))
@@ -156,12 +157,12 @@ def fit_window(volume: Volume, centre: Array, vertices: Array | None) -> Window:
 
 
 def blend(mesh: Array, volume: Array) -> tuple[Array, Array]:
-    """Radii of the mesh where it is close to the volume or alone, of the volume elsewhere, with a soft border.
+    """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
 
     Returns:
         radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
     """
-    close = np.isfinite(mesh) & ~(np.abs(mesh - volume) > MESH_REACH)
+    close = np.isfinite(mesh) & ~(volume - mesh > MESH_REACH)
     # Ten nodes inside the border the mesh rules alone.
     kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
     kept = np.where(np.isnan(volume), close.astype(np.float64), kept)

@@ -46,8 +46,11 @@ HALF_SHARE = 0.4
 RATE_LAYERS, RATE_ALPHA, RATE_FRAME = 0.3, 15.0, 0.5
 """Learning rates of the layers' own colours, of the logits of alpha, and of the frames' parts, against the colours'."""
 
-KEEP_LAYERS, KEEP_FRAMES = 0.99, 0.999
-"""The layers' own colours and the frames' parts shrink by this factor each step towards what is shared."""
+KEEP_FRAMES = 0.999
+"""The frames' parts shrink by this factor each step towards what is shared."""
+
+SMOOTH_EVERY = 3
+"""Steps between smoothings of opacity over neighbouring texels, at half and full resolution."""
 
 BACKGROUND_RATE = 0.5
 FAINT = 0.002
@@ -230,7 +233,7 @@ class _Trainer:
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
             rays = np.arange(int(self.random.integers(stride)), count, stride)
-            rates, keep = self._rates(i / level.iterations if level.last else 0.0)
+            rates = self._rates(i / level.iterations if level.last else 0.0)
             error = self.state.step(
                 self.views,
                 rays,
@@ -241,8 +244,10 @@ class _Trainer:
                 BACKGROUND_RATE,
                 0.0 if coarse else FAINT,
                 rates,
-                keep,
+                KEEP_FRAMES,
             )
+            if not coarse and i % SMOOTH_EVERY == 0:
+                self.state.smooth_alpha(frame)
             recent = error if i == 0 else 0.9 * recent + 0.1 * error
             best = min(best, recent)
             if not np.isfinite(error) or recent > DIVERGED * best + 1e-4:
@@ -263,10 +268,10 @@ class _Trainer:
         assert self.state is not None and self.views is not None
         return max(1, int(len(self.views.pixel) / (RAYS_PER_TEXEL * self.state.shape[0] * self.state.shape[1])))
 
-    def _rates(self, progress: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _rates(self, progress: float) -> NDArray[np.float32]:
         rate = self.rate * (1 - 0.9 * progress)
         rates = rate * np.array([1, RATE_LAYERS, RATE_ALPHA, RATE_FRAME, RATE_FRAME * RATE_ALPHA])
-        return rates.astype(np.float32), np.array([KEEP_LAYERS, KEEP_FRAMES], np.float32)
+        return rates.astype(np.float32)
 
     def result(self, mark: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""

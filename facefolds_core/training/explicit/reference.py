@@ -83,25 +83,24 @@ def adam_step(
     texture: Tensor,  # [M, N, 4]
     gradient: Tensor,  # [M, N, 4]
     rates: Tensor,  # [5]
-    keep: Tensor,  # [2]
+    keep: float,
     correct: Tensor,  # [4]
 ) -> None:
     """As `adam_kernel.adam_step`."""
     met = (gradient != 0).any(-1)
     alpha = texture[..., 3]
     slope = gradient[..., 3] * alpha * (1 - alpha)
-    one = torch.ones((), device=gradient.device)
-    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], keep[0])
-    _adam(layers[..., 3], slope, met, rates[2], correct[:2], one)
+    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], 1.0)
+    _adam(layers[..., 3], slope, met, rates[2], correct[:2], 1.0)
     layers[0, ..., 3].clamp_(-9, 9)
-    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep[1])
+    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep)
     total, any_met = gradient[..., :3].sum(1), met.any(1, keepdim=True)
-    _adam(colour, total, any_met, rates[0], correct[:2], one)
+    _adam(colour, total, any_met, rates[0], correct[:2], 1.0)
     colour[0].clamp_(0, 1)
-    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep[1])
+    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep)
 
 
-def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: Tensor) -> None:
+def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: float) -> None:
     values, first, second = state
     new_first = BETA1 * first + (1 - BETA1) * g
     new_second = BETA2 * second + (1 - BETA2) * g * g

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
+from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.views import Views
 
 LEAST_OPACITY, MOST_OPACITY = 0.02, 0.9
@@ -112,7 +113,7 @@ class TextureState:
         background_rate: float,
         faint: float,
         rates: NDArray[np.float32],
-        keep: NDArray[np.float32],
+        keep: float,
     ) -> float:
         """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
         texture = self.activated(frame)
@@ -143,7 +144,7 @@ class TextureState:
                 texture.numpy(),
                 self.gradient.numpy(),
                 rates,
-                keep,
+                np.float32(keep),
                 correct,
             )
         else:
@@ -163,7 +164,7 @@ class TextureState:
         solid: float,
         background_rate: float,
         rates: NDArray[np.float32],
-        keep: NDArray[np.float32],
+        keep: float,
         correct: NDArray[np.float32],
     ) -> float:
         """`step` in plain torch."""
@@ -186,9 +187,20 @@ class TextureState:
             self.frame_alpha[:, frame],
             texture,
             gradient.view(-1, n, 4),
-            *(torch.from_numpy(x).to(self.device) for x in (rates, keep, correct)),
+            torch.from_numpy(rates).to(self.device),
+            keep,
+            torch.from_numpy(correct).to(self.device),
         )
         return float(squares)
+
+    def smooth_alpha(self, frame: int) -> None:
+        """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
+        for logits in (self.layers[0, ..., 3], self.frame_alpha[0, frame]):
+            if self.device.type == "cpu":
+                smoothed = torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape))
+            else:
+                smoothed = smooth_reference(logits, *self.shape)
+            logits.copy_(smoothed)
 
     def contributions(self, views: Views, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
