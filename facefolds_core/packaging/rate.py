@@ -8,6 +8,8 @@ from dataclasses import dataclass
 MAX_ENCODES = 6
 CLOSE_ENOUGH = 0.15
 """dB above the target at which the search ends early."""
+SPARED = 0.2
+"""dB given up where the target is out of reach."""
 DB_A_STEP = 0.4
 """What one step of the factor costs, roughly, of any encoder: for the second guess."""
 
@@ -30,23 +32,33 @@ class Found:
 def search_crf(quality: Callable[[int], float], target: float, start: int, worst: int) -> Found:
     """The largest factor in [1, worst] whose quality is at least `target`, as far as MAX_ENCODES trials can tell.
 
+    Where no factor reaches it (coarse textures lose more by 4:2:0 than the encoder does), bits without end would buy
+    nothing: then the largest factor that is at most SPARED worse than the best one, in as many trials again.
+
     Args:
         quality: factor -> dB; falls as the factor grows. Each call is one encoding.
         start: the first factor that is tried.
     """
     tried: dict[int, float] = {}
-    good, bad = 0, worst + 1  # `good` reaches the target, `bad` does not
-    guess = min(max(start, 1), worst)
-    while bad - good > 1 and len(tried) < MAX_ENCODES:
+    good = _search(quality, target, start, worst, tried)
+    if not good:
+        good = _search(quality, max(tried.values()) - SPARED, start, worst, tried) or min(tried)
+    return Found(good, tried[good], len(tried))
+
+
+def _search(quality: Callable[[int], float], target: float, start: int, worst: int, tried: dict[int, float]) -> int:
+    """The factor, 0 if none that was tried reaches the target. Trials are added to `tried`."""
+    limit = len(tried) + MAX_ENCODES
+    good = max((crf for crf in tried if tried[crf] >= target), default=0)  # reaches the target
+    bad = min((crf for crf in tried if tried[crf] < target), default=worst + 1)  # does not
+    guess = _next(tried, good, bad, target) if tried else min(max(start, 1), worst)
+    while bad - good > 1 and len(tried) < limit:
         tried[guess] = quality(guess)
         good, bad = (guess, bad) if tried[guess] >= target else (good, guess)
         if good and tried[good] - target < CLOSE_ENOUGH:
             break
         guess = _next(tried, good, bad, target)
-    if good:
-        return Found(good, tried[good], len(tried))
-    best = min(tried)
-    return Found(best, tried[best], len(tried))
+    return good
 
 
 def _next(tried: dict[int, float], good: int, bad: int, target: float) -> int:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from facefolds_core.packaging.rate import CLOSE_ENOUGH, MAX_ENCODES, search_crf
+from facefolds_core.packaging.rate import CLOSE_ENOUGH, MAX_ENCODES, SPARED, search_crf
 
 CURVES = {
     "line": lambda crf: 52 - 0.5 * crf,
@@ -31,6 +31,18 @@ def test_target_is_reached_and_no_factor_far_better_is_missed(curve: object, tar
 def test_a_target_out_of_reach_gives_the_best_that_was_tried() -> None:
     found = search_crf(lambda crf: 40 - crf, 60, 18, 51)
     assert found.crf == 1 and found.psnr == 39
+
+
+@pytest.mark.parametrize("start", [1, 18, 51])
+def test_a_target_out_of_reach_does_not_buy_what_changes_nothing(start: int) -> None:
+    def curve(crf: int) -> float:
+        """4:2:0 alone leaves 39.2 dB."""
+        return -10 * math.log10(10**-3.92 + 10 ** (-(60 - 0.6 * crf) / 10))
+
+    found = search_crf(curve, 41, start, 51)
+    assert found.crf >= 6
+    assert curve(1) - SPARED <= found.psnr == curve(found.crf)
+    assert found.encodes <= 2 * MAX_ENCODES
 
 
 def test_a_target_that_everything_reaches_gives_the_coarsest() -> None:
