@@ -6,7 +6,7 @@ import os
 import platform
 import subprocess
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -16,6 +16,7 @@ from facefolds_core.files import read_json, write_json
 VERSION = 1
 ClockKind = Literal["wall", "processor"]
 Positive = Annotated[float, Field(gt=0)]
+Entry = TypeVar("Entry", bound=BaseModel)
 
 
 class Conditions(BaseModel):
@@ -95,6 +96,30 @@ class Measurement(BaseModel):
         return self.subject, self.preset, self.variant, c.commit, c.clock, str(c.threads), str(c.frames)
 
 
+def read_entries(path: Path, name: str, version: int, kind: type[Entry]) -> list[Entry]:
+    """The list `name` in a file of `{"version": ..., name: [...]}`; empty if there is no file.
+
+    Raises:
+        UserError: if the file is not one of these.
+    """
+    if not path.exists():
+        return []
+    remedy = "restore it (`git checkout`), or delete it to measure again"
+    value = read_json(path, remedy=remedy)
+    try:
+        if value["version"] != version:
+            raise UserError(
+                "results of another version",
+                file=path,
+                expected=f"version {version}",
+                found=value["version"],
+                remedy=remedy,
+            )
+        return [kind.model_validate(entry) for entry in value[name]]
+    except (KeyError, TypeError, ValidationError) as error:
+        raise UserError("garbled results", file=path, found=str(error)[:300], remedy=remedy) from None
+
+
 class Results:
     """The measurements of one file.
 
@@ -111,22 +136,7 @@ class Results:
         Raises:
             UserError: if the file is not one of these.
         """
-        if not self.path.exists():
-            return []
-        remedy = "restore it (`git checkout`), or delete it to measure again"
-        value = read_json(self.path, remedy=remedy)
-        try:
-            if value["version"] != VERSION:
-                raise UserError(
-                    "results of another version",
-                    file=self.path,
-                    expected=f"version {VERSION}",
-                    found=value["version"],
-                    remedy=remedy,
-                )
-            return [Measurement.model_validate(entry) for entry in value["measurements"]]
-        except (KeyError, TypeError, ValidationError) as error:
-            raise UserError("garbled results", file=self.path, found=str(error)[:300], remedy=remedy) from None
+        return read_entries(self.path, "measurements", VERSION, Measurement)
 
     def add(self, measurement: Measurement) -> None:
         """Keep it, in place of the same one measured before. The file is read again: others may have added to it."""

@@ -16,15 +16,15 @@ import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
-from bench.results import commit_name
+from bench.results import commit_name, read_entries
 from bench.runs import check_train_params
 from bench.stress_film import Shots, held_out, shoot, training, write_shots
 from bench.stress_hazards import HAZARDS, Hazard
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files import write_json
 from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.params import TrainParams
 from facefolds_core.scoring.metrics import psnr, shown
@@ -113,16 +113,7 @@ def read_cells(path: Path) -> list[Cell]:
     Raises:
         UserError: if the file is not one of these.
     """
-    if not path.exists():
-        return []
-    remedy = "restore it (`git checkout`), or delete it to measure again"
-    value = read_json(path, remedy=remedy)
-    try:
-        if value["version"] != VERSION:
-            raise UserError("results of another version", file=path, found=value["version"], remedy=remedy)
-        return [Cell.model_validate(entry) for entry in value["cells"]]
-    except (KeyError, TypeError, ValidationError) as error:
-        raise UserError("garbled results", file=path, found=str(error)[:300], remedy=remedy) from None
+    return read_entries(path, "cells", VERSION, Cell)
 
 
 def keep_cell(path: Path, cell: Cell) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from bench.paper import PAPER
+from bench.results import read_entries
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files import write_json
 
 VERSION = 1
 Name = Literal["layers", "mesh", "texture"]
@@ -71,18 +72,7 @@ def read_rows(path: Path) -> list[Row]:
     Raises:
         UserError: if the file is not one of these.
     """
-    if not path.exists():
-        return []
-    remedy = "restore it (`git checkout`), or delete it to measure again"
-    value = read_json(path, remedy=remedy)
-    try:
-        if value["version"] != VERSION:
-            raise UserError(
-                "rows of another version", file=path, expected=VERSION, found=value["version"], remedy=remedy
-            )
-        return [Row.model_validate(entry) for entry in value["rows"]]
-    except (KeyError, TypeError, ValidationError) as error:
-        raise UserError("garbled rows of a sweep", file=path, found=str(error)[:300], remedy=remedy) from None
+    return read_entries(path, "rows", VERSION, Row)
 
 
 def add_row(path: Path, row: Row) -> None:
