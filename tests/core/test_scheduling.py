@@ -18,6 +18,7 @@ from facefolds_core.params import VideoCodec
 from facefolds_core.scheduling import kept_scheduling
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
+REAL_TIME = {1, 2}  # SCHED_FIFO and SCHED_RR; a driver's own thread may have another (Mesa's cache: SCHED_BATCH)
 needs_root = pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root's threads change")
 
 
@@ -33,7 +34,7 @@ def test_this_thread_and_new_ones_are_as_before() -> None:
         thread = threading.Thread(target=end.wait)
         thread.start()
         assert os.SCHED_FIFO in policies()
-    assert policies() == {os.SCHED_OTHER}
+    assert not policies() & REAL_TIME
     end.set()
     thread.join()
 
@@ -58,4 +59,4 @@ def test_no_encoder_changes_it(name: str, tmp_path: Path) -> None:
     codec = CODECS[name]
     options = codec.options(VideoCodec(codec=name), 40)
     encode_video(tmp_path / "film", pictures(), (64, 64), Fraction(30), codec, options)
-    assert seen | policies() == {os.SCHED_OTHER}
+    assert not (seen | policies()) & REAL_TIME
