@@ -52,7 +52,10 @@ def view_of(camera: Camera, file: Path, frame: int) -> dict[str, Any]:
 
 
 def run_godot(job: dict[str, Any], driver: str = "GLES2") -> subprocess.CompletedProcess[str]:
-    """Run `tools/capture.gd` with a job. Godot keeps its files in a home of its own."""
+    """Run `tools/capture.gd` with a job. Godot keeps its files in a home of its own.
+
+    The code returned is Godot's own: xvfb-run's is 5 when its screen is slow to go, whatever Godot said.
+    """
     with tempfile.TemporaryDirectory() as home:
         path = Path(home) / "job.json"
         path.write_text(json.dumps(job))
@@ -63,8 +66,13 @@ def run_godot(job: dict[str, Any], driver: str = "GLES2") -> subprocess.Complete
             environment.pop(name, None)
         godot = [str(find_godot()), "--path", str(PROJECT), "--audio-driver", "Dummy", "--video-driver", driver]
         screen = ["xvfb-run", "-a", "-s", "-screen 0 640x480x24"]
-        command = [*screen, *godot, "--resolution", "64x64", "-s", "tools/capture.gd"]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+        status = Path(home) / "status"
+        keep = ["sh", "-c", '"$@"; echo $? > "$0"', str(status)]
+        command = [*screen, *keep, *godot, "--resolution", "64x64", "-s", "tools/capture.gd"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+        if status.exists():
+            done.returncode = int(status.read_text())
+        return done
 
 
 def errors(done: subprocess.CompletedProcess[str]) -> list[str]:
