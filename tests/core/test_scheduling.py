@@ -60,3 +60,4 @@ def test_no_encoder_changes_it(name: str, tmp_path: Path) -> None:
     options = codec.options(VideoCodec(codec=name), 40)
     encode_video(tmp_path / "film", pictures(), (64, 64), Fraction(30), codec, options)
     assert not (seen | policies()) & REAL_TIME
+    assert os.sched_getscheduler(0) == os.SCHED_OTHER

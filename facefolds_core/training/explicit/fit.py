@@ -38,7 +38,7 @@ cameras left out: some thirty cameras do not determine so many texels of twelve 
 
 MESH_REACH = 0.03
 """Where the volume lies outside the tracked mesh by more, units, it is believed: a mesh knows no hair and no clothes.
-Deeper than the mesh it never is: it has holes at dark eyes, open mouths and where few cameras look."""
+Where it lies deeper it never is: it has holes at dark eyes, open mouths and where few cameras look."""
 
 MESH_TRUST = 0.004
 """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
