@@ -20,7 +20,8 @@ import typer
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from bench.runs import check_train_params, in_a_process
+from bench.processes import in_a_process
+from bench.runs import check_train_params
 from facefolds_core.captures.actor.capture import krt_block
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.images import decode_image

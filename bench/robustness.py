@@ -18,8 +18,9 @@ import numpy as np
 import typer
 
 from bench.common import conditions_now, find_scenes, keep, words
+from bench.processes import in_a_process
 from bench.results import ClockKind, Measurement, Results
-from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole
+from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole
 from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene, write_scene
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_folder

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -31,8 +27,6 @@ from facefolds_core.training.checkpoints import save_checkpoint
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.loop import TrainingRun, begin, train_step
 from facefolds_core.training.report import peak_memory
-
-T = TypeVar("T")
 
 CHECKPOINT_SECONDS = 60.0
 """On the clock of the run, between checkpoints of a perceptron run."""
@@ -201,16 +195,3 @@ def check_train_params(values: dict[str, object]) -> TrainParams:
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError("a parameter is wrong", place=str(values), expected=first["msg"]) from None
-
-
-def in_a_process(function: Callable[..., T], *arguments: object) -> T:
-    """Call it in a fresh process, so that its peak memory is its own.
-
-    Raises:
-        UserError: what it raised, or that the process died (out of memory, for one).
-    """
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        try:
-            return pool.submit(function, *arguments).result()
-        except BrokenProcessPool:
-            raise UserError("the training process died", remedy="see whether the machine ran out of memory") from None

@@ -17,8 +17,9 @@ import typer
 
 from bench.chart import draw, write_plot_data
 from bench.common import conditions_now, find_scenes, keep, numbers, words
+from bench.processes import in_a_process
 from bench.results import ClockKind, Measurement, Results, describe
-from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole
+from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole
 from facefolds_core.errors import UserError, report_user_errors
 
 SECONDS = "10,30,60,120,300,900"

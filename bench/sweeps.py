@@ -21,8 +21,8 @@ import typer
 
 from bench.common import OWN_SUBJECTS, words
 from bench.drawing_speed import pictures_a_second
+from bench.processes import in_a_process
 from bench.results import commit_name, machine_name
-from bench.runs import in_a_process
 from bench.sweep_cells import Cell, measure, own_metrics, plan, run_stages
 from bench.sweep_chart import draw, write_plot_data
 from bench.sweep_rows import Name, Row, add_row, read_rows, with_tables

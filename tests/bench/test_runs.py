@@ -7,9 +7,8 @@ import pytest
 from bench import runs
 from bench.clock import Clock
 from bench.results import Conditions, Measurement
-from bench.runs import Job, check_train_params, in_a_process, measure_on_the_way, measure_whole, score
+from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole, score
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.params import TrainParams
 from facefolds_core.scoring.perceptual import Perceptual
@@ -127,14 +126,3 @@ def test_clock_of_processor_time_is_divided() -> None:
     clock = Clock(runs.time_source("processor", 1000))
     sum(range(300_000))
     assert 0 < clock.seconds < 0.1
-
-
-def test_a_process_that_dies_is_an_error() -> None:
-    with pytest.raises(UserError, match="died"):
-        in_a_process(die)
-
-
-def die() -> None:
-    import os
-
-    os._exit(1)

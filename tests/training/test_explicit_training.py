@@ -11,10 +11,12 @@ import torch
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
+from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import TrainParams
-from facefolds_core.training.explicit import fit
+from facefolds_core.training.explicit import fit, loop
 from facefolds_core.training.explicit.loop import plan, train_explicit
 from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.volume import fit as volume_fit
 from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
@@ -139,3 +141,16 @@ def test_divergence_is_rolled_back(
     monkeypatch.setattr(TextureState, "step", fail_once)
     train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
     assert "diverged" in (tmp_path / "model" / "fit.json").read_text()
+
+
+def test_layers_that_drift_inwards_stop_before_the_centre(
+    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Thin hair does that: the search for crossings needs a radius to step along."""
+    monkeypatch.setattr(loop, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
+    monkeypatch.setattr(volume_fit, "LEVELS", ((32, 30),))
+    train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
+    model = load_model(tmp_path / "model")
+    assert isinstance(model.manifolds, RadialManifolds)
+    assert model.manifolds.middle.min().item() == pytest.approx(fit.LEAST_RADIUS)
+    assert (model.manifolds.radii() > 0).all()
