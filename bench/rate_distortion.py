@@ -228,33 +228,39 @@ def psnr_at(size: int, series: list[Point]) -> float | None:
 
 def quality_table(found: list[Point]) -> str:
     """Markdown: PSNR of each series at the bytes of the paper's points."""
-    names = list(dict.fromkeys(point.series for point in found))
-    by_name = {name: [point for point in found if point.series == name] for name in names}
-    lines = [f"| bytes | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
-    for anchor in by_name[names[0]]:
-        cells = []
-        for name in names:
-            value = psnr_at(anchor.bytes, by_name[name])
-            smaller = [point.psnr for point in by_name[name] if point.bytes <= anchor.bytes]
-            least = f"at least {max(smaller):.2f} dB" if smaller else "larger"
-            cells.append(least if value is None else f"{value:.2f} dB")
-        lines.append(f"| {anchor.bytes / 1000:.0f} kB | {' | '.join(cells)} |")
-    return "\n".join(lines)
+
+    def cell(anchor: Point, points: list[Point]) -> str:
+        value = psnr_at(anchor.bytes, points)
+        smaller = [point.psnr for point in points if point.bytes <= anchor.bytes]
+        least = f"at least {max(smaller):.2f} dB" if smaller else "larger"
+        return least if value is None else f"{value:.2f} dB"
+
+    return _table(found, "bytes", lambda point: f"{point.bytes / 1000:.0f} kB", cell)
 
 
-def table(found: list[Point]) -> str:
+def size_table(found: list[Point]) -> str:
     """Markdown: bytes of each series at the qualities of the paper's points."""
+
+    def cell(anchor: Point, points: list[Point]) -> str:
+        size = bytes_at(anchor.psnr, points)
+        better = [point.bytes for point in points if point.psnr >= anchor.psnr]
+        most = f"at most {min(better) / 1000:.0f} kB" if better else "out of reach"
+        return most if size is None else f"{size / 1000:.0f} kB"
+
+    return _table(found, "held-out PSNR", lambda point: f"{point.psnr:.2f} dB", cell)
+
+
+def _table(
+    found: list[Point], title: str, row: Callable[[Point], str], cell: Callable[[Point, list[Point]], str]
+) -> str:
+    """A row for each point of the first series, a column for each series."""
     names = list(dict.fromkeys(point.series for point in found))
     by_name = {name: [point for point in found if point.series == name] for name in names}
-    lines = [f"| held-out PSNR | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
-    for anchor in by_name[names[0]]:
-        cells = []
-        for name in names:
-            size = bytes_at(anchor.psnr, by_name[name])
-            better = [point.bytes for point in by_name[name] if point.psnr >= anchor.psnr]
-            most = f"at most {min(better) / 1000:.0f} kB" if better else "out of reach"
-            cells.append(most if size is None else f"{size / 1000:.0f} kB")
-        lines.append(f"| {anchor.psnr:.2f} dB | {' | '.join(cells)} |")
+    lines = [f"| {title} | {' | '.join(names)} |", "|---" * (1 + len(names)) + "|"]
+    lines += [
+        f"| {row(anchor)} | {' | '.join(cell(anchor, by_name[name]) for name in names)} |"
+        for anchor in by_name[names[0]]
+    ]
     return "\n".join(lines)
 
 
@@ -300,7 +306,7 @@ def main(
         write_json(work / "rate.json", rows)
         if plot:
             write_json(plot, rows)
-        typer.echo(f"\n{scene.subject}, {scene.num_frames} frames\n{table(found)}\n\n{quality_table(found)}")
+        typer.echo(f"\n{scene.subject}, {scene.num_frames} frames\n{size_table(found)}\n\n{quality_table(found)}")
         if chart:
             draw(found, chart, f"{scene.subject}, {scene.num_frames} frames")
 

@@ -28,6 +28,7 @@ from facefolds_core.model.device import pick_device
 from facefolds_core.params import EvaluateParams, TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.reporting.facts import STAGE_OUTPUTS
 from facefolds_core.scoring.evaluation import ImageScore, score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
@@ -49,15 +50,7 @@ RUN: dict[str, Callable[[SubjectFolders], str]] = {
     "bake": bake,
     "compress": compress,
 }
-MADE = {
-    "train": ("model", "training"),
-    "sample": ("samples",),
-    "reconstruct": ("surfaces",),
-    "decimate": ("meshes",),
-    "texture": ("resampled",),
-    "bake": ("textures",),
-    "compress": ("asset", "asset.glb"),
-}
+MADE = {stage: STAGE_OUTPUTS[stage] for stage in RUN}
 """What each stage leaves in a subject's folder."""
 
 SIZES = (

@@ -202,56 +202,31 @@ HELP = (__doc__ or "").replace("\n\n", "\n\n\b\n")
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, help=HELP)
 
 
-def sweep_command(
-    sweep: Sweep, subjects: str, values: str, data: Path, work: Path | None, results: Path, force: bool
-) -> None:
-    with report_user_errors("sweeps"):
-        chosen = chosen_values(values, sweep)
-        failed = []
-        for subject in chosen_subjects(subjects, data):
-            failed += run_sweep(sweep, subject, chosen, work or subject / "sweeps", results, force)
-        typer.echo(f"sweeps: rows in {results}; `python -m bench.sweeps draw` makes tables and charts of them")
-        if failed:
-            raise UserError("cells that failed:\n" + "\n".join(failed))
+def add_command(sweep: Sweep, text: str) -> None:
+    """A command of the sweep's name."""
+
+    @app.command(sweep.name, help=text)
+    def command(
+        subjects: Subjects = "",
+        values: Values = "",
+        data: Data = Path("data"),
+        work: Work = None,
+        results: ResultsFile = RESULTS,
+        force: Force = False,
+    ) -> None:
+        with report_user_errors("sweeps"):
+            chosen = chosen_values(values, sweep)
+            failed = []
+            for subject in chosen_subjects(subjects, data):
+                failed += run_sweep(sweep, subject, chosen, work or subject / "sweeps", results, force)
+            typer.echo(f"sweeps: rows in {results}; `python -m bench.sweeps draw` makes tables and charts of them")
+            if failed:
+                raise UserError("cells that failed:\n" + "\n".join(failed))
 
 
-@app.command()
-def layers(
-    subjects: Subjects = "",
-    values: Values = "",
-    data: Data = Path("data"),
-    work: Work = None,
-    results: ResultsFile = RESULTS,
-    force: Force = False,
-) -> None:
-    """Number of layers N: 12, 8, 4, 1. Trains a model for each, with the subject's own preset."""
-    sweep_command(SWEEPS["layers"], subjects, values, data, work, results, force)
-
-
-@app.command()
-def mesh(
-    subjects: Subjects = "",
-    values: Values = "",
-    data: Data = Path("data"),
-    work: Work = None,
-    results: ResultsFile = RESULTS,
-    force: Force = False,
-) -> None:
-    """Mesh resolution R^m: 512, 256, 128, 64, 32, 16, 8. Runs decimate, bake and compress for each."""
-    sweep_command(SWEEPS["mesh"], subjects, values, data, work, results, force)
-
-
-@app.command()
-def texture(
-    subjects: Subjects = "",
-    values: Values = "",
-    data: Data = Path("data"),
-    work: Work = None,
-    results: ResultsFile = RESULTS,
-    force: Force = False,
-) -> None:
-    """Texture resolution R^t: 1024, 512, 256, 128. Texture, bake and compress for each."""
-    sweep_command(SWEEPS["texture"], subjects, values, data, work, results, force)
+add_command(SWEEPS["layers"], "Number of layers N: 12, 8, 4, 1. Trains a model for each, with the subject's preset.")
+add_command(SWEEPS["mesh"], "Mesh resolution R^m: 512, 256, 128, 64, 32, 16, 8. Decimate, bake and compress for each.")
+add_command(SWEEPS["texture"], "Texture resolution R^t: 1024, 512, 256, 128. Texture, bake and compress for each.")
 
 
 @app.command("draw")

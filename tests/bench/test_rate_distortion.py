@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.rate_distortion import Point, bytes_at, draw, psnr_at, quality_table, table
+from bench.rate_distortion import Point, bytes_at, draw, psnr_at, quality_table, size_table
 
 PAPER = [Point("paper", crf, 1000, size, db) for crf, size, db in ((14, 9000, 30.0), (22, 3000, 28.0), (30, 0, 25.0))]
 OURS = [Point("ours", crf, 100, size, db) for crf, size, db in ((14, 3900, 30.5), (22, 900, 28.0))]
@@ -20,7 +20,7 @@ def test_bytes_are_interpolated_in_their_logarithm() -> None:
 
 
 def test_table_has_a_row_for_each_quality_of_the_paper() -> None:
-    lines = table(PAPER + OURS).splitlines()
+    lines = size_table(PAPER + OURS).splitlines()
     assert lines[0] == "| held-out PSNR | paper | ours |"
     assert lines[3] == "| 28.00 dB | 4 kB | 1 kB |"
     assert lines[4] == "| 25.00 dB | 1 kB | at most 1 kB |"
