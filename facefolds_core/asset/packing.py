@@ -9,8 +9,8 @@ multiples of 16; what the texture leaves of its cell repeats its border. So
   look-up at a clamped (s, t), at least GUTTER + 1/2 >= 2^(m-1) pixels inside the cell, reads this cell only if m <= 3.
 
 Pictures are multiples of 16 a side, at least MIN_SIDE, and at most HARDWARE_SIDE where the layers can be placed so:
-beyond, many hardware decoders stop. A reader takes the rectangles from the manifest and does not care how they were
-chosen.
+beyond, many hardware decoders stop; if not, at most LARGE_SIDE, if not, MAX_SIDE. A reader takes the rectangles from
+the manifest and does not care how they were chosen.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ MIP_LEVELS = 3
 MIN_SIDE = 128
 """Pixels a side that every hardware decoder takes (NVDEC's least for VP9 and AV1)."""
 HARDWARE_SIDE = 4096
+LARGE_SIDE = 8192
+"""Pixels a side that new hardware, browsers and H.264's highest level take."""
 MAX_PIXELS = 35_651_584
 """Pixels a picture at the highest levels: 6.2 of H.264 (139 264 macroblocks), of VP9 and 6.3 of AV1."""
 MAX_SIDE = 16_384
@@ -64,7 +66,8 @@ class AtlasLayout:
         """The layout that the writer uses for N textures of (width, height) texels.
 
         Of the packings for WIDTHS_TRIED greatest widths, each as low as HEIGHT_SLACK allows, the one of least area
-        among those of at most HARDWARE_SIDE a side, if there are any; among equals the one with the shorter long side.
+        among those of at most HARDWARE_SIDE a side, if there are any, else of LARGE_SIDE, else of MAX_SIDE; among
+        equals the one with the shorter long side.
         """
         cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
         narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
@@ -81,7 +84,8 @@ class AtlasLayout:
                     continue
                 layouts.append(cls._placed(sizes, cells, places))
                 break
-        return min(layouts, key=lambda layout: (layout.long_side > HARDWARE_SIDE, layout.pixels, layout.long_side))
+        limits = (HARDWARE_SIDE, LARGE_SIDE, MAX_SIDE)
+        return min(layouts, key=lambda it: (sum(it.long_side > side for side in limits), it.pixels, it.long_side))
 
     @classmethod
     def _placed(

@@ -118,7 +118,14 @@ class LevelContent:
 
     @cached_property
     def layout(self) -> AtlasLayout:
-        return AtlasLayout.pack([layer.crop[2:] for layer in self.layers])
+        """Where the layers lie in the picture.
+
+        Raises:
+            UserError: if they do not fit into one.
+        """
+        layout = AtlasLayout.pack([layer.crop[2:] for layer in self.layers])
+        check_layout(layout, self.textures.image(self.layers[0].source, 0).shape[0])
+        return layout
 
     @property
     def rate(self) -> Fraction:
@@ -148,7 +155,6 @@ def write_level(
         UserError: if the textures do not fit into one video, or an encoder refuses them.
     """
     layout = content.layout
-    check_layout(layout, content.textures.image(content.layers[0].source, 0).shape[0])
     entries = tuple(
         _write_layer(folder / f"{name}_{index:02d}.drc", layer, rect, params)
         for index, (layer, rect) in enumerate(zip(content.layers, layout.rects, strict=True))

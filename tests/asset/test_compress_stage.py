@@ -83,6 +83,18 @@ def test_quality_by_target(folders: SubjectFolders) -> None:
     assert all(coarse < fine for coarse, fine in zip(*sizes, strict=True))
 
 
+def test_textures_too_large_for_a_video_are_refused_before_anything_is_encoded(
+    folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig(folders, video={"target_psnr": 38.0})
+    monkeypatch.setattr("facefolds_core.asset.packing.MAX_PIXELS", 10_000)
+    monkeypatch.setattr("facefolds_core.asset.writer.encode_video", lambda *_: pytest.fail("encoded"))
+    with pytest.raises(UserError, match="do not fit") as caught:
+        compress(folders)
+    assert "texture.resolution" in str(caught.value.remedy)
+    assert not folders.asset.exists()
+
+
 def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
     rig(folders, mesh={"max_error_pixels": 0.05, "compression_level": 7})
     compress(folders)

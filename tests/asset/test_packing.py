@@ -8,6 +8,7 @@ import pytest
 from facefolds_core.asset.packing import (
     GUTTER,
     HARDWARE_SIDE,
+    LARGE_SIDE,
     MIN_SIDE,
     MIP_LEVELS,
     AtlasLayout,
@@ -102,6 +103,13 @@ def test_paper_size_fits() -> None:
 
 def test_hardware_limit_decides_between_shapes() -> None:
     assert AtlasLayout.pack([(1016, 600)] * 12).long_side <= HARDWARE_SIDE
+
+
+def test_cropped_layers_of_the_paper_size_are_not_stacked_into_one_column() -> None:
+    """One column of these has the least area, and no encoder takes it."""
+    layout = AtlasLayout.pack([(1024, 1024)] * 5 + [(1024, 1008)] * 7)
+    assert layout.long_side <= LARGE_SIDE
+    check_layout(layout, 1024)
 
 
 def test_too_large_a_picture_names_the_resolution_that_fits() -> None:
