@@ -1,3 +1,3 @@
 """FaceFolds: multi-view face video to nested textured meshes with an RGBA texture video."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

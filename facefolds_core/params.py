@@ -50,7 +50,7 @@ class CaptureParams(Section):
         frames: number of frames.
         height, width: of the images, pixels.
         fps: frames a second.
-        seed: of the procedural skin, hair and room.
+        seed: of the procedural skin, freckles and hair.
     """
 
     cameras: Annotated[int, Field(ge=3)] = 24

@@ -50,8 +50,8 @@ QUICK: dict[str, Any] = {
 }
 
 FAST: dict[str, Any] = {
-    # The explicit model (docs/method.md). It takes layers, level_halfwidth, iterations, lr_texture, lambda_veil
-    # and lambda_solid; the other keys are the perceptrons' and have no effect.
+    # The explicit model (docs/method.md). It takes layers, level_halfwidth, iterations, lr_texture, lr_volume,
+    # lambda_veil and lambda_solid; the other keys are the perceptrons' and have no effect.
     **PAPER,
     "model": "explicit",
     "level_halfwidth": 0.006,

@@ -21,7 +21,7 @@ def choose(
         "sweep.parquet"
     ),
     subject: Annotated[str, typer.Option(help="Name of the subject; needed where the table has several.")] = "",
-    max_bytes: Annotated[float | None, typer.Option(help="Of meshes and video together.")] = None,
+    max_bytes: Annotated[float | None, typer.Option(help="Of meshes, video and view effects together.")] = None,
     max_triangles: Annotated[float | None, typer.Option(help="Of all layers.")] = None,
     max_gpu_bytes: Annotated[float | None, typer.Option(help="Of vertices, indices and a decoded picture.")] = None,
     max_bit_rate: Annotated[float | None, typer.Option(help="Of the texture video, bits a second.")] = None,
