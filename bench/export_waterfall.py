@@ -23,11 +23,11 @@ from matplotlib.axes import Axes
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import report_user_errors
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files import atomic_file, atomic_folder, write_json
 from facefolds_core.model import load_model
+from facefolds_core.packaging.views import spread
 from facefolds_core.params import TrainParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import sheet_frames
 from facefolds_core.scoring.waterfall import Step, waterfall
 from facefolds_core.training.report import pick_device
 
@@ -37,7 +37,8 @@ def draw(path: Path, found: dict[str, list[Step]]) -> None:
     figure, rows = plt.subplots(len(found), figsize=(9, 4.2 * len(found)), layout="constrained", squeeze=False)
     for axes, (subject, steps) in zip(rows[:, 0], found.items(), strict=True):
         draw_steps(axes, subject, steps)
-    figure.savefig(path, dpi=120, metadata={"Software": None})
+    with atomic_file(path) as temporary:
+        figure.savefig(temporary, dpi=120, metadata={"Software": None})
     plt.close(figure)
 
 
@@ -68,7 +69,7 @@ def main(
             folders = SubjectFolders(data / subject)
             scene = read_scene(folders.scene)
             model = load_model(folders.model, pick_device(read_stage(TrainParams, folders.config).device))
-            steps = found[subject] = waterfall(scene, model, folders, sheet_frames(scene.num_frames, frames))
+            steps = found[subject] = waterfall(scene, model, folders, spread(scene.num_frames, frames))
             with atomic_folder(folders.root / "waterfall") as temporary:
                 write_json(temporary / "waterfall.json", {"subject": subject, "steps": [asdict(s) for s in steps]})
                 with (temporary / "waterfall.csv").open("w", newline="") as file:

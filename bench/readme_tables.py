@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bench.markers import replace_between
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json, write_text
 
@@ -76,9 +77,7 @@ def main(
             typer.echo(text)
             return
         readme = Path("README.md")
-        head, rest = readme.read_text(encoding="utf-8").split(START)
-        tail = rest.split(END)[1]
-        write_text(readme, f"{head}{START}\n{text}\n{END}{tail}")
+        write_text(readme, replace_between(readme.read_text(encoding="utf-8"), START, END, text))
         typer.echo(f"readme_tables: tables written into {readme}")
 
 

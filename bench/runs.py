@@ -18,8 +18,9 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.model.device import pick_device
+from facefolds_core.packaging.views import spread
 from facefolds_core.params import TrainParams
-from facefolds_core.scoring.evaluation import METRICS, score_images, sheet_frames
+from facefolds_core.scoring.evaluation import METRICS, score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
@@ -152,7 +153,7 @@ def score(scene: Scene, model: RadianceManifolds, frames: int, perceptual: Perce
     found: list[dict[str, float | None]] = []
     for camera in held_out:
         view = ModelView(model, scene.cameras[camera])
-        for k in sheet_frames(scene.num_frames, frames):
+        for k in spread(scene.num_frames, frames):
             if (camera, k) not in truths:
                 continue
             picture = shown(view.render(float(k))[1])

@@ -21,6 +21,7 @@ from bench.processes import in_a_process
 from bench.results import ClockKind, Measurement, Results, describe
 from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.training.explicit.loop import LEAST_ITERATIONS
 
 SECONDS = "10,30,60,120,300,900"
 PRESETS = "fast,quick,paper"
@@ -59,11 +60,12 @@ def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
         guess = next_iterations(budgets[0], [(first.iterations, first.seconds)], guess)
     for budget in budgets:
         for _ in range(2):
-            iterations = next_iterations(budget, known, guess)
+            iterations = max(LEAST_ITERATIONS, next_iterations(budget, known, guess))
             shorter = replace(job, params=job.params.model_copy(update={"iterations": iterations}))
             made = in_a_process(measure_whole, shorter, budget, partial(keep, results.path))
             known = [run for run in known if run[0] != iterations] + [(iterations, made.seconds)]
-            if abs(made.seconds - budget) <= NEAR * budget or next_iterations(budget, known, guess) == iterations:
+            better = max(LEAST_ITERATIONS, next_iterations(budget, known, guess))
+            if abs(made.seconds - budget) <= NEAR * budget or better == iterations:
                 break
 
 

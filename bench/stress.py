@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from bench.common import words
+from bench.markers import replace_between
 from bench.stress_cells import CUT, RESULTS, Cell, keep_cell, plan_cells, read_cells, run_cell
 from bench.stress_draw import draw_heat_map, draw_worst
 from bench.stress_tables import table
@@ -32,12 +33,6 @@ def describe(cell: Cell) -> str:
     if cell.inner is None:
         return f"{what}: failed: {cell.failure}"
     return f"{what}: {cell.inner:.2f} dB after {cell.seconds:.1f} s" + ("" if cell.converged else ", not converged")
-
-
-def write_between(page: Path, text: str) -> None:
-    """Replace what stands between START and END."""
-    head, rest = page.read_text(encoding="utf-8").split(START)
-    write_text(page, f"{head}{START}\n{text}\n{END}{rest.split(END)[1]}")
 
 
 def main(
@@ -62,7 +57,7 @@ def main(
         cells = read_cells(results)
         text = table(cells, list(CUT))
         typer.echo(f"\n{text}")
-        write_between(PAGE, text)
+        write_text(PAGE, replace_between(PAGE.read_text(encoding="utf-8"), START, END, text))
         draw_heat_map(cells, [preset for preset in CUT if any(c.preset == preset for c in cells)], HEAT_MAP)
         draw_worst(cells, "fast", data / "pictures", WORST)
 

@@ -24,7 +24,7 @@ from bench.stress_film import Shots, held_out, shoot, training, write_shots
 from bench.stress_hazards import HAZARDS, Hazard
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
+from facefolds_core.files import atomic_file, write_json
 from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.params import TrainParams
 from facefolds_core.scoring.metrics import psnr, shown
@@ -247,5 +247,5 @@ def strip_path(pictures: Path, cell: Cell) -> Path:
 def save_strip(path: Path, seen: list[tuple[Picture, Picture]]) -> None:
     """One row of truths above one row of what the model shows."""
     rows = [np.concatenate([pair[i] for pair in seen], 1) for i in (0, 1)]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), np.rint(255 * np.concatenate(rows)[..., ::-1]).astype(np.uint8))
+    with atomic_file(path) as temporary:
+        cv2.imwrite(str(temporary), np.rint(255 * np.concatenate(rows)[..., ::-1]).astype(np.uint8))

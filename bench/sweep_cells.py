@@ -29,7 +29,7 @@ from facefolds_core.params import EvaluateParams, TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.reporting.facts import STAGE_OUTPUTS
-from facefolds_core.scoring.evaluation import ImageScore, score_images
+from facefolds_core.scoring.evaluation import ImageScore, frame_rate_factor, score_images, shipped
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from facefolds_core.scoring.report import asset_cost, averages
@@ -213,12 +213,13 @@ def asset_scores(
 ) -> list[ImageScore]:
     """`evaluate`'s variant `asset` alone: without the model's pictures it takes a third of the time."""
     truths, masks, caster = scene.open_frames(), scene.open_masks(), AssetCaster(asset)
+    step = frame_rate_factor(scene, asset)
     cameras = scene.indices("holdout")
     if not cameras:
         raise UserError("no held-out camera: there is nothing to score on", file=scene.folder / "scene.json")
     hits = {index: caster.cast(scene.cameras[index]) for index in cameras}
     found = []
-    for k, textures in enumerate(asset.frames()):
+    for k, textures in shipped(asset, list(range(scene.num_frames)), step):
         for index in cameras:
             if (index, k) not in truths:
                 continue

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from bench.markers import replace_between
 from bench.paper import PAPER
 from bench.results import read_entries
-from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
 
 VERSION = 1
@@ -142,10 +142,7 @@ def with_tables(text: str, rows: list[Row]) -> str:
     """
     for sweep in AXES:
         start, end = f"<!-- {sweep}: written by bench/sweeps.py draw -->", f"<!-- end of {sweep} -->"
-        if start not in text or end not in text:
-            raise UserError("no place for a table", expected=f"{start} ... {end}", remedy="put the markers back")
-        head, rest = text.split(start)
         subjects = sorted({row.subject for row in rows if row.sweep == sweep})
         tables = "\n\n".join(f"`{subject}`:\n\n{table(rows, sweep, subject)}" for subject in subjects)
-        text = f"{head}{start}\n{tables}\n{end}{rest.split(end)[1]}"
+        text = replace_between(text, start, end, tables)
     return text

@@ -61,11 +61,11 @@ def disk_error(error: OSError, path: str | Path) -> UserError:
     remedies = {
         errno.ENOSPC: "free some space on that disk and run the same command again; finished stages are kept",
         errno.EDQUOT: "your disk quota is used up; free some space and run the same command again",
-        errno.EACCES: "give yourself write permission there, or work in another folder",
+        errno.EACCES: "give yourself permission to read and write there, or work in another folder",
         errno.EROFS: "the file system is read-only; work in another folder",
     }
     return UserError(
-        "cannot write a file",
+        "no permission" if error.errno == errno.EACCES else "cannot write a file",
         file=path,
         found=error.strerror or str(error),
         remedy=remedies.get(error.errno or 0, "check the disk and run the same command again"),
@@ -74,7 +74,7 @@ def disk_error(error: OSError, path: str | Path) -> UserError:
 
 @contextmanager
 def report_user_errors(what: str) -> Iterator[None]:
-    """Turn a `UserError` (or a full disk) inside the block into one message on stderr and exit status 1.
+    """Turn a `UserError` (or a full disk, or a missing permission) inside the block into a message and exit status 1.
 
     Args:
         what: the name of the command or stage, printed before the message.
@@ -85,7 +85,7 @@ def report_user_errors(what: str) -> Iterator[None]:
         sys.stderr.write(f"\n{what}: error: {error}\n")
         sys.exit(1)
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES):
             raise
         sys.stderr.write(f"\n{what}: error: {disk_error(error, error.filename or '(unknown)')}\n")
         sys.exit(1)

@@ -99,7 +99,7 @@ class TrainParams(Section):
         uv_frequencies, level_frequencies, view_frequencies: octaves of the positional encodings.
         search_samples: M, samples a ray for the first crossings.
         rays: rays a batch.
-        iterations: Adam steps.
+        iterations: Adam steps; of the explicit model at least 183.
         lr_manifold, lr_texture: initial learning rates.
         decay_manifold, decay_texture: factors by which the rates fall each `decay_interval` iterations, exponentially.
         lambda_view, lambda_reg: weights of |view term|^2 and of |manifold weights|^2.
@@ -146,7 +146,7 @@ class TrainParams(Section):
         if not isinstance(value, dict):
             return value
         name = value.get("preset", "fast")
-        if name not in PRESETS:
+        if not isinstance(name, str) or name not in PRESETS:
             raise ValueError(f"unknown preset {name!r}; there are {', '.join(sorted(PRESETS))}")
         return {**PRESETS[name], **value}
 

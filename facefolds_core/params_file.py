@@ -105,6 +105,16 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             remedy="remove or rename them",
         )
     sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
+    for name, section in sections.items():
+        if not isinstance(section, dict):
+            raise UserError(
+                "not a section",
+                file=path,
+                place=name,
+                expected="keys and values",
+                found=repr(section),
+                remedy=f"write `{name}: {{key: value}}`",
+            )
     subjects = {
         str(name): _validate(Subject, entry, path, f"subjects.{name}") for name, entry in value["subjects"].items()
     }

@@ -74,7 +74,7 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
     def run() -> None:
         try:
             runner = loop.run_until_complete(start())
-        except UserError as error:
+        except BaseException as error:  # whatever it is, the caller waits for it
             address.set_exception(error)
             return
         address.set_result(f"http://{HOST}:{runner.addresses[0][1]}/")

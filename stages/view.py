@@ -53,7 +53,7 @@ def view(
         Path | None, typer.Argument(help="Folder of the asset. Left out: the one under --data that was made last.")
     ] = None,
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
-    port: Annotated[int, typer.Option(help="Port on this machine; 0 for any free one.")] = 0,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 for any free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in a browser, where there is a screen.")] = True,
 ) -> None:
     """Serve an asset and the web player to this machine only, and open the player. Ctrl+C ends it."""

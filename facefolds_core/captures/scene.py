@@ -17,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,12 +94,25 @@ class Scene:
         return FrameStore(path) if path.exists() else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
-        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None."""
+        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None.
+
+        Raises:
+            UserError: if the file is damaged.
+        """
         path = self.folder / "surface.npz"
         if not path.exists():
             return None
-        with np.load(path, allow_pickle=False) as archive:
-            return archive["vertices"], archive["faces"]
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                return archive["vertices"], archive["faces"]
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+            raise UserError(
+                "the tracked mesh of the scene is damaged",
+                file=path,
+                expected="vertices and faces",
+                found=str(error),
+                remedy="run `dvc repro` to make the normalised scene again",
+            ) from None
 
 
 def write_scene(scene: Scene, folder: Path) -> None:

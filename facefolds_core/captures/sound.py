@@ -46,8 +46,9 @@ def cut_sound(source: Path, target: Path, start: float, seconds: float) -> None:
         raise _unreadable(source, str(error)) from None
     channels = 2 if layout else 1
     samples = np.concatenate([np.zeros(0, np.int16), *(frame.to_ndarray().reshape(-1) for frame in frames)])
-    samples = samples.reshape(-1, channels)[round(start * rate) : round((start + seconds) * rate)]
-    silence = np.zeros((round(seconds * rate) - len(samples), channels), np.int16)
+    first, length = round(start * rate), round(seconds * rate)
+    samples = samples.reshape(-1, channels)[first : first + length]
+    silence = np.zeros((length - len(samples), channels), np.int16)
     with wave.open(str(target), "wb") as file:
         file.setparams((channels, 2, rate, 0, "NONE", ""))
         file.writeframes(np.concatenate([samples, silence]).astype("<i2").tobytes())

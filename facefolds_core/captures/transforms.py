@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -190,19 +191,25 @@ def _arrange(entries: list[Entry], path: Path) -> tuple[dict[str, list[Entry]], 
         names = _unique([_stem_and_folder(group[0]) for group in groups])
         return dict(zip(names, groups, strict=True)), ["0"], {entry.place: "0" for entry in entries}
     timed = None not in times
+    named = _time_names([time for time in times if time is not None]) if timed else {}
     frame_of = {}
-    ordered: list[str]
     stems = _frame_is_folder(groups)
     for entry in entries:
         stem, folder = _stem_and_folder(entry)
-        frame_of[entry.place] = f"{entry.time:g}" if timed else (folder if stems else stem)
-    if timed:
-        ordered = [f"{time:g}" for time in sorted(time for time in times if time is not None)]
-    else:
-        ordered = sorted(set(frame_of.values()))
+        frame_of[entry.place] = folder if stems else stem
+        if timed and entry.time is not None:
+            frame_of[entry.place] = named[entry.time]
+    ordered = list(named.values()) if timed else sorted(set(frame_of.values()))
     parts = [_stem_and_folder(group[0]) for group in groups]
     cameras = _unique([(stem, folder) if stems else (folder, stem) for stem, folder in parts])
     return dict(zip(cameras, groups, strict=True)), ordered, frame_of
+
+
+def _time_names(times: Iterable[float]) -> dict[float, str]:
+    """Names of moments, in order: six digits, or all of them where six are not enough to tell them apart."""
+    ordered = sorted(set(times))
+    short = [f"{time:g}" for time in ordered]
+    return dict(zip(ordered, short if len(set(short)) == len(short) else map(repr, ordered), strict=True))
 
 
 def _stem_and_folder(entry: Entry) -> tuple[str, str]:
@@ -276,7 +283,10 @@ def _focal(entry: Entry, width: int, height: int, path: Path) -> tuple[float, fl
         if f"fl_{axis}" in values:
             focal[axis] = _number(entry, f"fl_{axis}")
         elif f"camera_angle_{axis}" in values:
-            focal[axis] = size / 2 / math.tan(_number(entry, f"camera_angle_{axis}") / 2)
+            angle = _number(entry, f"camera_angle_{axis}")
+            if not 0 < angle < math.pi:
+                raise _fail(path, entry.place, f"camera_angle_{axis} is no angle of view", "radians in (0, pi)", angle)
+            focal[axis] = size / 2 / math.tan(angle / 2)
     if not focal:
         raise _fail(path, entry.place, "no focal length", "fl_x (and fl_y) or camera_angle_x", "neither")
     fx = focal.get("x", focal.get("y", 0.0))

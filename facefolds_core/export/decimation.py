@@ -93,7 +93,7 @@ def decimate(surface: Surface, max_vertices: int, centre: Array) -> Surface:
     vertices, faces = surface.vertices.astype(np.float64), surface.faces.astype(np.intp)
     # Euler: an open sheet has F = 2 V - 2 - B triangles, B its border vertices, a few times sqrt(V) after decimation.
     for aggressiveness in AGGRESSIVENESS:
-        target = 2 * max_vertices
+        target = min(2 * max_vertices, len(surface.faces))
         while len(vertices) > max_vertices and target > 0:
             found, index = fast_simplification.simplify(
                 surface.vertices, surface.faces, target_count=target, agg=aggressiveness

@@ -42,7 +42,7 @@ def search_crf(quality: Callable[[int], float], target: float, start: int, worst
     tried: dict[int, float] = {}
     good = _search(quality, target, start, worst, tried)
     if not good:
-        good = _search(quality, max(tried.values()) - SPARED, start, worst, tried) or min(tried)
+        good = _search(quality, max(tried.values()) - SPARED, start, worst, tried)
     return Found(good, tried[good], len(tried))
 
 

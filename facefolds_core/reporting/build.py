@@ -16,12 +16,13 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.files import write_text
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
+from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.facts import Facts, read_facts
 from facefolds_core.reporting.measure import Measured, measure, radii, spacings
-from facefolds_core.scoring.evaluation import frame_rate_factor, sheet_frames
+from facefolds_core.scoring.evaluation import frame_rate_factor
 from facefolds_core.scoring.sheets import MAX_ERROR
 
 REPORT_NAME = "report.html"
@@ -71,10 +72,10 @@ def gather(folders: SubjectFolders) -> Subject:
 def chosen_pairs(scene: Scene, wanted: int) -> list[tuple[int, int]]:
     """(camera, frame) of the held-out pictures that are shown: `wanted` frames a camera, fewer if they are large."""
     photos = scene.open_frames()
-    frames = sheet_frames(scene.num_frames, wanted)
+    frames = spread(scene.num_frames, wanted)
     pairs = [(index, k) for index in scene.indices("holdout") for k in frames if (index, k) in photos]
     most = max(1, min(MOST_VIEWS, MOST_PIXELS // (scene.width * scene.height)))
-    return [pairs[i] for i in sheet_frames(len(pairs), most)] if pairs else []
+    return [pairs[i] for i in spread(len(pairs), most)] if pairs else []
 
 
 def render_page(subject: Subject, folder: str) -> str:

@@ -19,6 +19,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
+from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, composite
@@ -92,7 +93,7 @@ def evaluate(
     _check(scene, model, held_out)
     step = frame_rate_factor(scene, asset)
     truths, masks = scene.open_frames(), scene.open_masks()
-    on_sheet = sheet_frames(scene.num_frames, params.sheet_frames)
+    on_sheet = spread(scene.num_frames, params.sheet_frames)
     caster = AssetCaster(asset)
     scores: list[ImageScore] = []
     panels: list[Panel] = []
@@ -116,11 +117,6 @@ def evaluate(
                     panels.append(Panel(camera.name, frame, *shot, group["model"], group["asset"], mask))
                 bar.update()
     return Evaluation(scores, panels)
-
-
-def sheet_frames(frames: int, wanted: int) -> list[int]:
-    """At most `wanted` of `frames` indices, evenly spaced, the first and the last among them."""
-    return sorted({round(i) for i in np.linspace(0, frames - 1, min(wanted, frames))})
 
 
 def score_images(
@@ -176,17 +172,17 @@ def _rendered(
     view, hits = ModelView(model, camera), caster.cast(camera)
     maps = asset.effects()
     added = None if maps is None else added_colours(hits, to_eye(camera), maps)
-    for k, textures in _shipped(asset, frames, step):
+    for k, textures in shipped(asset, frames, step):
         with_view, without_view, alpha = view.render(float(k))
         behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
-        shipped, _ = composite(hits, textures, background)
-        images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": shipped}
+        picture, _ = composite(hits, textures, background)
+        images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": picture}
         if added is not None:
             images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
         yield k, images
 
 
-def _shipped(asset: Asset, frames: list[int], step: int) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]]]]:
+def shipped(asset: Asset, frames: list[int], step: int) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]]]]:
     """The textures of the scene's `frames`; decoded in one go if that is all that have photos."""
     if len(frames) * step == asset.num_frames:
         return ((k // step, textures) for k, textures in enumerate(asset.frames()) if k % step == 0)

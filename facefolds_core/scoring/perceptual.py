@@ -142,7 +142,7 @@ def find_perceptual(device: torch.device | str = "cpu") -> Perceptual:
     if lpips is None:
         missing.append(f"no LPIPS: AlexNet's weights, {TRUNK_NAME}, are not in {_hub_folder()} (or are damaged)")
     if st_lpips is None:
-        missing.append("no ST-LPIPS: the package stlpips-pytorch is not installed, or its weights are damaged")
+        missing.append("no ST-LPIPS: the package stlpips-pytorch is not installed")
     return Perceptual(
         None if lpips is None else lpips.to(device), None if st_lpips is None else st_lpips.to(device), tuple(missing)
     )

@@ -133,12 +133,6 @@ def text_table(metrics: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _cell(name: str, value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.2f}" if name.startswith("psnr") else f"{value:.4f}"
-
-
 def _read(kind: type[T], path: Path) -> T:
     remedy = "run `dvc repro`: the stage that writes it will run again"
     value = read_json(path, remedy=remedy)

@@ -2,7 +2,8 @@
 
 Columns: `experiment`, `revision`, `subject`, `error` (strings); then one a parameter, whose name has a dot
 ("decimate.resolution"), null where the row leaves it as the subject has it; then one a measured figure, null where
-there is none. Columns of parameters hold numbers where all their values are numbers, else JSON text.
+there is none. Columns of parameters hold numbers where all their values are numbers, else JSON text ("null" where
+somebody set that).
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from facefolds_core.files import atomic_file
 
 NAMES = ("experiment", "revision", "subject", "error")
 SUFFIXES = (".parquet", ".csv")
+MISSING = object()
+"""In place of a value where a run lacks the key."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +66,10 @@ def write_runs(path: Path, runs: Sequence[Run]) -> None:
     _check_suffix(path)
     columns: dict[str, pa.Array] = {name: pa.array([getattr(run, name) for run in runs], pa.string()) for name in NAMES}
     for name in _union(run.params for run in runs):
-        values = [run.params.get(name) for run in runs]
+        # A null that somebody set is a value; a cell is only empty where the run lacks the key.
+        values = [run.params.get(name, MISSING) for run in runs]
         columns[name] = _numbers(values) or pa.array(
-            [None if v is None else json.dumps(v) for v in values], pa.string()
+            [None if v is MISSING else json.dumps(v) for v in values], pa.string()
         )
     for name in _union(run.figures for run in runs):
         columns[name] = pa.array([run.figures.get(name) for run in runs], pa.float64())
@@ -87,7 +91,9 @@ def read_runs(path: Path) -> list[Run]:
     remedy = "`python -m stages.collect` writes one"
     try:
         if path.suffix == ".csv":
-            texts = pa_csv.ConvertOptions(strings_can_be_null=True, column_types=dict.fromkeys(NAMES, pa.string()))
+            texts = pa_csv.ConvertOptions(
+                null_values=[""], strings_can_be_null=True, column_types=dict.fromkeys(NAMES, pa.string())
+            )
             table = pa_csv.read_csv(path, convert_options=texts)
         else:
             table = pa_parquet.read_table(path)
@@ -138,8 +144,9 @@ def _union(mappings: Any) -> list[str]:
 
 
 def _numbers(values: list[Any]) -> pa.Array | None:
-    """None if something else than numbers is among them."""
-    known = [value for value in values if value is not None]
+    """None if something else than numbers is among them; what is MISSING becomes null."""
+    known = [value for value in values if value is not MISSING]
+    values = [None if value is MISSING else value for value in values]
     if any(isinstance(value, bool) or not isinstance(value, (int, float)) for value in known):
         return None
     return pa.array(values, pa.int64() if all(isinstance(value, int) for value in known) else pa.float64())

@@ -63,7 +63,7 @@ def test_explicit_runs_are_sized_by_those_before(tmp_path: Path, monkeypatch: py
 
     def fake(function: object, one: Job, budget: float, record: partial[None]) -> Measurement:
         runs.append(one.params.iterations)
-        made = one.measurement(budget, 5 + 0.05 * one.params.iterations, one.params.iterations, 1, None)
+        made = one.measurement(budget, 0.5 + 0.05 * one.params.iterations, one.params.iterations, 1, None)
         record(made)
         return made
 

@@ -6,15 +6,19 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bench import sweep_cells, sweeps
-from bench.sweep_cells import MADE, RUN, Cell, own_metrics, plan, run_stages
+from bench.sweep_cells import MADE, RUN, Cell, asset_scores, own_metrics, plan, run_stages
 from bench.sweep_rows import Row, read_rows
 from bench.sweeps import SWEEPS, as_run, chosen_values, run_sweep
 from facefolds_core.errors import UserError
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.metrics import MAX_PSNR
+from facefolds_core.scoring.perceptual import Perceptual
+from tests.scoring.fakes import FRAMES, SIZE, flat_asset, flat_scene, pictures
 
 
 @pytest.fixture
@@ -141,6 +145,12 @@ def test_a_failed_cell_does_not_lose_the_others(
     assert sum("measured already" in line for line in lines) == 2
     assert sum("failed: RuntimeError" in line for line in lines) == 2
     assert len(read_rows(path)) == 3
+
+
+def test_an_asset_at_twice_the_frame_rate_is_scored_at_the_photos(tmp_path: Path) -> None:
+    twice = np.stack([pictures(), 255 - pictures()], 1).reshape(2 * FRAMES, SIZE, SIZE, 3)
+    found = asset_scores(flat_scene(tmp_path), flat_asset(twice), (0.0, 0.0, 0.0), Perceptual(None, None, ()))
+    assert [score.values["psnr"] for score in found] == [MAX_PSNR] * FRAMES
 
 
 def test_a_row_as_a_recommendation_reads_it(subject: Path, tmp_path: Path) -> None:

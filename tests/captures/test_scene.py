@@ -52,6 +52,14 @@ def test_masks_and_surface_are_optional(tmp_path: Path) -> None:
     assert scene(tmp_path).load_surface() is None
 
 
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"no archive"])
+def test_a_damaged_tracked_mesh_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "surface.npz").write_bytes(content)
+    with pytest.raises(UserError, match="tracked mesh of the scene is damaged") as caught:
+        scene(tmp_path).load_surface()
+    assert caught.value.file == tmp_path / "surface.npz"
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [({"version": 99}, "another version"), ({"cameras": [{"name": "a"}]}, "garbled"), ({"times": "soon"}, "garbled")],

@@ -10,7 +10,7 @@ import pytest
 
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.multiface import read_multiface
-from facefolds_core.captures.sound import sound_start
+from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.errors import UserError
 from facefolds_core.params import FrameRange, NormalizeParams, Subject
 from tests.captures.fixtures import SEGMENT, write_multiface
@@ -46,6 +46,19 @@ def test_sound_begins_with_the_first_frame_in_use(tmp_path: Path) -> None:
     # Frames 1, 3 and 5 at 15 a second: 0.2 seconds from 1/30 on; the sound ends with frame 5's first half.
     expected = np.concatenate([ramp[RATE // 30 :], np.zeros(RATE // 5, int)])[: RATE // 5]
     np.testing.assert_array_equal(heard(path), expected)
+
+
+@pytest.mark.parametrize("start", range(6))
+def test_a_cut_that_falls_between_samples_has_its_length(tmp_path: Path, start: int) -> None:
+    source = tmp_path / "sound.wav"
+    with wave.open(str(source), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes(np.arange(16_000, dtype="<i2").tobytes())
+    cut_sound(source, tmp_path / "cut.wav", start / 30, 4 / 30)
+    with wave.open(str(tmp_path / "cut.wav"), "rb") as file:
+        found = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+    first = round(start * 16_000 / 30)
+    np.testing.assert_array_equal(found, np.arange(first, first + round(4 * 16_000 / 30)))
 
 
 def test_frames_that_are_not_evenly_spaced_have_no_sound(tmp_path: Path) -> None:

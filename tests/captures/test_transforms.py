@@ -13,6 +13,7 @@ import pytest
 
 from facefolds_core.captures.lens import Lens, make_lens, undistort
 from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.errors import UserError
 from facefolds_core.params import Subject
 from tests.captures.fixtures import (
     HEAD,
@@ -117,6 +118,24 @@ def test_times_order_the_frames(tmp_path: Path) -> None:
     capture = read_transforms(tmp_path, subject(tmp_path))
     assert capture.frame_ids == ("0", "0.25")
     assert capture.images[4, 1] == tmp_path / "400005" / "f1.png"
+
+
+def test_times_that_six_digits_cannot_tell_apart(tmp_path: Path) -> None:
+    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
+    path = tmp_path / "transforms.json"
+    content = json.loads(path.read_text())
+    for entry in content["frames"]:
+        entry["time"] += 1699999999.0
+    path.write_text(json.dumps(content))
+    assert read_transforms(tmp_path, subject(tmp_path)).frame_ids == ("1699999999.0", "1699999999.25")
+
+
+@pytest.mark.parametrize("angle", [0, -0.5, 4])
+def test_an_angle_of_view_that_is_none(tmp_path: Path, angle: float) -> None:
+    path, _ = write_transforms(tmp_path, camera_angle_x=angle)
+    edit_transforms(path, 0, fl_x=None, fl_y=None)
+    with pytest.raises(UserError, match="angle of view"):
+        read_transforms(tmp_path, subject(tmp_path))
 
 
 def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: Path) -> None:

@@ -34,6 +34,13 @@ def test_full_disk_becomes_a_message(capsys: pytest.CaptureFixture[str]) -> None
     assert "free some space" in capsys.readouterr().err
 
 
+def test_a_missing_permission_becomes_a_message(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit), report_user_errors("train"):
+        raise PermissionError(errno.EACCES, "Permission denied", "data/x")
+    shown = capsys.readouterr().err
+    assert "no permission" in shown and "data/x" in shown and "remedy" in shown
+
+
 def test_other_errors_keep_their_traceback() -> None:
     with pytest.raises(ZeroDivisionError), report_user_errors("train"):
         1 / 0  # noqa: B018

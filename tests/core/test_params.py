@@ -68,6 +68,8 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         ("", "no subjects"),
         (MINIMAL + "trian: {}\n", "trian"),
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
+        (MINIMAL + "train: {preset: [fast]}\n", "there are"),
+        (MINIMAL + "train: fast\n", "keys and values"),
         (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
         (MINIMAL + "texture: {size: 3}\n", "texture.size"),

@@ -74,3 +74,8 @@ def test_what_is_not_there_or_outside_is_not_found(address: str, path: str) -> N
 def test_a_port_that_is_taken(address: str, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot listen"), serving(tmp_path, {}, urlsplit(address).port or 0):
         pass
+
+
+def test_a_port_that_cannot_be_does_not_hang(tmp_path: Path) -> None:
+    with pytest.raises(OverflowError), serving(tmp_path, {}, 70_000):
+        pass

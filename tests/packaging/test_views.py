@@ -40,6 +40,8 @@ def test_what_is_hidden_costs_nothing() -> None:
     assert meter(textures).psnr([(0, list(wrong))]) > 30
 
 
-@pytest.mark.parametrize(("count", "wanted", "found"), [(10, 3, [0, 4, 9]), (2, 5, [0, 1]), (1, 1, [0])])
+@pytest.mark.parametrize(
+    ("count", "wanted", "found"), [(10, 3, [0, 4, 9]), (12, 3, [0, 6, 11]), (2, 5, [0, 1]), (1, 1, [0]), (9, 1, [0])]
+)
 def test_spread(count: int, wanted: int, found: list[int]) -> None:
     assert spread(count, wanted) == found

@@ -20,7 +20,6 @@ from facefolds_core.scoring.evaluation import (
     Evaluation,
     evaluate,
     score_images,
-    sheet_frames,
     subject_box,
 )
 from facefolds_core.scoring.metrics import MAX_PSNR
@@ -149,10 +148,3 @@ def test_the_subjects_box_has_a_margin_within_the_frame() -> None:
 
 def test_a_faint_mask_is_empty() -> None:
     assert subject_box(np.full((9, 9), 0.05)) is None
-
-
-@pytest.mark.parametrize(
-    ("frames", "wanted", "chosen"), [(12, 3, [0, 6, 11]), (1, 3, [0]), (2, 5, [0, 1]), (9, 1, [0])]
-)
-def test_the_sheets_frames_are_evenly_spaced(frames: int, wanted: int, chosen: list[int]) -> None:
-    assert sheet_frames(frames, wanted) == chosen

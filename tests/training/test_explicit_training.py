@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 
+from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
@@ -152,5 +154,40 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
     train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
-    assert model.manifolds.middle.min().item() == pytest.approx(fit.LEAST_RADIUS)
-    assert (model.manifolds.radii() > 0).all()
+    assert fit.LEAST_RADIUS <= model.manifolds.radii().min().item() < fit.LEAST_RADIUS + 0.05
+
+
+def test_wide_layers_keep_their_distance_from_the_centre() -> None:
+    halfwidth = np.array([0.006, 0.03, 0.2])
+    assert (fit.least_middle(halfwidth) - max(fit.ROUNDS) * halfwidth >= fit.LEAST_RADIUS - 1e-12).all()
+
+
+def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
+    ball = trimesh.creation.icosphere(3, 0.2)
+    back = np.asarray(ball.vertices)
+    faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
+    directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    radii = fit.mesh_radii(back[None], faces, np.zeros(3), directions)
+    assert np.isnan(radii[:2]).all()
+    assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
+
+
+def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+    scene = make_scene(tmp_path / "scene", size=8)
+    image = np.zeros((8, 8, 3), np.uint8)
+    write_frames(scene.folder / "frames.arrow", image.shape, [(i, 0, image) for i in range(len(scene.cameras))])
+    with pytest.raises(UserError, match="a training image is missing") as caught:
+        train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
+    assert "quick" in str(caught.value.remedy)
+
+
+@pytest.mark.parametrize("grey", [0, 90])
+def test_pictures_without_a_subject_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grey: int) -> None:
+    monkeypatch.setattr(volume_fit, "LEVELS", ((24, 20),))
+    scene = make_scene(tmp_path / "scene", size=24)
+    image = np.full((24, 24, 3), grey, np.uint8)
+    pairs = [(i, k) for i in range(len(scene.cameras)) for k in range(scene.num_frames)]
+    write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
+    with pytest.raises(UserError, match="no subject was found"):
+        train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")

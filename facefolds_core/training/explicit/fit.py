@@ -117,6 +117,7 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         source = f"the tracked mesh, mean over frames, but where the volume lies over {MESH_REACH} outside it"
     middle = extrapolate(known).clip(LEAST_RADIUS)
     widths = spread(seen, middle, halfwidth, volume.voxel)
+    middle = np.maximum(middle, least_middle(widths))
     texels = texel_count(scene, window, float(np.quantile(middle[opacity >= SURE], 0.9)))
     return Fit(
         centre=centre,
@@ -183,6 +184,11 @@ def spread(seen: Profile, middle: Array, halfwidth: float, voxel: float) -> Arra
     return wide
 
 
+def least_middle(halfwidth: Array) -> Array:
+    """The smallest middle radius with which no layer of any round comes nearer to c than LEAST_RADIUS."""
+    return LEAST_RADIUS + max(ROUNDS) * halfwidth
+
+
 def _nodes(window: Window) -> tuple[int, int]:
     height, width = window[1] - window[0], window[3] - window[2]
     scale = NODES / max(height, width)
@@ -192,7 +198,7 @@ def _nodes(window: Window) -> tuple[int, int]:
 def mesh_radii(vertices: Array, faces: NDArray[np.int32], centre: Array, directions: Array) -> Array:
     """(...) distance of the mesh's outermost point from `centre` along (..., 3), mean over frames (K, V, 3).
 
-    NaN where no frame's mesh has a point.
+    NaN where no frame's mesh has a point on that side of `centre`.
     """
     flat = directions.reshape(-1, 3)
     total, count = np.zeros(len(flat)), np.zeros(len(flat))
@@ -200,8 +206,11 @@ def mesh_radii(vertices: Array, faces: NDArray[np.int32], centre: Array, directi
         mesh = trimesh.Trimesh(frame, faces, process=False)
         start = 2 * float(np.linalg.norm(frame - centre, axis=1).max())
         points, ray, _ = mesh.ray.intersects_location(centre + start * flat, -flat, multiple_hits=False)
-        total[ray] += np.linalg.norm(points - centre, axis=1)
-        count[ray] += 1
+        radius = ((points - centre) * flat[ray]).sum(1)
+        # A ray that meets nothing on this side runs on through the centre and may meet the back of a head.
+        near = radius > 0
+        total[ray[near]] += radius[near]
+        count[ray[near]] += 1
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(directions.shape[:-1])
 
 

@@ -25,10 +25,10 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
-from facefolds_core.training.explicit.fit import LEAST_RADIUS, ROUNDS, Fit, fit_scene, recentre
+from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Images, Views, trace_views
+from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
 from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
@@ -38,7 +38,10 @@ RAYS_PER_TEXEL = 2.5
 """Of one frame, in one step."""
 
 ROUND_ITERATIONS = 60
-"""Of each round of geometry, at a quarter of the final texels a side; the same again at the last round's geometry."""
+"""Of each round of geometry, at a quarter of the final texels a side."""
+
+LEAST_ITERATIONS = ROUND_ITERATIONS * len(ROUNDS) + 3
+"""That are run even if fewer are asked for: all rounds, and a few with the final geometry."""
 
 HALF_SHARE = 0.4
 """Of the remaining iterations, at half of the final texels a side; the others are at full resolution."""
@@ -67,8 +70,9 @@ EPSILON = 1 / 255
 """A layer whose alpha is nowhere larger is dropped: no pixel changes by more than this."""
 
 LEAST = 1 / 1020
-"""Texels that add less to the opacity of every training ray are made transparent. A ray reads four a layer: its colour
-changes by no more than N / 255, and that only if all of them are just below."""
+"""Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several, some
+RAYS_PER_TEXEL a texel; all of them over the frames) are made transparent. A ray reads four a layer: its colour changes
+by no more than N / 255, and that only if all of them are just below."""
 
 BESIDE = 0.1
 """Directions in which the volume is less opaque lie beside the subject: what was painted there is room."""
@@ -105,7 +109,7 @@ def plan(fit: Fit, iterations: int) -> list[Level]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
     levels = [Level(size(4), ROUND_ITERATIONS, 8, scale, False) for scale in ROUNDS]
-    rest = max(3, iterations - ROUND_ITERATIONS * len(levels))
+    rest = max(iterations, LEAST_ITERATIONS) - ROUND_ITERATIONS * len(levels)
     half = round(HALF_SHARE * rest)
     levels.append(Level(size(2), half, 1, ROUNDS[-1], False))
     levels.append(Level(fit.texels, rest - half, 1, ROUNDS[-1], True))
@@ -116,8 +120,10 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     """Train on `scene` and write the model folder whole.
 
     Raises:
-        UserError: if training diverges even at small learning rates.
+        UserError: if an image is missing, nothing stands out from the background, or training diverges even at small
+            learning rates.
     """
+    check_images(scene)
     device = pick_device(params.device)
     began = time.perf_counter()
     with open_log(log) as live:
@@ -222,7 +228,7 @@ class _Trainer:
         start = torch.from_numpy(self.fit.middle).float()
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
         moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
-        self.middle = moved.clamp(min=LEAST_RADIUS)
+        self.middle = torch.maximum(moved, torch.from_numpy(least_middle(self.fit.halfwidth)).float())
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
@@ -256,9 +262,9 @@ class _Trainer:
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
             if i % 10 == 9:
+                live.step = self.iteration
                 live.log_metric("psnr", self.psnr)
                 live.log_metric("texel_rows", level.texels[0])
-                live.step = self.iteration
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True

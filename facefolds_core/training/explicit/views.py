@@ -61,31 +61,37 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     return views
 
 
+def check_images(scene: Scene) -> None:
+    """Refuse a scene in which a training camera lacks a frame: each camera's background is learnt from all of them.
+
+    Raises:
+        UserError: naming the camera and the frame.
+    """
+    store = scene.open_frames()
+    for camera in scene.indices("train"):
+        for frame in range(scene.num_frames):
+            if (camera, frame) not in store:
+                raise UserError(
+                    "a training image is missing",
+                    file=store.path,
+                    place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
+                    expected="every frame of every camera: the explicit model learns one background each",
+                    remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; else run "
+                    "`dvc repro` to make the normalised scene again",
+                )
+
+
 class Images:
-    """The training images of one frame at a time, from the memory-mapped store.
+    """The training images of one frame at a time, from the memory-mapped store; all must be there (`check_images`).
 
     Args:
         gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
-
-    Raises:
-        UserError: if a training image is missing.
     """
 
     def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
         self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)
         self.store = scene.open_frames()
         self.cameras = scene.indices("train")
-        for camera in self.cameras:
-            for frame in range(scene.num_frames):
-                if (camera, frame) not in self.store:
-                    raise UserError(
-                        "a training image is missing",
-                        file=self.store.path,
-                        place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                        expected="every frame of every camera: the explicit model learns one background each",
-                        remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; else run "
-                        "`dvc repro` to make the normalised scene again",
-                    )
 
     def frame(self, index: int) -> NDArray[np.uint8]:
         """(C, H W, 3)."""

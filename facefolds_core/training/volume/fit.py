@@ -322,6 +322,11 @@ def _train(
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()
-        bar.set_postfix(volume=f"{max(values.shape)}^3", psnr=f"{-10 * math.log10(recent):.2f}", refresh=False)
+        bar.set_postfix(volume=f"{max(values.shape)}^3", psnr=f"{_psnr(recent):.2f}", refresh=False)
     values[:] = grid[0]
-    return -10 * math.log10(max(recent, 1e-12))
+    return _psnr(recent)
+
+
+def _psnr(error: float) -> float:
+    """dB, of a mean squared error that may be 0."""
+    return -10 * math.log10(max(error, 1e-12))

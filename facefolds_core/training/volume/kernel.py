@@ -162,7 +162,7 @@ def shade(  # type: ignore[no-untyped-def]
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
 def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
-    """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance at which half of alpha is reached (R,) or 0."""
+    """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance where half of the light is left (R,) or 0."""
     count = origins.shape[0]
     rgb = np.zeros((count, 3), np.float32)
     alpha = np.zeros(count, np.float32)

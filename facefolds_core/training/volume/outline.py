@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv, uv_to_directions
 from facefolds_core.training.volume import kernel
@@ -127,7 +128,20 @@ def lost_share(volume: Volume, centre: Array, points: Array) -> float:
 
 
 def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[float, float]]:
-    """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x."""
+    """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x.
+
+    Raises:
+        UserError: if there are no points.
+    """
+    if not len(points):
+        raise UserError(
+            "no subject was found in the images",
+            place="the middle frame",
+            expected="something near the cameras' common point that stands out from what lies behind it",
+            found="nothing that several cameras agree on",
+            remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
+            "calibration, or take other frames",
+        )
     losses = {round(x, 2): lost_share(volume, np.array([x, 0.0, 0.0]), points) for x in CENTRES}
     least = min(losses.values())
     best = min(x for x, loss in losses.items() if loss <= least + TIE)
