@@ -118,7 +118,7 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), {}, 30.0)
+    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
     levels = plan(chosen, 400)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
@@ -191,3 +191,13 @@ def test_pictures_without_a_subject_are_refused(tmp_path: Path, monkeypatch: pyt
     write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
     with pytest.raises(UserError, match="no subject was found"):
         train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
+
+
+def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
+    trained: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = make_scene(tmp_path / "scene", size=64, surface_radius=1.25 * OPAQUE[0].radius)
+    train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
+    assert "left out" in (tmp_path / "model" / "fit.json").read_text()
+    assert "left out" in capsys.readouterr().out
+    assert _held_out_psnr(scene, tmp_path / "model") > _held_out_psnr(*trained) - 1

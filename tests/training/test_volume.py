@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+import trimesh
 from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
+from facefolds_core.training.explicit.fit import MESH_WRONG, share_off
 from facefolds_core.training.volume import fit, kernel, outline, reference
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
@@ -149,3 +151,13 @@ def test_cameras_that_look_elsewhere_are_refused(tmp_path: Path) -> None:
     away = [replace(c, w2c=c.w2c * np.array([[1], [-1], [-1]])) for c in scene.cameras]
     with pytest.raises(UserError, match="one place"):
         fit.bounding_box(away)
+
+
+@pytest.mark.parametrize(("scale", "wrong"), [(1.0, False), (1.2, True), (0.8, True)])
+def test_a_tracked_mesh_of_another_size_is_found_out(scale: float, wrong: bool) -> None:
+    centre = np.array([-0.1, 0.0, 0.0])
+    ball = trimesh.creation.icosphere(4, 0.3)
+    vertices = centre + scale * (np.asarray(ball.vertices)[None] - centre)
+    share = share_off(_ball(0.3), centre, vertices, ball.faces)
+    assert (share > MESH_WRONG) == wrong
+    assert share > 0.95 or share < 0.05

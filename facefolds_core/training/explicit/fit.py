@@ -32,6 +32,9 @@ WINDOW_MARGIN = 0.04
 NODES = 384
 """Nodes along the longer side of the radius maps."""
 
+MESH_NODES = 128
+"""Directions a side of the hemisphere in which the tracked mesh is compared with the volume."""
+
 PIXELS_PER_TEXEL = 1.5
 """Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
 cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
@@ -39,6 +42,11 @@ cameras left out: some thirty cameras do not determine so many texels of twelve 
 MESH_REACH = 0.03
 """Where the volume lies outside the tracked mesh by more, units, it is believed: a mesh knows no hair and no clothes.
 Where it lies deeper it never is: it has holes at dark eyes, open mouths and where few cameras look."""
+
+MESH_OFF, MESH_WRONG = 0.02, 0.5
+"""A tracked mesh that lies farther than the first, units, from the volume in more than this share of the directions in
+which both have a surface is wrong as a whole (its scale, its place) and is left out. `actor` and `mugsy` have 0.03 and
+0.04; enlarged by 5, 10 and 20 % the actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.71."""
 
 MESH_TRUST = 0.004
 """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
@@ -70,6 +78,7 @@ class Fit:
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
         reasons: one line a choice.
+        notes: what a user should know at once.
         losses: x of the candidates for the centre -> share of the visible surface that each loses.
         volume_psnr: of the volume on training rays, dB.
     """
@@ -83,6 +92,7 @@ class Fit:
     rgb: Array
     texels: tuple[int, int]
     reasons: tuple[str, ...]
+    notes: tuple[str, ...]
     losses: dict[float, float]
     volume_psnr: float
 
@@ -96,7 +106,7 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
     """
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     centre, losses = choose_centre(volume, visible_points(volume, cameras))
-    surface = scene.load_surface()
+    surface, notes = _trusted_surface(scene, volume, centre)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(volume, centre, vertices)
     rows, columns = _nodes(window)
@@ -136,10 +146,37 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
             f"middle radius: {source}",
             f"halfwidth: {halfwidth}, more where the volume is blurred or far from the middle, at most {WIDEST}",
             f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera",
+            *notes,
         ),
+        notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
+
+
+def _trusted_surface(
+    scene: Scene, volume: Volume, centre: Array
+) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[str, ...]]:
+    """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
+    surface = scene.load_surface()
+    if surface is None:
+        return None, ()
+    share = share_off(volume, centre, surface[0].astype(np.float64), surface[1])
+    if share <= MESH_WRONG:
+        return surface, ()
+    return None, (
+        f"the tracked mesh is left out: in {share:.0%} of the directions it lies over {MESH_OFF} units from what "
+        "the images show (is its scale or its place wrong?)",
+    )
+
+
+def share_off(volume: Volume, centre: Array, vertices: Array, faces: NDArray[np.int32]) -> float:
+    """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
+    over MESH_OFF apart; 0 where there are none."""
+    directions = window_directions(FULL_WINDOW, MESH_NODES, MESH_NODES)
+    seen, mesh = profile(volume, centre, directions), mesh_radii(vertices, faces, centre, directions)
+    apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= SURE)]
+    return float((apart > MESH_OFF).mean()) if len(apart) else 0.0
 
 
 def fit_window(volume: Volume, centre: Array, vertices: Array | None) -> Window:

@@ -133,6 +133,8 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
         for note in cameras.notes:
             bar.write(f"train: {note}")
         fit = fit_scene(cameras.scene, volume, params.level_halfwidth)
+        for note in fit.notes:
+            bar.write(f"train: {note}")
         trainer = _Trainer(cameras, params, fit, volume, device)
         levels = plan(fit, params.iterations)
         for k, level in enumerate(levels):
