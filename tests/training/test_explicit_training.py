@@ -200,4 +200,4 @@ def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
     train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
     assert "left out" in (tmp_path / "model" / "fit.json").read_text()
     assert "left out" in capsys.readouterr().out
-    assert _held_out_psnr(scene, tmp_path / "model") > _held_out_psnr(*trained) - 1
+    assert _held_out_psnr(scene, tmp_path / "model") > _held_out_psnr(*trained) - 2  # as without a mesh
