@@ -1,7 +1,7 @@
 """Write the tables of the README from data/<subject>/metrics.json, so that no figure is typed by hand.
 
-python bench/readme_tables.py            prints them
-python bench/readme_tables.py --write    replaces the part of README.md between the markers
+python -m bench.readme_tables            prints them
+python -m bench.readme_tables --write    replaces the part of README.md between the markers
 """
 
 from __future__ import annotations
