@@ -46,7 +46,7 @@ Where it lies deeper it never is: it has holes at dark eyes, open mouths and whe
 MESH_OFF, MESH_WRONG = 0.02, 0.5
 """A tracked mesh that lies farther than the first, units, from the volume in more than this share of the directions in
 which both have a surface is wrong as a whole (its scale, its place) and is left out. `actor` and `mugsy` have 0.03 and
-0.04; enlarged by 5, 10 and 20 % the actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.71."""
+0.04; enlarged by 5, 10 and 20 % the actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.70."""
 
 MESH_TRUST = 0.004
 """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
