@@ -1,0 +1,124 @@
+"""Hashes of everything that the pipeline makes: equal before and after a change that should change nothing.
+
+    python -m bench.golden --out before.json            # on the old code
+    python -m bench.golden --against before.json        # on the new one: exit 1, and a line a file, where they differ
+
+It runs every stage of a tiny capture (explicit model and perceptrons) and, unless `--tiny`, of the actor as params.yaml
+has it. Hashes depend on the processor and the libraries: compare them on one machine only, they are not kept.
+Seconds and rates are left out of the JSON files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+ROOT = Path(__file__).resolve().parents[1]
+STAGES = "configure capture normalize train sample reconstruct decimate texture bake compress evaluate".split()
+UNTIMED = ("timings", "training", "config", "checkpoints")
+"""Folders that hold times, or what was asked for."""
+
+TINY = """\
+subjects:
+  tiny:
+    source: actor
+    path: facefolds_core/captures/actor
+    holdout: {every: 4}
+    train: {preset: fast, layers: 3, iterations: 200}
+  tiny_quick:
+    source: actor
+    path: facefolds_core/captures/actor
+    holdout: {every: 4}
+    train: {preset: quick, iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+capture: {cameras: 8, frames: 2, height: 48, width: 32}
+normalize: {}
+train: {}
+sample: {resolution: 64}
+reconstruct: {}
+decimate: {resolution: 12}
+texture: {resolution: 32}
+bake: {}
+compress: {}
+evaluate: {}
+"""
+
+
+def run_pipeline(folder: Path, subject: str) -> None:
+    """All stages of one subject of `folder`/params.yaml, with this checkout's code."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for stage in STAGES:
+        command = [sys.executable, "-m", f"stages.{stage}", "--subject", subject]
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"{stage} of {subject} failed:\n{done.stdout}{done.stderr}")
+        typer.echo(done.stdout.strip().splitlines()[-1], err=True)
+
+
+def without_times(value: Any) -> Any:
+    """A JSON value without seconds and rates."""
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if "second" not in k and "fingerprint" not in k}
+    return [without_times(v) for v in value] if isinstance(value, list) else value
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """File of one subject's folder -> SHA-256 of what it says."""
+    found = {}
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name = path.relative_to(folder)
+        if name.parts[0] in UNTIMED or name.name == "training.json":
+            continue
+        content = path.read_bytes()
+        if path.suffix == ".json":
+            content = json.dumps(without_times(json.loads(content)), sort_keys=True).encode()
+        found[name.as_posix()] = hashlib.sha256(content).hexdigest()
+    return found
+
+
+def differences(before: dict[str, dict[str, str]], after: dict[str, dict[str, str]]) -> list[str]:
+    """A line for each file that differs or is on one side only."""
+    return [
+        f"{subject}/{name}: {'differs' if name in old and name in new else 'only before' if name in old else 'only now'}"
+        for subject, new in after.items()
+        for old in [before.get(subject, {})]
+        for name in sorted({*old, *new})
+        if old.get(name) != new.get(name)
+    ]
+
+
+def main(
+    out: Annotated[Path | None, typer.Option(help="Write the hashes to this JSON file.")] = None,
+    against: Annotated[Path | None, typer.Option(help="Compare with the hashes in this file.")] = None,
+    tiny: Annotated[bool, typer.Option(help="Leave out the actor at its full size.")] = False,
+) -> None:
+    """Hash what the pipeline makes; compare with an earlier run."""
+    found = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        (folder / "params.yaml").write_text(TINY)
+        for subject in ("tiny", "tiny_quick"):
+            run_pipeline(folder, subject)
+            found[subject] = digests(folder / "data" / subject)
+        if not tiny:
+            (folder / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+            run_pipeline(folder, "actor")
+            found["actor"] = digests(folder / "data" / "actor")
+    if out is not None:
+        out.write_text(json.dumps(found, indent=1))
+    if against is not None:
+        lines = differences(json.loads(against.read_text()), found)
+        if lines:
+            sys.exit("\n".join(lines))
+        typer.echo(f"equal: {sum(map(len, found.values()))} files of {', '.join(found)}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
