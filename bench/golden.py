@@ -22,7 +22,10 @@ from typing import Annotated, Any
 import typer
 
 ROOT = Path(__file__).resolve().parents[1]
-STAGES = "configure capture normalize train sample reconstruct decimate texture bake compress evaluate".split()
+STAGES = (
+    *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
+    *("decimate", "texture", "bake", "compress", "evaluate"),
+)
 UNTIMED = ("timings", "training", "config", "checkpoints")
 """Folders that hold times, or what was asked for."""
 
@@ -84,9 +87,9 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def differences(before: dict[str, dict[str, str]], after: dict[str, dict[str, str]]) -> list[str]:
-    """A line for each file that differs or is on one side only."""
+    """A line for each file that differs, or is on one side only."""
     return [
-        f"{subject}/{name}: {'differs' if name in old and name in new else 'only before' if name in old else 'only now'}"
+        f"{subject}/{name}: {old.get(name, 'missing')[:12]} before, {new.get(name, 'missing')[:12]} now"
         for subject, new in after.items()
         for old in [before.get(subject, {})]
         for name in sorted({*old, *new})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -97,3 +97,38 @@ def fingerprint(folder: Path) -> dict[str, str]:
         else:
             found[name] = "folder" if path.is_dir() else "special"
     return found
+
+
+@dataclass
+class Counts:
+    """What a run of one fuzzer found. `fuzz_AREA.py` has `run(count, seed, folder) -> Counts`: the tests call it with a
+    small count, `python -m tests.hostile` with a large one.
+
+    Attributes:
+        tried: damaged inputs, or kills.
+        accepted, refused: of these.
+        crashed, hung, harmed, kept_wrong: a line for each defect: an exception that is no `UserError`; no end in the
+            time allowed; a file changed outside the command's own outputs; a wrong result taken for a good one.
+    """
+
+    tried: int = 0
+    accepted: int = 0
+    refused: int = 0
+    crashed: list[str] = field(default_factory=list)
+    hung: list[str] = field(default_factory=list)
+    harmed: list[str] = field(default_factory=list)
+    kept_wrong: list[str] = field(default_factory=list)
+
+    @property
+    def defects(self) -> list[str]:
+        return [*self.crashed, *self.hung, *self.harmed, *self.kept_wrong]
+
+    def add(self, what: str, result: Outcome) -> None:
+        """Count one outcome; `what` tells how to repeat it: seed, file, damage."""
+        self.tried += 1
+        if result.kind == "crashed":
+            self.crashed.append(f"{what}: {result.text}")
+        elif result.kind == "refused":
+            self.refused += 1
+        else:
+            self.accepted += 1
