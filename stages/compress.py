@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from facefolds_core.asset import AssetSource
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.writer import AssetSource
 from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.asset import read_asset, write_asset
+from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
+from facefolds_core.asset.writer import write_asset
 from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh

@@ -17,8 +17,8 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.manifest import Manifest, write_manifest
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.asset.writer import file_sha256
 from facefolds_core.errors import UserError
+from facefolds_core.files import file_sha256
 from tests.assets import cap_mesh, make_asset
 
 FILES = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"]
