@@ -24,14 +24,14 @@ test: $(READY)
 	$(BIN)/python -m pytest
 
 view: $(READY) $(PLAYER)
-	$(BIN)/python -m stages.view $(ASSET)
+	$(BIN)/facefolds view $(ASSET)
 
 $(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.json viewer/build.mjs
 	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 
 report: $(READY)
-	$(BIN)/python -m stages.report $(SUBJECT)
+	$(BIN)/facefolds report $(SUBJECT)
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -52,7 +52,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
-	$(BIN)/python -m stages.doctor
+	$(BIN)/facefolds doctor
 	@touch $(READY)
 
 blender: .venv-blender/.installed

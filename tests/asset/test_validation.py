@@ -242,7 +242,11 @@ def test_damaged_video_with_a_matching_checksum_is_no_traceback(asset: Path) -> 
 def run_command(folder: Path) -> subprocess.CompletedProcess[str]:
     root = Path(__file__).parents[2]
     return subprocess.run(
-        [sys.executable, "-m", "stages.validate", str(folder)], cwd=root, capture_output=True, text=True, check=False
+        [sys.executable, "-m", "facefolds_core", "validate", str(folder)],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 
