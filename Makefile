@@ -2,7 +2,7 @@
 # make test    set up, then run the tests
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
-# make lint    ruff, mypy and the layer check
+# make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
@@ -15,7 +15,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint bench charts blender clean
+.PHONY: repro test view report lint lint-player bench charts blender clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -38,6 +38,14 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory lint-player; else echo "the player was not linted: no npm (apt-get install nodejs npm)" >&2; fi
+
+lint-player: viewer/node_modules/.package-lock.json
+	npm --prefix viewer run --silent lint
+
+viewer/node_modules/.package-lock.json: viewer/package-lock.json
+	cd viewer && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
 
 bench: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
