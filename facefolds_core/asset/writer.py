@@ -30,9 +30,9 @@ from facefolds_core.asset.manifest import (
 )
 from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
 from facefolds_core.asset.video import encode_video, pack_frame, probe_video
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, file_sha256
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
