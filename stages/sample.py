@@ -26,7 +26,8 @@ def sample(folders: SubjectFolders) -> str:
     check_match(model, scene, folders)
     window = FULL_WINDOW
     if params.window == "auto":
-        window = visible_window(model, [scene.cameras[i] for i in scene.indices("train")])
+        cameras = [scene.cameras[i] for i in scene.indices("train")]
+        window = visible_window(model, cameras, params.auto_window)
     grids = sample_grids(model, params.resolution, window)
     with atomic_folder(folders.samples) as temporary:
         opacity = write_textures(temporary / "textures.arrow", model, grids)

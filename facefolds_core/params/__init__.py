@@ -6,7 +6,18 @@ below takes a number that somebody might tune from anywhere but a section (tests
 
 from facefolds_core.params.base import Section, merged, nested, value_at
 from facefolds_core.params.capture import CaptureParams, NormalizeParams
-from facefolds_core.params.compress import CodecName, CompressParams, GlbParams, LevelParams, MeshCodec, VideoCodec
+from facefolds_core.params.compress import (
+    BetweenParams,
+    CodecName,
+    CompressParams,
+    CrfSearchParams,
+    GlbParams,
+    LevelParams,
+    MeshCodec,
+    MeterParams,
+    VideoCodec,
+    ViewEffectParams,
+)
 from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import (
     BackgroundParams,
@@ -16,7 +27,16 @@ from facefolds_core.params.explicit import (
     LossParams,
     PruningParams,
 )
-from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
+from facefolds_core.params.export import (
+    AutoWindowParams,
+    BakeParams,
+    CollapseParams,
+    DecimateParams,
+    ReconstructParams,
+    RefitParams,
+    SampleParams,
+    TextureParams,
+)
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
@@ -28,12 +48,16 @@ __all__ = [
     "PRESETS",
     "SECTIONS",
     "STAGE_SECTIONS",
+    "AutoWindowParams",
     "BackgroundParams",
     "BakeParams",
+    "BetweenParams",
     "CameraParams",
     "CaptureParams",
     "CodecName",
+    "CollapseParams",
     "CompressParams",
+    "CrfSearchParams",
     "DecimateParams",
     "DivergenceParams",
     "EnvironmentParams",
@@ -48,6 +72,7 @@ __all__ = [
     "LossParams",
     "MeshCodec",
     "MeshParams",
+    "MeterParams",
     "MlpParams",
     "MlpStartParams",
     "NormalizeParams",
@@ -55,6 +80,7 @@ __all__ = [
     "Preset",
     "PruningParams",
     "ReconstructParams",
+    "RefitParams",
     "SampleParams",
     "Section",
     "StartParams",
@@ -63,6 +89,7 @@ __all__ = [
     "TrainParams",
     "TrainSection",
     "VideoCodec",
+    "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
     "merged",

@@ -6,10 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
-from facefolds_core.params.base import Count, Many, Natural, Pixels, Section, TextureSide
+from facefolds_core.params.base import Count, Many, Natural, Pixels, Section, Share, TextureSide
 
 CodecName = Literal["h264", "vp9", "av1"]
 ConstantRateFactor = Annotated[int, Field(ge=0, le=51)]
+Decibels = Annotated[float, Field(ge=0, le=100)]
 
 
 def _one_or_several(value: Any) -> Any:
@@ -31,6 +32,9 @@ class MeshCodec(Section):
 
     compression_level: Annotated[int, Field(ge=0, le=10)] = 0
     """0 (fastest, the paper's, keeps the order of vertices) to 10."""
+
+    max_bits: Annotated[int, Field(ge=1, le=24)] = 20
+    """Of positions and texture coordinates that `max_error_pixels` may take: beyond, floats are no finer."""
 
 
 class VideoCodec(Section):
@@ -64,6 +68,94 @@ class VideoCodec(Section):
         if not value or len(set(value)) != len(value):
             raise ValueError("each codec once, at least one")
         return value
+
+
+class CrfSearchParams(Section):
+    """The search for `video.target_psnr`: few encodings (packaging/rate.py)."""
+
+    frames: Count = 30
+    """An attempt encodes at most so many frames, from the first on."""
+
+    max_encodes: Count = 6
+    """Attempts; as many again where the target is out of reach."""
+
+    tolerance: Decibels = 0.15
+    """dB above the target at which the search ends early."""
+
+    spared: Decibels = 0.2
+    """dB given up where the target is out of reach: bits without end would buy nothing."""
+
+    slope: Annotated[float, Field(gt=0, le=100)] = 0.4
+    """dB that one step of the factor costs, roughly, of any encoder: for the second attempt."""
+
+
+class MeterParams(Section):
+    """The yardstick of packaging: rendered training views (packaging/views.py)."""
+
+    cameras: Count = 6
+    """Training cameras, evenly spread."""
+
+    frames: Count = 3
+    """Evenly spread."""
+
+    rays_per_camera: Count = 16_000
+    """Of those that hit anything, drawn once."""
+
+
+class ViewEffectParams(Section):
+    """The fit of the view effects (packaging/effects.py)."""
+
+    share: Annotated[float, Field(gt=0, le=100)] = 0.1
+    """Bytes of the effects, of the full level's, at most."""
+
+    frames: Count = 3
+    """That are fitted to, evenly spread."""
+
+    pixels: Count = 240_000
+    """In the fit, over all cameras and frames."""
+
+    min_opacity: Share = 0.9
+    """From which a pixel is the asset's: beside it the photo shows the room."""
+
+    min_weight: Share = 0.01
+    """Compositing weight of a layer below which a pixel says nothing about it."""
+
+    max_residual: Share = 0.3
+    """Residuals are clipped to it: what is beyond is wrong geometry or the room."""
+
+    ridges: Annotated[Many[Annotated[float, Field(ge=0, le=1e9)]], Field(min_length=1, max_length=100)] = (
+        *(1.0, 3.0),
+        *(10.0, 30.0),
+    )
+    """Strengths of the ridge that are tried; the one that is best on the cameras left out is taken."""
+
+    validation_every: Annotated[int, Field(ge=2, le=100_000)] = 5
+    """Every so many-th training camera is left out to choose the ridge."""
+
+    min_gain: Decibels = 0.2
+    """dB on those cameras below which no effects ship."""
+
+    downscales: Annotated[Many[Annotated[int, Field(ge=1, le=4096)]], Field(min_length=1, max_length=100)] = (
+        *(8, 12, 16),
+        *(24, 32),
+    )
+    """Texels of the textures a texel of the maps, along each side: the first whose file is small enough."""
+
+
+class BetweenParams(Section):
+    """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""
+
+    min_side: Annotated[int, Field(ge=16, le=4096)] = 16
+    """Texels a side below which no motion is looked for: frames are mixed."""
+
+    fixed_point_steps: Count = 6
+    """To find which texel is at a place at a time."""
+
+    min_crowd: Annotated[float, Field(gt=0, le=1)] = 0.001
+    """Weight of a frame whose texels are stretched over a gap, at least."""
+
+    behind: Share = 0.5
+    """Grey behind the composite whose motion is measured: an outline must not look like the edge of something black."""
 
 
 class GlbParams(Section):
@@ -120,6 +212,21 @@ class CompressParams(Section):
     view_effects: bool = False
     """Fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of the full level at
     most. It needs an asset that stands before the room, not one that has it painted on."""
+
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
+    """Of poster and photos, on JPEG's scale."""
+
+    search: CrfSearchParams = CrfSearchParams()
+    """For `video.target_psnr`."""
+
+    meter: MeterParams = MeterParams()
+    """What quality is measured on."""
+
+    effects: ViewEffectParams = ViewEffectParams()
+    """For `view_effects`."""
+
+    between: BetweenParams = BetweenParams()
+    """For `frame_rate_factor`."""
 
     @field_validator("levels")
     @classmethod

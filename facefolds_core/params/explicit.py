@@ -124,8 +124,7 @@ class ExplicitParams(Section):
     """N, number of manifolds; the paper's."""
 
     iterations: Count = 460
-    """Adam steps of rounds and textures together; at least the rounds (`geometry`) and three more are made, 183. With
-    more the views beside the training cameras hardly gain."""
+    """Adam steps of rounds and textures together; at least the rounds (`geometry`) and three more are made, 183."""
 
     volume: VolumeParams = VolumeParams()
     """The starting volume."""

@@ -16,6 +16,7 @@ from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model, save_model
+from facefolds_core.model.textures import MlpTextures
 from facefolds_core.params import MlpParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import (
@@ -61,6 +62,8 @@ def new_state(params: MlpParams, spec: ModelSpec, device: torch.device) -> Train
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(params.seed)
         model = build_model(spec).to(device)
+    if isinstance(model.textures, MlpTextures):
+        model.textures.start_alpha(params.initial_alpha_logit)
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
