@@ -202,7 +202,7 @@ class CompressParams(Section):
     photos: Natural = 0
     """Photos of held-out cameras that ship with the asset, to compare with: at most so many."""
 
-    frame_rate_factor: Literal[1, 2, 3] = 1
+    frame_rate_factor: Annotated[int, Field(ge=1, le=3)] = 1
     """The asset plays at 1, 2 or 3 times the capture's frames a second; what lies between the capture's frames follows
     the motion (export/between.py)."""
 
