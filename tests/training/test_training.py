@@ -265,6 +265,15 @@ def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_pat
     assert fingerprint(params(device="cpu", checkpoint_seconds=5.0), scene) == fingerprint(params(), scene)
 
 
+@pytest.mark.parametrize(
+    "values", [{"volume": {"reach": 0.4}}, {"losses": {"late_opacity": 0.2}}, {"geometry": {"rounds": [2.0]}}]
+)
+def test_the_fingerprint_of_the_explicit_model_has_its_nested_keys(scene: Scene, values: dict[str, object]) -> None:
+    usual = train_params({"preset": "fast"})
+    assert fingerprint(train_params({"preset": "fast", **values}), scene) != fingerprint(usual, scene)
+    assert fingerprint(train_params({"preset": "fast", "device": "cpu"}), scene) == fingerprint(usual, scene)
+
+
 def test_missing_training_image(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, OPAQUE, size=8, frames=1)
     more_frames = Scene(**{**vars(scene), "frame_ids": ("000000", "000001"), "times": np.arange(2.0)})
