@@ -82,7 +82,7 @@ def user_error(
         kind = next(k for k in kinds if k.model_fields["model"].default == names[0])
         names = names[1:]
     remedy = f"mend it; {REFERENCE} describes all keys"
-    expected, found = first["msg"], repr(first["input"])
+    expected, found = first["msg"].removeprefix("Value error, "), repr(first["input"])
     if first["type"] == "extra_forbidden":
         expected, remedy = _unknown_key(kind, names, remedy)
         found = names[-1]

@@ -8,7 +8,7 @@ import pytest
 
 from facefolds_core.config import read_stage, read_subject, read_train
 from facefolds_core.errors import UserError
-from facefolds_core.params import CompressParams, MlpParams, TextureParams
+from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
 from facefolds_core.params_file import load_params, write_configs
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
@@ -31,6 +31,13 @@ def test_a_preset_fills_what_is_not_given(tmp_path: Path) -> None:
     assert isinstance(train, MlpParams)
     assert train.iterations == 7
     assert train.rays == 32768
+
+
+@pytest.mark.parametrize("number", ["1e-3", "1E-3", "+1e-3", ".1e-2", "10_0e-5", "0.001"])
+def test_numbers_are_read_as_dvc_writes_them(tmp_path: Path, number: str) -> None:
+    text = MINIMAL + f"bake: {{hold: {number}}}\ncompress: {{levels: []}}\n"
+    bake = load_params(params_file(tmp_path, text)).stage("bake", "a")
+    assert isinstance(bake, BakeParams) and bake.hold == 0.001
 
 
 def test_a_subject_overrides_one_nested_key(tmp_path: Path) -> None:
@@ -69,6 +76,11 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
+        (MINIMAL + "train: {lambda_veil: 0}\n", "losses.opacity"),
+        ("subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {volume: {}}\n", "to the subjects"),
+        (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
+        (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),
+        (MINIMAL + "capture: {fps: 1.0e+300}\n", "capture.fps"),
         (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
         (MINIMAL + "texture: {size: 3}\n", "texture.size"),

@@ -28,7 +28,7 @@ from facefolds_core.training.explicit.cameras import CameraChoice, choose_camera
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Level, plan
-from facefolds_core.training.explicit.state import Prices, TextureState
+from facefolds_core.training.explicit.state import LossWeights, TextureState
 from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
 from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
@@ -162,7 +162,7 @@ class _Trainer:
         assert self.state is not None and self.views is not None
         count, stride = len(self.views.pixel), self._stride()
         coarse = number < len(self.params.geometry.rounds)
-        prices = self._prices(coarse)
+        weights = self._weights(coarse)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -173,7 +173,7 @@ class _Trainer:
                 rays,
                 self.images.frame(frame),
                 frame,
-                prices,
+                weights,
                 rates,
             )
             if not coarse and i % self.params.textures.smooth_every == 0:
@@ -193,12 +193,12 @@ class _Trainer:
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True
 
-    def _prices(self, coarse: bool) -> Prices:
+    def _weights(self, coarse: bool) -> LossWeights:
         """Once the rounds have decided what the background explains, opacity is cheap, and half opacity dear."""
         losses = self.params.losses
         if coarse:
-            return Prices(losses.opacity, 0.0, 0.0)
-        return Prices(losses.opacity * losses.late_opacity, losses.binarisation, self.params.textures.min_alpha)
+            return LossWeights(losses.opacity, 0.0, 0.0)
+        return LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, self.params.textures.min_alpha)
 
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""

@@ -20,7 +20,7 @@ UNSEEN_LOGIT = -9.0
 
 
 @dataclass(frozen=True)
-class Prices:
+class LossWeights:
     """Of one step, beside the squared error, a ray; T is its transmittance.
 
     Attributes:
@@ -124,7 +124,7 @@ class TextureState:
         rays: NDArray[np.int64],
         images: NDArray[np.uint8],
         frame: int,
-        prices: Prices,
+        weights: LossWeights,
         rates: NDArray[np.float32],
     ) -> float:
         """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
@@ -144,10 +144,10 @@ class TextureState:
                 self.background.numpy(),
                 texture.numpy().reshape(h, w, n, 4),
                 self.gradient.numpy().reshape(-1, h, w, n, 4),
-                prices.opacity,
-                prices.binarisation,
+                weights.opacity,
+                weights.binarisation,
                 background_rate,
-                prices.min_alpha,
+                weights.min_alpha,
             )
             adam_kernel.adam_step(
                 self.colour.numpy(),
@@ -161,7 +161,7 @@ class TextureState:
                 correct,
             )
         else:
-            squares = self._reference_step(views, rays, images, frame, texture, prices, rates, correct)
+            squares = self._reference_step(views, rays, images, frame, texture, weights, rates, correct)
         return float(squares) / (3 * len(rays))
 
     def _reference_step(
@@ -171,7 +171,7 @@ class TextureState:
         images: NDArray[np.uint8],
         frame: int,
         texture: Tensor,
-        prices: Prices,
+        weights: LossWeights,
         rates: NDArray[np.float32],
         correct: NDArray[np.float32],
     ) -> float:
@@ -189,8 +189,8 @@ class TextureState:
             target,
             self.background[at],
             texture.view(*self.shape, n, 4),
-            prices.opacity,
-            prices.binarisation,
+            weights.opacity,
+            weights.binarisation,
             self.params.background.rate,
         )
         self.background[at] = moved
