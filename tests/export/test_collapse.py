@@ -74,7 +74,7 @@ def coarse_faces() -> NDArray[np.int64]:
 def radial_errors(coarse: Sheets, sheets: Sheets, layer: int, faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """Radius of a coarse mesh, by casting rays from c, minus that of the samples."""
     towards = directions(sheets)
-    mesh = sheet_mesh(coarse, layer, faces, towards, RefitParams())
+    mesh = sheet_mesh(coarse, layer, faces, towards)
     origins = np.tile(sheets.centre, (len(towards), 1))
     hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, towards)
     found = hits.triangle >= 0
