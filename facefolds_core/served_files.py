@@ -41,7 +41,7 @@ def player_file(folder: Path, name: str) -> FileIO | None:
 
 
 def named_files(folder: Path) -> set[str]:
-    """The files that a manifest names. Read leniently: the player says what is wrong with a manifest, not the server."""
+    """What a manifest names. Read leniently: the player says what is wrong with a manifest, not the server."""
     file = open_inside(folder, MANIFEST)
     if file is None:
         return set()
@@ -63,7 +63,7 @@ def named_files(folder: Path) -> set[str]:
 
 
 def open_inside(folder: Path, name: str) -> FileIO | None:
-    """Open a regular file of `folder`, whatever a link in its place says; None if there is none, or it may not be read."""
+    """Open a regular file in `folder` or below; None if missing, special, not readable, or led out by a link."""
     try:
         path = (folder / name).resolve(strict=True)
         if not path.is_relative_to(folder.resolve()):
@@ -80,7 +80,7 @@ def open_inside(folder: Path, name: str) -> FileIO | None:
 
 
 def byte_range(header: str, size: int) -> tuple[int, int] | None:
-    """What a Range header asks of a file: (first byte, one past the last); None if that cannot be had (one range only)."""
+    """(first byte, one past the last) that a Range header asks of a file; None if that cannot be had, or is several."""
     match = _RANGE.fullmatch(header.strip())
     if not match or not (match[1] or match[2]):
         return None
@@ -92,7 +92,7 @@ def byte_range(header: str, size: int) -> tuple[int, int] | None:
 
 
 async def send(request: web.Request, file: FileIO, name: str) -> web.StreamResponse:
-    """Answer with an open file, or the bytes of it that are asked for. A file that shrinks meanwhile ends the connection."""
+    """Answer with an open file, or the part that is asked for. A file that shrinks meanwhile ends the connection."""
     status = os.fstat(file.fileno())
     size, etag = status.st_size, f"{status.st_ino:x}-{status.st_mtime_ns:x}-{status.st_size:x}"
     headers = {"Accept-Ranges": "bytes", "ETag": f'"{etag}"'}

@@ -33,8 +33,8 @@ HEADERS = {
     "Cache-Control": "no-cache",  # what is made anew is seen at once
     # WebAssembly and a worker from a blob: the Draco decoder. Styles: the page's and the element's own. Blobs: videos.
     "Content-Security-Policy": "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
-    "connect-src 'self' blob: data:; img-src 'self' blob: data:; media-src 'self' blob:; style-src 'self' 'unsafe-inline'; "
-    "frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; form-action 'none'",
+    "connect-src 'self' blob: data:; img-src 'self' blob: data:; media-src 'self' blob:; "
+    "style-src 'self' 'unsafe-inline'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; form-action 'none'",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
@@ -88,7 +88,7 @@ async def _checked(
 
 
 class _Watched(asyncio.Protocol):
-    """A connection on its way to aiohttp's protocol. Closed if its first request does not come, or there are too many."""
+    """A connection on its way to aiohttp's protocol. Closed if no first request comes, or if too many are open."""
 
     def __init__(self, inner: web.RequestHandler, open_connections: set[_Watched]) -> None:
         self._inner = inner

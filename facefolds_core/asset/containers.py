@@ -1,7 +1,7 @@
-"""What a video's file is, from its own first bytes; and whether an MP4's tables can be true, before FFmpeg believes them.
+"""What a video's file is, by its first bytes; and whether an MP4's tables can be true, before FFmpeg believes them.
 
 FFmpeg guesses a file's kind by its content, and knows kinds that open other files or addresses (playlists). And it
-allots memory for as many pictures as an MP4's tables claim: a header of some hundred bytes can claim a thousand million.
+allots memory for as many pictures as an MP4's tables claim: a header of some hundred bytes can claim 10^9.
 """
 
 from __future__ import annotations

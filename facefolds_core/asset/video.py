@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import av
 import numpy as np
@@ -170,7 +170,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any, str]]:
         kind = container_of(path)
         options = {"err_detect": STRICT["err_detect"]}
         with av.open(
-            f"file:{path}", format=FORMATS[kind], container_options=options, stream_options=[STRICT]
+            f"file:{path}", format=FORMATS[kind], container_options=options, stream_options=cast(Any, [STRICT])
         ) as container:
             if not container.streams.video:
                 raise _damaged(path, "it has no video stream")
