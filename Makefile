@@ -3,6 +3,7 @@
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
+# make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
@@ -15,7 +16,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint lint-player bench charts blender clean
+.PHONY: repro test view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -46,6 +47,9 @@ lint-player: viewer/node_modules/.package-lock.json
 viewer/node_modules/.package-lock.json: viewer/package-lock.json
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error
 	@touch $@
+
+wheel: $(READY) $(PLAYER)
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 bench: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor

@@ -7,6 +7,7 @@ nothing of what trains one.
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import Annotated, Any
 
 import typer
@@ -27,6 +28,10 @@ COMMANDS = {
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
+EXTRAS = {"report": "report", "collect": "pipeline", "recommend": "pipeline"}
+"""Commands that need more than the base -> the extra that brings it."""
+
+
 class LazyCommands(TyperGroup):
     """A group whose commands are imported when they are asked for."""
 
@@ -36,7 +41,7 @@ class LazyCommands(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"facefolds_core.cli.{cmd_name.replace('-', '_')}")
+        module = _module(cmd_name)
         single = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
         single.command(name=cmd_name)(module.command)
         return typer.main.get_command(single)
@@ -44,6 +49,17 @@ class LazyCommands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+
+def _module(name: str) -> Any:
+    """The module of a command. What pip has not installed is named, with the extra that brings it."""
+    try:
+        return importlib.import_module(f"facefolds_core.cli.{name.replace('-', '_')}")
+    except ModuleNotFoundError as error:
+        if name not in EXTRAS or (error.name or "").startswith("facefolds_core"):
+            raise
+        remedy = f"pip install 'facefolds[{EXTRAS[name]}]'"
+        sys.exit(f"facefolds {name}: error: it needs the package {error.name}, which is not installed: {remedy}")
 
 
 app = typer.Typer(

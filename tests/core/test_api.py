@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import facefolds_core
-from facefolds_core.cli import COMMANDS
+from facefolds_core.cli import COMMANDS, app
 from tests.assets import make_asset
 
 EXTRAS = "torch numba scipy trimesh pymeshlab cv2 pyarrow safetensors matplotlib jinja2 yaml dvc dvclive rpack tqdm"
@@ -64,6 +65,17 @@ def test_help_lists_every_command_and_imports_none(project_root: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert all(f"  {name} " in done.stdout for name in COMMANDS), done.stdout + done.stderr
     assert done.stdout.rstrip().endswith("[]")
+
+
+def test_a_command_without_its_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    for module in [
+        name for name in sys.modules if name.startswith(("facefolds_core.reporting", "facefolds_core.cli.report"))
+    ]:
+        monkeypatch.delitem(sys.modules, module)
+    done = CliRunner().invoke(app, ["report"])
+    assert done.exit_code == 1
+    assert "pip install 'facefolds[report]'" in str(done.exception)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
