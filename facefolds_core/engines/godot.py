@@ -44,6 +44,8 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
     Raises:
         UserError: if the folder holds anything else than an earlier export, or the asset's video is damaged.
     """
+    if folder.is_file():
+        raise UserError("a file stands where the folder is to be", file=folder, remedy="name another folder")
     if folder.exists() and any(folder.iterdir()) and not (folder / CONTENTS).is_file():
         raise UserError(
             "the folder is not empty, and holds no earlier export",
