@@ -24,6 +24,8 @@ MOST_FRAMES = 1_000_000
 MOST_VERTICES = 1 << 23
 """Of one mesh; triangles likewise."""
 SCALE_RANGE = (1e-9, 1e9)
+MEASURED = 1e-2
+"""How far from a rotation a photo's camera may be: captures measure theirs, and are given 1e-3."""
 LONGEST_TEXT = 200
 MOST_LAYERS = 256
 """Of a level; levels and photos likewise."""
@@ -110,23 +112,23 @@ def _coordinate_problems(coordinates: Coordinates) -> list[str]:
     return problems
 
 
-def _is_rotation(rows: tuple[tuple[float, ...], ...]) -> bool:
+def _is_rotation(rows: tuple[tuple[float, ...], ...], tolerance: float = 1e-6) -> bool:
     rotation = np.array(rows)
     if not np.abs(rotation).max() <= 2:  # larger numbers might overflow
         return False
-    return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= 1e-6 and np.linalg.det(rotation) > 0)
+    return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= tolerance and np.linalg.det(rotation) > 0)
 
 
 def _photo_problems(photo: Photo, frames: int) -> list[str]:
     problems = []
     if photo.frame >= frames:
         problems.append(f"frame {photo.frame} of {frames}")
-    if not _is_rotation(tuple(row[:3] for row in photo.w2c)):
+    if not _is_rotation(tuple(row[:3] for row in photo.w2c), MEASURED):
         problems.append("the first three columns of w2c are not a rotation")
     if not max(abs(row[3]) for row in photo.w2c) <= FARTHEST:
         problems.append(f"its camera is more than {FARTHEST:g} units away")
     (fx, _, _), (_, fy, _), last = photo.K
-    if not (min(fx, fy) > 0 and max(fx, fy) <= FARTHEST * MAX_SIDE and last == (0, 0, 1)):
+    if not (min(fx, fy) > 0 and max(fx, fy) <= FARTHEST * MAX_SIDE and np.allclose(last, (0, 0, 1), atol=MEASURED)):
         problems.append("K is no camera's")
     return problems
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from facefolds_core.asset.audio import SoundTrack
 from facefolds_core.asset.codecs import Codec, level_and_mime
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
-from facefolds_core.asset.containers import ContainerError, container_of
+from facefolds_core.asset.containers import container_of
 from facefolds_core.asset.packing import GUTTER, MAX_PIXELS, AtlasLayout, cut, fill_cell
 from facefolds_core.errors import UserError
 from facefolds_core.scheduling import kept_scheduling
@@ -180,7 +180,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any, str]]:
             yield container, stream, kind
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy="make the asset again, or copy it again") from None
-    except (FFmpegError, ContainerError, UnicodeDecodeError) as error:  # PyAV decodes the container's metadata as text
+    except (FFmpegError, ValueError) as error:  # PyAV: metadata that are no text, a file without streams
         raise _damaged(path, str(error)) from None
 
 

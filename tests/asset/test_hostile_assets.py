@@ -24,6 +24,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
+from tests.asset.filmed import filmed, packaged
 from tests.assets import CENTRE, cap_mesh
 from tests.hostile.fuzz_assets import seal
 from tests.viewer.fixtures import rich_asset
@@ -135,6 +136,13 @@ def test_ten_thousand_layers(asset: Path) -> None:
 def test_levels_in_the_wrong_order(asset: Path) -> None:
     edit(asset, lambda value: value["levels"].reverse())
     refused(asset, "coarsest first")
+
+
+def test_levels_in_the_wrong_order_are_not_written(tmp_path: Path) -> None:
+    sides = {"fine": 32, "coarse": 16}
+    levels = [{"name": k, "mesh_resolution": n, "texture_resolution": n, "crf": 30} for k, n in sides.items()]
+    with pytest.raises(UserError, match="wrong order"):
+        packaged(tmp_path / "asset", filmed(tmp_path / "scene"), {"levels": levels})
 
 
 def test_layers_in_the_wrong_order(asset: Path) -> None:

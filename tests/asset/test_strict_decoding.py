@@ -150,3 +150,13 @@ def test_a_sound_is_decoded(tmp_path: Path, mp4: Path) -> None:
     path = tmp_path / "audio.wav"
     path.write_bytes(b"RIFF" + bytes(100))
     assert sound_problem(path, 1.0)
+
+
+def test_containers_without_streams(tmp_path: Path) -> None:
+    for name, content in {
+        "a.mp4": struct.pack(">I4s4s4xI4s", 16, b"ftyp", b"isom", 8, b"moov"),
+        "a.webm": b"\x1a\x45\xdf\xa3\x87\x42\x82\x84webm\x18\x53\x80\x67\x80",
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(UserError, match="damaged texture video"):
+            probe_video(tmp_path / name)

@@ -171,16 +171,23 @@ def damage_sealed_file(place: Path, random: np.random.Generator) -> Damage:
     """Other bytes, with checksums that say they are right: up to the decoders. They may notice, but must not break."""
     value = json.loads((place / "manifest.json").read_text())
     entries = [entry for entry in parts(value) if isinstance(entry, dict) and "sha256" in entry]
-    entry = entries[random.integers(len(entries))]
+    videos = [entry for entry in entries if "codec" in entry]
+    chosen = videos if random.random() < 0.5 else entries
+    entry = chosen[random.integers(len(chosen))]
     path, mutation = place / entry.get("file", entry.get("mesh")), MUTATIONS[random.integers(len(MUTATIONS))]
-    content = mutation(path.read_bytes(), random)
+    content, header = path.read_bytes(), 0
+    if random.random() < 0.5:  # containers' tables, and the heads of meshes and pictures
+        header = int(random.integers(1, 2000))
+        content = mutation(content[:header], random) + content[header:]
+    else:
+        content = mutation(content, random)
     path.write_bytes(content)
     entry |= {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     for level in value["levels"]:
         files = [*level["layers"], *level["texture"]["videos"], *filter(None, [level["view_effects"]])]
         level["bytes"] = sum(file["bytes"] for file in files)
     seal(place, value)
-    return f"{mutation.__name__} {path.name}, sealed", False
+    return f"{mutation.__name__} {header or 'all'} bytes of {path.name}, sealed", False
 
 
 def damage_manifest(place: Path, random: np.random.Generator) -> Damage:
