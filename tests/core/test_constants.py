@@ -71,6 +71,10 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/draco.py": ("MOST_CLAIMED",),
         "asset/nesting.py": ALL,
     },
+    "patience and limits of the server of the web player: nothing that the pipeline makes": {
+        "served_files.py": ALL,
+        "serving.py": ALL,
+    },
     "how much is done at a time: memory and speed, never the result": {
         "export/sampling.py": ("DIRECTIONS_AT_ONCE",),
         "model/manifolds.py": ("CHUNK",),
