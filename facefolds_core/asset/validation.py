@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
 from facefolds_core.asset.manifest import (
@@ -21,6 +20,7 @@ from facefolds_core.asset.manifest import (
 from facefolds_core.asset.reader import check_file, manifest_problems, mesh_problems
 from facefolds_core.asset.video import decode_video, probe_video
 from facefolds_core.errors import UserError
+from facefolds_core.pictures import DamagedPictureError, open_picture
 
 _BT709_LIMITED = (1, 1)
 
@@ -127,12 +127,10 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
 
 def _picture_problems(path: Path, said: Poster | ViewEffects) -> list[str]:
     try:
-        with Image.open(path) as picture:
-            picture.load()
-            size, mode = picture.size, picture.mode
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises all three for damaged files
+        picture = open_picture(path)
+    except (OSError, DamagedPictureError) as error:
         return [f"not a picture: {error}"]
-    found = [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]
-    if size != (said.width, said.height):
-        found.append(f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}")
+    found = [] if picture.mode == "RGB" else [f"a picture of mode {picture.mode}, not RGB"]
+    if picture.size != (said.width, said.height):
+        found.append(f"{picture.width} x {picture.height} pixels, the manifest says {said.width} x {said.height}")
     return found
