@@ -42,23 +42,23 @@ class DamagedPictureError(ValueError):
 
 
 def picture_size(file: Path | bytes) -> tuple[int, int]:
-    """(width, height) from the header of a PNG or JPEG, without decoding it.
+    """(width, height) from the header of a PNG or JPEG, without decoding it. Only a regular file is opened.
 
     Raises:
         DamagedPictureError: if it has none. OSError: if the file cannot be read.
     """
+    _check_kind(file)
     with _open(file) as picture:
         return picture.size
 
 
 def open_picture(file: Path | bytes) -> Pillow.Image:
-    """A PNG or JPEG, decoded whole and checked as the module says. Anything but a regular file is not opened.
+    """A PNG or JPEG, decoded whole and checked as the module says. Only a regular file is opened.
 
     Raises:
         DamagedPictureError: if it is not one, or damaged. OSError: if the file cannot be read.
     """
-    if isinstance(file, Path) and file.exists() and not is_regular(file):
-        raise DamagedPictureError("not a regular file")
+    _check_kind(file)
     data = file if isinstance(file, bytes) else file.read_bytes()
     with _open(data) as picture:
         if picture.format == "PNG":
@@ -72,6 +72,12 @@ def open_picture(file: Path | bytes) -> Pillow.Image:
         return picture
 
 
+def _check_kind(file: Path | bytes) -> None:
+    """A FIFO would block until somebody writes into it."""
+    if isinstance(file, Path) and file.exists() and not is_regular(file):
+        raise DamagedPictureError("not a regular file")
+
+
 def _open(file: Path | bytes) -> Pillow.Image:
     try:
         with warnings.catch_warnings():
@@ -81,7 +87,9 @@ def _open(file: Path | bytes) -> Pillow.Image:
         raise DamagedPictureError("no PNG or JPEG") from None
     except Pillow.DecompressionBombError as error:
         raise DamagedPictureError(f"a header beyond sense: {error}") from None
-    except (SyntaxError, ValueError, struct.error, zlib.error, IndexError, KeyError, OverflowError) as error:
+    except (OSError, SyntaxError, ValueError, struct.error, zlib.error, IndexError, KeyError, OverflowError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise  # the system's; Pillow's own, for what is cut off, have no number
         raise DamagedPictureError(str(error) or type(error).__name__) from None
 
 

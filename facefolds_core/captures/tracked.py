@@ -74,7 +74,7 @@ def read_bin(path: Path, count: int | None) -> Array:
         count: V where it is known.
 
     Raises:
-        UserError: if the length of the file does not fit.
+        UserError: if the length of the file does not fit, or a part of it is zeros.
     """
     data = read_bytes(path, _REMEDY)
     if not data or len(data) % 12 or (count is not None and len(data) != 12 * count):
@@ -85,7 +85,17 @@ def read_bin(path: Path, count: int | None) -> Array:
             found=f"{len(data)} bytes",
             remedy=_REMEDY,
         )
-    return np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
+    points = np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
+    zeros = int((points == 0).all(1).sum())
+    if zeros > 1:
+        raise UserError(
+            "a damaged tracked mesh",
+            file=path,
+            expected="vertices in different places",
+            found=f"{zeros} of {len(points)} exactly at 0 0 0, as after an interrupted copy",
+            remedy=_REMEDY,
+        )
+    return points
 
 
 def read_pose(path: Path) -> Array:

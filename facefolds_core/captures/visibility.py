@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 NEAR, FAR = 0.02, 50.0
 """Distances of a camera from the centre; the median camera's is 1."""
+FOCAL = (0.1, 200.0)
+"""Focal lengths over the long side of the picture: angles of view of 157 to 0.3 degrees."""
 SMALL, LARGE = 0.01, 5.0
 """Diagonals of the tracked mesh's bounding box, in the same units; a head's is about 0.3."""
 RADIUS = 0.25
@@ -46,9 +48,11 @@ def check_sight(
         file: the capture, for the message.
 
     Raises:
-        UserError: if cameras stand in one place, absurdly near or far, or look past the subject in all of their frames;
+        UserError: if focal lengths are beyond sense; if cameras stand in one place, absurdly near or far, or look
+            past the subject in all of their frames;
             if the mesh is absurdly small or large, or in a frame lies in no camera's picture. Names the cameras.
     """
+    _check_angles(cameras, str(file))
     _check_places(cameras, seen, str(file))
     if vertices is None:
         around = np.array([d for d in product((-1, 0, 1), repeat=3) if any(d)], float)
@@ -89,6 +93,22 @@ def in_picture(camera: Camera, points: Array) -> NDArray[np.bool_]:
         pixels, depth = camera.project(points)
         inside = (pixels >= 0) & (pixels <= [camera.width, camera.height])
     return np.asarray(inside.all(-1) & (depth > 0))
+
+
+def _check_angles(cameras: Sequence[Camera], file: str) -> None:
+    odd = [
+        f"{camera.name} ({camera.K[0, 0]:.4g} pixels)"
+        for camera in cameras
+        if not FOCAL[0] <= camera.K[0, 0] / max(camera.width, camera.height) <= FOCAL[1]
+    ]
+    if odd:
+        raise UserError(
+            "focal lengths that no camera has",
+            file=file,
+            place=f"camera {shorten(odd)}",
+            expected=f"{FOCAL[0]} to {FOCAL[1]:g} times the picture's long side",
+            remedy=_CALIBRATION,
+        )
 
 
 def _check_places(cameras: Sequence[Camera], seen: Sequence[Sequence[int]], file: str) -> None:
