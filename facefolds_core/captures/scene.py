@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.archives import read_npz
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.reading import check_regular, is_there, remake

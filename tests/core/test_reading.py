@@ -16,11 +16,11 @@ import pyarrow as pa
 import pytest
 
 from facefolds_core.archives import read_npz
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.captures.scene import read_scene, write_scene
 from facefolds_core.config import read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import read_meshes
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.model.storage import load_model, read_tensors
 from facefolds_core.reading import remake
 from facefolds_core.reporting.facts import read_images, read_mapping

@@ -18,7 +18,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.export.sampling import sample_grids
@@ -36,6 +35,7 @@ from facefolds_core.export.stores import (
     write_sheets,
     write_surfaces,
 )
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
