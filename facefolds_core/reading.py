@@ -89,6 +89,14 @@ def is_regular(path: Path) -> bool:
         return False
 
 
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder (or a link to one) of this name; False for names that cannot be."""
+    try:
+        return stat.S_ISDIR(path.stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
 def is_there(path: Path) -> bool:
     """Whether there is anything of this name, even a broken link; False for names that cannot be."""
     return os.path.lexists(path) if "\0" not in str(path) else False
@@ -135,7 +143,7 @@ def check_regular(
 
 def check_folder(path: Path, remedy: str) -> None:
     """Refuse anything that stands where a folder should be; nothing at all is fine."""
-    if is_there(path) and not path.is_dir():
+    if is_there(path) and not is_folder(path):
         found = "a file" if is_regular(path) else "something else, or a link to nothing"
         raise UserError("not a folder", file=path, expected="a folder", found=found, remedy=remedy)
 

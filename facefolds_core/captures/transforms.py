@@ -27,7 +27,7 @@ from facefolds_core.captures.values import json_matrix, json_number, short, wron
 from facefolds_core.files import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.params import Subject
-from facefolds_core.reading import LARGEST, check_regular, is_regular, is_there
+from facefolds_core.reading import LARGEST, check_regular, is_folder, is_regular, is_there
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     Raises:
         UserError: if the file is missing, garbled, lacks a key or has a matrix that is none; names the entry and key.
     """
-    path = root if root.suffix == ".json" and not root.is_dir() else root / "transforms.json"
+    path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
     remedy = "point `path` at the folder that holds transforms.json, or make the file again"
     check_regular(path, remedy, largest=LARGEST)
     value = read_json(path, remedy=remedy)

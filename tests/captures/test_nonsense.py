@@ -307,6 +307,18 @@ def test_an_address_of_the_net_must_be_downloaded_first(tmp_path: Path, source: 
         assert caught.value.place == "subjects.head.path"
 
 
+@pytest.mark.parametrize("path", ["x" * 300, "a\0b", "x" * 300 + ".json", "x/" * 3000])
+@pytest.mark.parametrize("source", ["multiface", "transforms"])
+def test_a_path_that_cannot_be(tmp_path: Path, source: str, path: str) -> None:
+    subject = Subject(source=source, path=path)
+    folders = SubjectFolders(tmp_path / "data" / "head")
+    write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", folders.config)
+    for stage in (capture, normalize):
+        with pytest.raises(UserError) as caught:
+            stage(folders)
+        assert caught.value.remedy
+
+
 def test_configure_says_so_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "params.yaml").write_text("subjects:\n  head: {source: multiface, path: 'https://example.org/c'}\n")
