@@ -21,7 +21,6 @@ from facefolds_core.paths import SubjectFolders
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 
 STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
-    "configure": ("config",),
     "capture": ("capture",),
     "normalize": ("scene",),
     "train": ("model", "training"),
