@@ -18,6 +18,7 @@ PLAYER := viewer/dist/index.html
 .PHONY: repro test view report lint bench charts blender clean
 
 repro: $(READY)
+	$(BIN)/python -m stages.doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
 test: $(READY)
@@ -40,6 +41,7 @@ lint: $(READY)
 	$(BIN)/lint-imports
 
 bench: $(READY)
+	$(BIN)/python -m stages.doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
 	$(BIN)/python -m bench.speed_accuracy
 

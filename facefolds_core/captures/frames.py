@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from facefolds_core.errors import UserError
+from facefolds_core.errors import UserError, disk_error, is_disk_error
 from facefolds_core.files import atomic_file
 
 Image = NDArray[np.uint8]
@@ -65,6 +65,8 @@ class FrameStore:
         except FileNotFoundError:
             raise UserError("file not found", file=path, remedy=remedy) from None
         except (pa.ArrowException, KeyError, ValueError, OSError) as error:
+            if is_disk_error(error):
+                raise disk_error(error, path) from None
             raise UserError("damaged frame store", file=path, found=str(error), remedy=remedy) from None
         self.path = Path(path)
         self._table = table

@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors.torch import save_file
 from torch import Tensor
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
 from facefolds_core.model.radiance import RadianceManifolds
-from facefolds_core.model.storage import check_tensors, read_tensors
+from facefolds_core.model.storage import check_tensors, read_tensors, write_tensors
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -35,6 +33,7 @@ class TrainingState:
         generator: draws rays; on the CPU.
         iteration: steps done.
         seconds: spent on them, over all runs.
+        psnr: last logged, dB.
     """
 
     model: RadianceManifolds
@@ -42,6 +41,7 @@ class TrainingState:
     generator: torch.Generator
     iteration: int = 0
     seconds: float = 0.0
+    psnr: float = 0.0
 
 
 def fingerprint(params: TrainParams, scene: Scene) -> str:
@@ -83,10 +83,8 @@ def save_checkpoint(state: TrainingState, mark: str, folder: Path) -> Path:
         mark: the run's `fingerprint`.
     """
     path = folder / CHECKPOINT
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in _state_tensors(state).items()}
-    metadata = {"fingerprint": mark, "iteration": str(state.iteration), "seconds": repr(state.seconds)}
-    with atomic_file(path) as temporary:
-        save_file(tensors, str(temporary), metadata=metadata)
+    numbers = {"iteration": state.iteration, "seconds": state.seconds, "psnr": state.psnr}
+    write_tensors(path, _state_tensors(state), {"fingerprint": mark} | {name: repr(x) for name, x in numbers.items()})
     return path
 
 
@@ -119,6 +117,7 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
     state.generator.set_state(tensors["generator"])
     state.iteration = int(metadata["iteration"])
     state.seconds = float(metadata["seconds"])
+    state.psnr = float(metadata.get("psnr", 0.0))
 
 
 def _fill_optimiser(state: TrainingState) -> None:
