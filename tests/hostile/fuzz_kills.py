@@ -10,6 +10,7 @@ import os
 import shutil
 import signal
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -98,7 +99,7 @@ class Project:
     def reset(self) -> None:
         """What it was after the undisturbed run."""
         shutil.copy(self.tiny.root / "base.lock", self.lock)
-        status, output = self.tiny.run("dvc", "checkout", "--force")
+        status, output = self.tiny.run("dvc", "checkout", "--force", *(f"{stage}@{NAME}" for stage in self.stages))
         assert status == 0, output
 
 
@@ -167,7 +168,7 @@ def _case(project: Project, way: str, random: np.random.Generator, what: str, co
         counts.hung.append(f"{what}: still running after {ENDS_WITHIN:.0f} s: {left}")
         os.killpg(process.pid, signal.SIGKILL)
     output = process.communicate()[0]
-    if "Traceback" in output and "dvc" not in output.rpartition("Traceback")[2]:
+    if "Traceback" in output:
         counts.crashed.append(f"{what}: {output[-600:]}")
     _recover(project, command, what, counts)
     project.reset()
@@ -220,11 +221,9 @@ def _kill(pid: int, victim: str, number: signal.Signals) -> None:
             victims = [child.pid for child in below if "stages." in " ".join(child.cmdline())]
         except psutil.Error:
             victims = []
-    for one in victims[-1:]:
-        try:
+    with suppress(ProcessLookupError):
+        for one in victims[-1:]:
             os.kill(one, number)
-        except ProcessLookupError:
-            pass
 
 
 def _still_running(session: int) -> list[str]:
