@@ -1,6 +1,6 @@
 """Kills at seeded moments: of DVC alone, of a stage alone, of both, and while DVC rewrites dvc.lock.
 
-Afterwards nothing runs on, `python -m stages.doctor` and `dvc repro` recover, the results are those of an undisturbed
+Afterwards nothing runs on, `facefolds doctor` and `dvc repro` recover, the results are those of an undisturbed
 run bit for bit, nothing temporary is left, and nothing was touched outside the subject's folder and DVC's own files.
 """
 
@@ -175,7 +175,7 @@ def _case(project: Project, way: str, random: np.random.Generator, what: str, co
 
 
 def _recover(project: Project, command: tuple[str, ...], what: str, counts: Counts) -> None:
-    for step in (("python", "-m", "stages.doctor"), command):
+    for step in (("python", "-m", "facefolds_core", "doctor"), command):
         status, output = project.tiny.run(*step)
         if status != 0:
             counts.add(what, Outcome("crashed", f"{' '.join(step)}: {output[-600:]}"))

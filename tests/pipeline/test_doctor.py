@@ -1,4 +1,4 @@
-"""`python -m stages.doctor` mends what a killed DVC leaves; the real DVC agrees, and loses nothing."""
+"""`facefolds doctor` mends what a killed DVC leaves; the real DVC agrees, and loses nothing."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from facefolds_core.cli import mending
+from facefolds_core.cli.mending import mend
 from facefolds_core.errors import UserError
 from facefolds_core.locks import try_lock
-from stages import mending
-from stages.mending import mend
 
 PIPELINE = """\
 stages:
@@ -127,7 +127,7 @@ def test_the_command_says_what_it_mended(project: Path, project_root: Path) -> N
     environment = {**os.environ, "PYTHONPATH": str(project_root)}
     start = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", "stages.doctor"], cwd=project, env=environment, capture_output=True, text=True
+        [sys.executable, "-m", "facefolds_core", "doctor"], cwd=project, env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     assert "doctor: dvc.lock was empty: deleted" in done.stdout

@@ -69,11 +69,13 @@ def _while_dvc_waits(guard: Path) -> Iterator[None]:
 
 def is_lockfile(path: Path) -> bool:
     """Whether DVC accepts it as a `dvc.lock`."""
-    # DVC's libraries take a while to import: only now.
-    from dvc.dvcfile import Lockfile
-    from dvc.exceptions import DvcException
-    from dvc.utils.serialize import parse_yaml
-
+    # DVC takes a while to import: only now. Without it nobody reads the file.
+    try:
+        from dvc.dvcfile import Lockfile
+        from dvc.exceptions import DvcException
+        from dvc.utils.serialize import parse_yaml
+    except ModuleNotFoundError:
+        return True
     try:
         Lockfile.validate(parse_yaml(path.read_text(encoding="utf-8"), path), str(path))
     except (DvcException, UnicodeDecodeError, RecursionError):

@@ -6,8 +6,8 @@ import ctypes
 import sys
 from pathlib import Path
 
+from facefolds_core.cli.mending import mend
 from facefolds_core.errors import report_user_errors
-from stages.mending import mend
 
 SYSTEM_LIBRARIES = {
     # shared object -> (who needs it, Debian/Ubuntu package, Fedora package)
@@ -15,7 +15,7 @@ SYSTEM_LIBRARIES = {
     "libOpenGL.so.0": ("pymeshlab", "libopengl0", "libglvnd-opengl"),
 }
 OPTIONAL_LIBRARIES = {
-    "libEGL.so.1": ("`python -m stages.render`", "libegl1 libgl1-mesa-dri", "mesa-libEGL mesa-dri-drivers"),
+    "libEGL.so.1": ("`facefolds render`", "libegl1 libgl1-mesa-dri", "mesa-libEGL mesa-dri-drivers"),
 }
 
 
@@ -32,7 +32,7 @@ def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRAR
     return lines
 
 
-def main() -> None:
+def command() -> None:
     with report_user_errors("doctor"):
         for line in mend(Path.cwd()):
             print(f"doctor: {line}")
@@ -45,7 +45,3 @@ def main() -> None:
         print("doctor: not needed by the pipeline, but missing:\n  " + "\n  ".join(optional))
     else:
         print("doctor: all system libraries are here")
-
-
-if __name__ == "__main__":
-    main()
