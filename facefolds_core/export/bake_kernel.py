@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+from numba import prange
 
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
+from facefolds_core.jit import inlined, kernel
 
 PARTS = 2
 """Rays are worked on in this many parts, side by side, each with sums of its own: the result does not depend on the
@@ -20,7 +20,7 @@ SCALE = 65534.0
 """Texture coordinates in 16 bits: code = 1 + SCALE s, 0 where a ray misses the layer."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _corner(code, size):  # type: ignore[no-untyped-def]
     """16-bit texture coordinate -> index of the texel before it, and the fraction beyond its centre; clamped."""
     x = min(max((code - 1) * (size / SCALE) - 0.5, 0.0), size - 1.0)
@@ -28,7 +28,7 @@ def _corner(code, size):  # type: ignore[no-untyped-def]
     return i, np.float32(x - i)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[n, i, j, q] * (one - b) + texture[n, i, j + 1, q] * b
@@ -36,13 +36,13 @@ def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def render(codes, texture, out):  # type: ignore[no-untyped-def]
     """codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255] -> out (P, 4) float32: rgb over black, transmittance."""
     height, width = texture.shape[1], texture.shape[2]
     scale = np.float32(1 / 255.0)
     one = np.float32(1.0)
-    for p in numba.prange(codes.shape[0]):
+    for p in prange(codes.shape[0]):
         through = one
         r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
         for n in range(codes.shape[1]):
@@ -59,7 +59,7 @@ def render(codes, texture, out):  # type: ignore[no-untyped-def]
         out[p, 0], out[p, 1], out[p, 2], out[p, 3] = r0, r1, r2, through
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def accumulate(  # type: ignore[no-untyped-def]
     codes,  # (P, N, 2) uint16
     target,  # (P, 4) float32: rgb over black and transmittance
@@ -74,7 +74,7 @@ def accumulate(  # type: ignore[no-untyped-def]
     count = codes.shape[0]
     totals = np.zeros(PARTS)
     one = np.float32(1.0)
-    for part in numba.prange(PARTS):
+    for part in prange(PARTS):
         own = sums[part]
         layer = np.empty(layers, np.int64)
         row = np.empty(layers, np.int64)
@@ -144,13 +144,13 @@ def accumulate(  # type: ignore[no-untyped-def]
     return totals.sum()
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def update(values, sums, damping, shown):  # type: ignore[no-untyped-def]
     """values (M, 4) -= sum J r / (damping + sum |J| row), in [0, 1]; sums (PARTS, M, 6) are zeroed.
 
     shown (M, 4) becomes what 8 bits hold of values. Texels without rays stay as they are.
     """
-    for k in numba.prange(values.shape[0]):
+    for k in prange(values.shape[0]):
         colour, opacity = np.float32(0.0), np.float32(0.0)
         for part in range(sums.shape[0]):
             colour += sums[part, k, 4]
@@ -168,7 +168,7 @@ def update(values, sums, damping, shown):  # type: ignore[no-untyped-def]
                     sums[part, k, q] = 0
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def true_positions(vertices, faces, st, window, out):  # type: ignore[no-untyped-def]
     """Where each texel of a mesh's texture lies in the layer: out (H, W, 2) float32 columns and rows, in texels.
 

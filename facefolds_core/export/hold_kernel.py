@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+from numba import prange
 
-from facefolds_core.export.bake_kernel import FASTMATH, OPAQUE, PARTS, _corner, _tap
+from facefolds_core.export.bake_kernel import OPAQUE, PARTS, _corner, _tap
+from facefolds_core.jit import inlined, kernel
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
     """Adds to each texel's sums, over all rays, share * (dC/dcolour)^2 and share * |dC/dalpha|^2 / 3.
 
@@ -20,7 +21,7 @@ def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
     height, width, layers = texture.shape[1], texture.shape[2], texture.shape[0]
     count = codes.shape[0]
     scale, one = np.float32(1 / 255.0), np.float32(1.0)
-    for part in numba.prange(PARTS):
+    for part in prange(PARTS):
         own = sums[part]
         layer, row, column = np.empty(layers, np.int64), np.empty(layers, np.int64), np.empty(layers, np.int64)
         a, b = np.empty(layers, np.float32), np.empty(layers, np.float32)
@@ -53,14 +54,14 @@ def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
                     texel[1] += w * opacity
 
 
-@numba.njit(error_model="numpy", inline="always")
+@inlined
 def _fill(x, first, last, value):  # type: ignore[no-untyped-def]
     for i in range(first, last + 1):
         x[i] = value
     return last + 1
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def steady(y, price, x):  # type: ignore[no-untyped-def]
     """x = argmin 1/2 sum (x_k - y_k)^2 + price sum |x_k - x_(k-1)|: Condat 2013, direct, (K,) each.
 
@@ -110,14 +111,14 @@ def steady(y, price, x):  # type: ignore[no-untyped-def]
                 over = -price
 
 
-@numba.njit(error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def hold(images, weights, price):  # type: ignore[no-untyped-def]
     """images (K, H, W, 4) uint8, in place: each channel of each texel `steady` in time, at price / weight.
 
     weights (H, W, 2) float32 of colour and of alpha; a texel without weight keeps its mean.
     """
     count, height, width = images.shape[0], images.shape[1], images.shape[2]
-    for row in numba.prange(height):
+    for row in prange(height):
         y, x = np.empty(count), np.empty(count)
         for column in range(width):
             for q in range(4):

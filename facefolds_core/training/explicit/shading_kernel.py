@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from facefolds_core.jit import inlined, kernel
 
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
+Array = NDArray[Any]
 
 PARTS = 2
 """Rays are shaded in this many parts, side by side, each with a gradient of its own: the result does not depend on the
@@ -20,7 +20,7 @@ OPAQUE = 0.002
 """Layers behind less than this transmittance are left out."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _corner(code, size):  # type: ignore[no-untyped-def]
     """16-bit position over the window -> index of the texel before it, and the fraction beyond its centre."""
     x = min(max((code - 1) * (size / 65534.0) - 0.5, 0.0), size - 1.0)
@@ -28,7 +28,7 @@ def _corner(code, size):  # type: ignore[no-untyped-def]
     return i, np.float32(x - i)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
@@ -36,7 +36,7 @@ def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
     codes,  # (P, N, 2) uint16: 1 + 65534 s, 1 + 65534 t of the crossing with each layer; 0 where missed
     camera,  # (P,) int32
@@ -62,7 +62,7 @@ def shade(  # type: ignore[no-untyped-def]
     parts = gradient.shape[0]
     sums = np.zeros(parts)
     one = np.float32(1.0)
-    for part in numba.prange(parts):
+    for part in prange(parts):
         own = gradient[part]
         layer = np.empty(layers, np.int64)
         row = np.empty(layers, np.int64)
@@ -134,7 +134,7 @@ def shade(  # type: ignore[no-untyped-def]
     return sums.sum()
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def contributions(  # type: ignore[no-untyped-def]
     codes,  # (P, N, 2) uint16, as above
     rays,  # (R,) int64, which of the P to look at
@@ -145,7 +145,7 @@ def contributions(  # type: ignore[no-untyped-def]
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
     count = rays.shape[0]
     parts = peak.shape[0]
-    for part in numba.prange(parts):
+    for part in prange(parts):
         own = peak[part]
         for k in range(count * part // parts, count * (part + 1) // parts):
             p = rays[k]

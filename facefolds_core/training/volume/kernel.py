@@ -7,13 +7,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from facefolds_core.jit import inlined, kernel
 
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
+Array = NDArray[Any]
 
 PARTS = 2
 """Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads."""
@@ -29,12 +29,12 @@ LIMIT = 12.0
 """Of |raw density|."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _softplus(x):  # type: ignore[no-untyped-def]
     return x if x > 15.0 else math.log1p(math.exp(x))
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     """Distances at which a ray enters and leaves the box of voxel centres; empty if the second is smaller."""
     near, far = 0.0, 1e30
@@ -47,7 +47,7 @@ def _span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     return near, far
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
     """Trilinear values at voxel coordinates (x, y, z) into out[0:4]; returns the lower corner and the fractions."""
     i = min(max(int(x), 0), grid.shape[0] - 2)
@@ -66,7 +66,7 @@ def _sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
     return i, j, k, fx, fy, fz
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
     origins,  # (R, 3) float32
     directions,  # (R, 3) float32, unit
@@ -92,7 +92,7 @@ def shade(  # type: ignore[no-untyped-def]
     count = origins.shape[0]
     sums = np.zeros(gradient.shape[0])
     density = step / voxel
-    for part in numba.prange(gradient.shape[0]):
+    for part in prange(gradient.shape[0]):
         own = gradient[part]
         corner = np.empty((samples, 3), np.int32)
         fraction = np.empty((samples, 3), np.float32)
@@ -160,14 +160,14 @@ def shade(  # type: ignore[no-untyped-def]
     return sums.sum()
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
     """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance where half of the light is left (R,) or 0."""
     count = origins.shape[0]
     rgb = np.zeros((count, 3), np.float32)
     alpha = np.zeros(count, np.float32)
     depth = np.zeros(count, np.float32)
-    for r in numba.prange(count):
+    for r in prange(count):
         o, d = origins[r], directions[r]
         near, far = _span(o, d, lower, voxel, grid)
         value = np.empty(4, np.float32)
@@ -189,7 +189,7 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
     return rgb, alpha, depth
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def adam_step(  # type: ignore[no-untyped-def]
     grid,  # (3, X, Y, Z, 4): values, first and second moments; all updated in place
     gradient,  # (PARTS, X, Y, Z, 4); zero afterwards
@@ -204,7 +204,7 @@ def adam_step(  # type: ignore[no-untyped-def]
     values = grid[0]
     old = values[..., 0].copy()
     nx, ny, nz = old.shape
-    for i in numba.prange(nx):
+    for i in prange(nx):
         for j in range(ny):
             for k in range(nz):
                 if gradient[0, i, j, k, 0] == 0 and gradient[1, i, j, k, 0] == 0:
@@ -229,7 +229,7 @@ def adam_step(  # type: ignore[no-untyped-def]
                     values[i, j, k, q] = min(max(moved, low), high)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
     """Along each direction (R, 3), from `farthest` in to `centre`.
 
@@ -241,7 +241,7 @@ def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # 
     opacity = np.zeros(count, np.float32)
     rgb = np.zeros((count, 3), np.float32)
     radius = np.zeros((count, shares.shape[0]), np.float32)
-    for r in numba.prange(count):
+    for r in prange(count):
         reached = np.zeros(samples + 1, np.float32)
         value = np.empty(4, np.float32)
         t = np.float32(1.0)
