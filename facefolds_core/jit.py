@@ -10,7 +10,8 @@ the CPU with its features. It misses what is built in from other files. Ours add
 kernel compiles, functions and constants, wherever they come from.
 """
 
-# mypy: disable-error-code="no-untyped-call"  (numba has no types)
+# numba has no types:
+# mypy: disable-error-code="no-untyped-call"
 
 from __future__ import annotations
 
@@ -26,8 +27,6 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
-
-FAST = {"contract", "afn", "arcp", "nsz", "reassoc"}
 
 F = TypeVar("F", bound=Callable[..., Any])
 Code = Callable[..., Any]
@@ -45,13 +44,11 @@ def kernel(function: Code | None = None, *, parallel: bool = False, nogil: bool 
         nogil: let other Python threads run meanwhile.
     """
 
-    def decorate(function: F) -> F:
-        built = numba.njit(fastmath=FAST if parallel else False, error_model="numpy", parallel=parallel, nogil=nogil)(
-            function
-        )
+    def decorate(function: Code) -> Any:
+        built: Any = numba.njit(error_model="numpy", parallel=parallel, nogil=nogil)(function)
         if isinstance(built, Dispatcher):  # not where NUMBA_DISABLE_JIT is set
             with suppress(RuntimeError):  # no folder can be written to: compile in each process
-                built._cache = _Cache(built)
+                cast(Any, built)._cache = _Cache(built)
         return built
 
     return decorate if function is None else decorate(function)
@@ -59,7 +56,7 @@ def kernel(function: Code | None = None, *, parallel: bool = False, nogil: bool 
 
 def compiled(function: F) -> F:
     """Compile a function that kernels call."""
-    return cast(F, numba.njit(fastmath=FAST, error_model="numpy")(function))
+    return cast(F, numba.njit(error_model="numpy")(function))
 
 
 def inlined(function: Code) -> Code:
@@ -96,7 +93,7 @@ def _parts(value: Any, names: tuple[str, ...], seen: set[Any]) -> Iterator[bytes
     elif isinstance(value, Dispatcher):
         seen.add(id(value))
         for option in sorted(value.targetoptions):
-            yield f"{option} {_plain(value.targetoptions[option])!r}".encode()
+            yield f"{option} {value.targetoptions[option]!r}".encode()
         yield from _parts(value.py_func, names, seen)
     elif isinstance(value, types.FunctionType) and _ours(value.__module__):
         seen.add(id(value))
@@ -114,10 +111,6 @@ def _parts(value: Any, names: tuple[str, ...], seen: set[Any]) -> Iterator[bytes
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
     else:
         raise TypeError(f"a kernel uses a global of type {type(value).__name__}: make it a number, a tuple, an array")
-
-
-def _plain(option: Any) -> Any:
-    return sorted(option) if isinstance(option, set) else option
 
 
 def _function_parts(function: types.FunctionType, seen: set[Any]) -> Iterator[bytes]:

@@ -37,14 +37,13 @@ def adam_step(  # type: ignore[no-untyped-def]
     frame_colour,  # (3, M, 3)
     frame_alpha,  # (3, M, N)
     texture,  # (M, N, 4) as activated
-    gradient,  # (PARTS, M, N, 4) with respect to `texture`; zero afterwards
+    gradient,  # (N, M, 4) with respect to `texture`; zero afterwards
     rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
     keep,  # factor by which the frames' parts shrink each step
     correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
 ):
     """Adam on the texels that the rays have met; the others stay as they are, moments included."""
     count, layers_n = layers.shape[1], layers.shape[2]
-    parts = gradient.shape[0]
     colour0, colour1, colour2 = colour[0], colour[1], colour[2]
     layers0, layers1, layers2 = layers[0], layers[1], layers[2]
     frame0, frame1, frame2 = frame_colour[0], frame_colour[1], frame_colour[2]
@@ -57,19 +56,11 @@ def adam_step(  # type: ignore[no-untyped-def]
         sum2 = np.float32(0.0)
         met = False
         for n in range(layers_n):
-            g0 = np.float32(0.0)
-            g1 = np.float32(0.0)
-            g2 = np.float32(0.0)
-            g3 = np.float32(0.0)
-            for p in range(parts):
-                g0 += gradient[p, k, n, 0]
-                g1 += gradient[p, k, n, 1]
-                g2 += gradient[p, k, n, 2]
-                g3 += gradient[p, k, n, 3]
-                for q in range(4):
-                    gradient[p, k, n, q] = 0
+            g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
             if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
                 continue
+            for q in range(4):
+                gradient[n, k, q] = 0
             met = True
             sum0 += g0
             sum1 += g1

@@ -15,8 +15,9 @@ from facefolds_core.jit import inlined, kernel
 
 Array = NDArray[Any]
 
-PARTS = 2
-"""Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads."""
+PARTS = 8
+"""Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads, of
+which so many have work. Of a part's gradient only the rows (i, j) that it has touched are read."""
 
 BLOCK = 4
 """Voxels a side of a block of the occupancy map."""
@@ -27,6 +28,11 @@ CLEAR, OPAQUE = 1e-4, 1e-3
 BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
 LIMIT = 12.0
 """Of |raw density|."""
+
+
+def empty_gradient(shape: tuple[int, ...]) -> tuple[Array, NDArray[np.bool_]]:
+    """Of a grid (X, Y, Z, 4): `gradient` and `touched` for `shade` and `adam_step`."""
+    return np.zeros((PARTS, *shape), np.float32), np.zeros((PARTS, *shape[:2]), np.bool_)
 
 
 @inlined
@@ -80,6 +86,7 @@ def shade(  # type: ignore[no-untyped-def]
     step,  # between samples, units
     samples,  # at most so many on a ray
     gradient,  # (PARTS, X, Y, Z, 4), added to
+    touched,  # (PARTS, X, Y) bool, set where the gradient is added to
     residual,  # (R, 3) out: C - I
     through,  # (R,) out: transmittance
     veil,  # weight of opacity
@@ -150,6 +157,8 @@ def shade(  # type: ignore[no-untyped-def]
                 g = light * pull * slope[n]
                 i, j, k = corner[n, 0], corner[n, 1], corner[n, 2]
                 fx, fy, fz = fraction[n, 0], fraction[n, 1], fraction[n, 2]
+                for tap in range(4):
+                    touched[part, i + (tap >> 1), j + (tap & 1)] = True
                 for tap in range(8):
                     di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
                     w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
@@ -157,7 +166,10 @@ def shade(  # type: ignore[no-untyped-def]
                     for q in range(3):
                         own[i + di, j + dj, k + dk, q + 1] += w * light * a * residual[r, q]
         sums[part] = total
-    return sums.sum()
+    total = 0.0  # not sums.sum(), which numba shares out among the threads
+    for part in range(sums.shape[0]):
+        total += sums[part]
+    return total
 
 
 @kernel(parallel=True)
@@ -193,6 +205,7 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
 def adam_step(  # type: ignore[no-untyped-def]
     grid,  # (3, X, Y, Z, 4): values, first and second moments; all updated in place
     gradient,  # (PARTS, X, Y, Z, 4); zero afterwards
+    touched,  # (PARTS, X, Y) bool; False afterwards
     share,  # (X, Y, Z) factor on the rate of density
     rate_density,
     rate_colour,
@@ -205,14 +218,30 @@ def adam_step(  # type: ignore[no-untyped-def]
     old = values[..., 0].copy()
     nx, ny, nz = old.shape
     for i in prange(nx):
+        parts = np.empty(gradient.shape[0], np.int64)
+        total = np.empty(4, np.float32)
         for j in range(ny):
+            count = 0
+            for part in range(gradient.shape[0]):
+                if touched[part, i, j]:
+                    touched[part, i, j] = False
+                    parts[count] = part
+                    count += 1
+            if count == 0:
+                continue
             for k in range(nz):
-                if gradient[0, i, j, k, 0] == 0 and gradient[1, i, j, k, 0] == 0:
+                total[:] = 0
+                met = False
+                for c in range(count):
+                    own = gradient[parts[c], i, j, k]
+                    met = met or own[0] != 0
+                    for q in range(4):
+                        total[q] += own[q]
+                        own[q] = 0
+                if not met:
                     continue
                 for q in range(4):
-                    g = gradient[0, i, j, k, q] + gradient[1, i, j, k, q]
-                    gradient[0, i, j, k, q] = 0
-                    gradient[1, i, j, k, q] = 0
+                    g = total[q]
                     if q == 0:
                         for n in range(6):
                             a, b = n >> 1, 2 * (n & 1) - 1
