@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bench.stress_film import Film, Shots, keep_cameras, keep_frames, map_cameras, map_images
 from facefolds_core.captures.actor import ActorOptions
-from facefolds_core.captures.frames import Image
 from facefolds_core.captures.scene import SPHERE_CENTRE
+from facefolds_core.frame_store import Image
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import TrainParams
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
@@ -14,6 +13,7 @@ from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets, read_grids, read_meshes
 from facefolds_core.files import atomic_folder
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import BakeParams
 from facefolds_core.paths import SubjectFolders

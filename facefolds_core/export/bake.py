@@ -19,11 +19,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.bake_kernel import SCALE, accumulate, render, true_positions, update
 from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.progress import progress as progress_bar

@@ -24,8 +24,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.export.textures import premultiply, straight
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.progress import progress as progress_bar
 
 SMALLEST = 16

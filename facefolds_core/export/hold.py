@@ -17,8 +17,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.hold_kernel import add_weights, hold
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.progress import progress as progress_bar
 
 WEIGHED = 6

@@ -13,10 +13,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.progress import progress as progress_bar
 

@@ -34,14 +34,13 @@ from facefolds_core.asset.writer import (
     AssetSource,
     LevelContent,
     check_inputs,
-    file_sha256,
     manifest_of,
     write_level,
 )
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export.between import at_frame_rate
-from facefolds_core.files import atomic_folder
+from facefolds_core.files import atomic_folder, file_sha256
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window

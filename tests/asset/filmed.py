@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package

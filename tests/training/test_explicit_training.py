@@ -9,9 +9,9 @@ import pytest
 import torch
 import trimesh
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import TrainParams
