@@ -19,6 +19,7 @@ PLAYER := viewer/dist/index.html
 .PHONY: repro test view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
+	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
 test: $(READY)
@@ -52,6 +53,7 @@ wheel: $(READY) $(PLAYER)
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 bench: $(READY)
+	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
 	$(BIN)/python -m bench.speed_accuracy
 

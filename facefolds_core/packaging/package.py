@@ -139,7 +139,7 @@ def _level(
     crfs = None
     if meter is not None and video.target_psnr is not None and not video.lossless:
         search, target = params.search, video.target_psnr
-        crfs = {codec: _crf(content, CODECS[codec], video, meter, target, search) for codec in video.codec}
+        crfs = {codec: _crf(folder, content, CODECS[codec], video, meter, target, search) for codec in video.codec}
     level = write_level(folder, name, content, params, crfs)
     if meter is None:
         return level
@@ -164,6 +164,7 @@ def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) ->
 
 
 def _crf(
+    folder: Path,
     content: LevelContent,
     codec: Codec,
     video: VideoCodec,
@@ -172,7 +173,7 @@ def _crf(
     search: CrfSearchParams,
 ) -> int:
     layout = content.layout
-    with TemporaryDirectory() as scratch:
+    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:
