@@ -20,9 +20,10 @@ from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import TrainParams
-from facefolds_core.scoring.evaluation import METRICS, score_images
+from facefolds_core.scoring.evaluation import score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.panels import METRICS
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from facefolds_core.training.checkpoints import save_checkpoint
 from facefolds_core.training.explicit.loop import train_explicit

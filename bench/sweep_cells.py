@@ -29,8 +29,9 @@ from facefolds_core.params import EvaluateParams, TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.reporting.facts import STAGE_OUTPUTS
-from facefolds_core.scoring.evaluation import ImageScore, frame_rate_factor, score_images, shipped
+from facefolds_core.scoring.evaluation import frame_rate_factor, score_images, shipped
 from facefolds_core.scoring.metrics import shown
+from facefolds_core.scoring.panels import ImageScore
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from facefolds_core.scoring.report import asset_cost, averages
 from stages.bake import bake
