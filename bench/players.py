@@ -103,7 +103,11 @@ def build_pages(out: Path) -> None:
 
 
 def prepare(assets: Sequence[Asset], splats: Sequence[int], heads: Path) -> tuple[list[Entry], dict[str, Path]]:
-    """Rows (name, page, query, ways to draw: "play" shows the next frame too), and folders that pages fetch from."""
+    """Rows (name, page, query, ways to draw: "play" shows the next frame too), and the folders of the assets.
+
+    Args:
+        heads: folder of the pages' own files, which is made.
+    """
     heads.mkdir()
     first = assets[0]
     write_glb(heads / "head.glb", first.full, "head")
@@ -117,7 +121,7 @@ def prepare(assets: Sequence[Asset], splats: Sequence[int], heads: Path) -> tupl
     for count in splats:
         (heads / f"{count}.splat").write_bytes(sample_splats(first, count).tobytes())
         rows.append({"name": f"{count:,} splats", "page": "splats", "query": f"file={count}.splat"})
-    return rows, {"heads": heads, **{f"asset{i}": asset.folder for i, asset in enumerate(assets)}}
+    return rows, {f"asset{i}": asset.folder for i, asset in enumerate(assets)}
 
 
 @contextmanager
@@ -218,7 +222,7 @@ def main(
         place = Path(temporary)
         build_pages(place / "site")
         counts = [int(count) for count in splats.split(",") if count]
-        rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "heads")
+        rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "site" / "heads")
         wanted = [parse_size(text, film=False) for text in sizes.split(",")]
         found = []
         with serving(place / "site", folders) as address:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +39,7 @@ from facefolds_core.asset.writer import (
     write_level,
 )
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.export.between import at_frame_rate
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -49,7 +51,7 @@ from facefolds_core.packaging.levels import Decimate, coarse_content, level_para
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import FRAMES, ViewMeter, spread, training_cameras
-from facefolds_core.params import CompressParams, VideoCodec
+from facefolds_core.params import CompressParams, LevelParams, VideoCodec
 from facefolds_core.rendering.reference import AssetCaster, composite
 
 EFFECTS_SHARE = 0.1
@@ -81,6 +83,7 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
     Raises:
         UserError: if the export cannot be an asset.
     """
+    _check_order(params.levels)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
     cameras = training_cameras(scene)
@@ -99,6 +102,18 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
         photos = _photos(temporary, scene, params.photos, factor)
         manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
+
+
+def _check_order(levels: Sequence[LevelParams]) -> None:
+    """Refuse levels that are clearly not in the format's order, which readers would refuse."""
+    for coarse, fine in pairwise(levels):
+        if coarse.mesh_resolution > fine.mesh_resolution and coarse.texture_resolution > fine.texture_resolution:
+            raise UserError(
+                "the levels of detail are in the wrong order",
+                place=f"compress.levels: {coarse.name}, {fine.name}",
+                expected="the coarsest first",
+                remedy="change their order in params.yaml",
+            )
 
 
 def make_meter(content: LevelContent, cameras: Sequence[Camera]) -> ViewMeter | None:

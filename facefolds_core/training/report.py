@@ -10,7 +10,6 @@ import torch
 
 from facefolds_core.model.device import pick_device as pick_device
 
-
 IMPORTED = time.process_time()
 """Processor time of this process until here."""
 

@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from facefolds_core.asset import read_asset
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
 from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.evaluation import MASK_MARGIN, Evaluation, evaluate, score_images, subject_box
 from facefolds_core.scoring.metrics import MAX_PSNR
