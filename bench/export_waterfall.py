@@ -14,13 +14,11 @@ import typer
 
 from bench import charts
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
 from facefolds_core.errors import report_user_errors
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files import atomic_folder, read_json, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.packaging.views import spread
-from facefolds_core.params import TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.waterfall import waterfall
 
@@ -39,7 +37,7 @@ def main(
         ):
             folders = SubjectFolders(data / subject)
             scene = read_scene(folders.scene)
-            model = load_model(folders.model, pick_device(read_stage(TrainParams, folders.config).device))
+            model = load_model(folders.model, pick_device(read_json(folders.config / "train.json")["device"]))
             found[subject] = [asdict(s) for s in waterfall(scene, model, folders, spread(scene.num_frames, frames))]
             with atomic_folder(folders.root / "waterfall") as temporary:
                 write_json(temporary / "waterfall.json", {"subject": subject, "steps": found[subject]})

@@ -76,7 +76,7 @@ def test_rates_multiply_the_usual_values(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(Project, "run", lambda *_: None)
     monkeypatch.setattr(Project, "write", lambda _, params: written.append(params["subjects"]["cell"]["train"].copy()))
     blank = Cell(subject="mugsy", hazard="x", strength=3, preset="fast", seed=7)
-    scaled = (("mlp", "other"), ("explicit", "lr"), ("explicit", "inner.width"))
+    scaled = (("mlp", "other"), ("explicit", "lr"), ("explicit", "inner.width"), ("explicit", "volume.none"))
     hazards.train(project, blank, Hazard("x", "x", (1, 2, 3), "{}", scaled=scaled))
     assert written[-1] == {"preset": "fast", "seed": 7, "lr": 1.5, "inner": {"width": 6.0}}
 
