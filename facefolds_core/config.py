@@ -14,18 +14,18 @@ from pydantic import ValidationError
 
 from facefolds_core.errors import UserError
 from facefolds_core.params import STAGE_SECTIONS, Section, Subject
+from facefolds_core.reading import read_text
 
 S = TypeVar("S", bound=Section)
 _REMEDY = "run `dvc repro`, which writes it from params.yaml"
 
 
 def _read(kind: type[S], path: Path) -> S:
+    text = read_text(path, _REMEDY, expected="JSON")
     try:
-        return kind.model_validate_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=_REMEDY) from None
-    except (ValidationError, UnicodeDecodeError) as error:
-        raise UserError("garbled stage configuration", file=path, found=str(error), remedy=_REMEDY) from None
+        return kind.model_validate_json(text)
+    except (ValidationError, RecursionError) as error:
+        raise UserError("garbled stage configuration", file=path, found=str(error)[:1000], remedy=_REMEDY) from None
 
 
 def read_subject(folder: Path) -> Subject:

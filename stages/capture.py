@@ -11,6 +11,7 @@ from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
+from facefolds_core.reading import check_local, is_folder, is_regular
 from stages.common import run_stage
 
 
@@ -18,8 +19,9 @@ def capture(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
     if subject.source == "actor":
         return _generate(folders, subject, read_stage(CaptureParams, folders.config))
+    check_local(subject.path, f"subjects.{folders.root.name}.path")
     path = Path(subject.path)
-    if not path.exists():
+    if not (is_folder(path) or is_regular(path)):
         raise UserError(
             "the capture is not there",
             file=path,

@@ -13,6 +13,7 @@ from facefolds_core.captures.transforms import read_transforms
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.reading import check_local
 from stages.common import run_stage
 
 SHOWN = 5
@@ -24,6 +25,7 @@ def read_capture(subject: Subject, folders: SubjectFolders) -> Capture:
     if subject.source == "actor":
         fps = read_stage(CaptureParams, folders.config).fps
         return read_multiface(folders.capture, subject, fps)
+    check_local(subject.path, f"subjects.{folders.root.name}.path")
     if subject.source == "multiface":
         return read_multiface(Path(subject.path), subject)
     return read_transforms(Path(subject.path), subject)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import manifest_problems, mesh_problems
@@ -27,6 +26,7 @@ from facefolds_core.asset.stored import check_file, is_folder, leads_out
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
 
 _BT709_LIMITED = (1, 1)
 _COLOURFUL = 24
@@ -180,13 +180,11 @@ def _colourful(picture: Picture, texture: Texture) -> bool:
 
 def _picture_problems(path: Path, said: Poster | ViewEffects) -> list[str]:
     try:
-        with Image.open(path) as picture:
-            size, mode = picture.size, picture.mode
-            found = [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]
-            if size != (said.width, said.height):
-                # Not decoded: the manifest's size is bounded, this one may be anything.
-                return [*found, f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}"]
-            picture.load()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:  # Pillow raises all of these
+        size = picture_size(path)
+        if size != (said.width, said.height):
+            # Not decoded: the manifest's size is bounded, this one may be anything.
+            return [f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}"]
+        mode = open_picture(path).mode
+    except (OSError, DamagedPictureError) as error:
         return [f"not a picture: {error}"]
-    return found
+    return [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]

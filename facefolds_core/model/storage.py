@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +19,7 @@ from facefolds_core.model.manifolds import INPUT_SCALE, MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.textures import MlpTextures
+from facefolds_core.reading import check_regular, no_memory
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 
@@ -139,12 +141,17 @@ def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, 
     Raises:
         UserError: if the file is missing or damaged.
     """
+    check_regular(path, remedy)
     try:
         with safe_open(str(path), "pt") as file:
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=remedy) from None
-    except (SafetensorError, OSError) as error:
+    except MemoryError:
+        raise no_memory(path) from None
+    except PermissionError:
+        raise
+    except (SafetensorError, OSError, ValueError, OverflowError, RuntimeError) as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOMEM:
+            raise no_memory(path) from None
         raise UserError(
             "damaged file", file=path, expected="a whole safetensors file", found=str(error), remedy=remedy
         ) from None
@@ -193,6 +200,7 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
         UserError: if it is missing, garbled or of another kind.
     """
     path = folder / "model.json"
+    check_regular(path, _REMEDY)
     value: Any = read_json(path, remedy=_REMEDY)
     try:
         return _SPEC.validate_python(value)

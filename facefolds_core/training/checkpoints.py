@@ -107,6 +107,8 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
             found=f"fingerprint {metadata.get('fingerprint')}",
             remedy=remedy,
         )
+    if not metadata.get("iteration", "").isdecimal() or not _is_duration(metadata.get("seconds", "")):
+        raise UserError("a damaged checkpoint", file=path, place="iteration, seconds", remedy=remedy)
     _fill_optimiser(state)
     check_tensors(tensors, _state_tensors(state), path, remedy)
     state.model.load_state_dict(
@@ -117,8 +119,14 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
             for moment in _MOMENTS:
                 state.optimiser.state[parameter][moment].copy_(tensors[f"optimiser.{moment}.{name}"])
     state.generator.set_state(tensors["generator"])
-    state.iteration = int(metadata["iteration"])
-    state.seconds = float(metadata["seconds"])
+    state.iteration, state.seconds = int(metadata["iteration"]), float(metadata["seconds"])
+
+
+def _is_duration(text: str) -> bool:
+    try:
+        return 0 <= float(text) < float("inf")
+    except ValueError:
+        return False
 
 
 def _fill_optimiser(state: TrainingState) -> None:

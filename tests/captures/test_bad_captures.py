@@ -161,7 +161,7 @@ MESHES: list[tuple[str, str, Callable[[Path], object], str]] = [
     ("word", ".obj", lambda p: replace_line(p, 3, "v 1 two 3"), "garbled mesh"),
     ("short", ".obj", lambda p: replace_line(p, 3, "v 1 2"), "garbled mesh"),
     ("face", ".obj", lambda p: replace_line(p, 9, "f 1 2 99"), "garbled mesh"),
-    ("binary", ".obj", lambda p: p.write_bytes(b"\xff\x00\xfe"), "garbled mesh"),
+    ("binary", ".obj", lambda p: p.write_bytes(b"\xff\x00\xfe"), "not a text file"),
     ("pose word", "_transform.txt", lambda p: replace_line(p, 2, "0 1 x 0"), "garbled head pose"),
     ("pose short", "_transform.txt", lambda p: replace_line(p, 2, ""), "garbled head pose"),
     ("pose nan", "_transform.txt", lambda p: replace_line(p, 2, "0 nan 0 0"), "not finite"),
