@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from facefolds_core.errors import UserError
+from facefolds_core.parsing import parse_json
 
 
 @contextmanager
@@ -69,26 +70,18 @@ def read_json(path: str | Path, remedy: str = "make the file again, or restore i
     """Parse a JSON file.
 
     Raises:
-        UserError: if the file is missing, is not UTF-8 or is not JSON; names the line and column.
+        UserError: if the file is missing, is not UTF-8 or is not JSON (parsing.py); names the line and column.
     """
     path = Path(path)
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy=remedy) from None
     except UnicodeDecodeError as error:
         raise UserError(
             "not a text file", file=path, place=f"byte {error.start}", expected="JSON in UTF-8", remedy=remedy
         ) from None
-    except json.JSONDecodeError as error:
-        raise UserError(
-            "garbled JSON",
-            file=path,
-            place=f"line {error.lineno}, column {error.colno}",
-            expected="valid JSON",
-            found=error.msg,
-            remedy=remedy,
-        ) from None
+    return parse_json(text, path, remedy)
 
 
 def file_sha256(path: Path) -> str:

@@ -64,23 +64,6 @@ def no_memory(path: str | Path, place: str | None = None) -> UserError:
     )
 
 
-def check_local(path: str, place: str) -> None:
-    """Refuse an address of the net where a folder on this machine is meant.
-
-    Raises:
-        UserError: for it.
-    """
-    if "://" in path:
-        raise UserError(
-            "a capture cannot be read from the net",
-            file="params.yaml",
-            place=place,
-            expected="a folder on this machine",
-            found=path,
-            remedy="download it first, and set `path` to the folder where you put it",
-        )
-
-
 def is_regular(path: Path) -> bool:
     """Whether there is a regular file (or a link to one) of this name; False for names that cannot be."""
     try:

@@ -22,7 +22,6 @@ from facefolds_core.reading import check_regular, is_there, no_memory
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 
 STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
-    "configure": ("config",),
     "capture": ("capture",),
     "normalize": ("scene",),
     "train": ("model", "training"),

@@ -178,7 +178,8 @@ def test_stage_generates_the_actor(tmp_path: Path) -> None:
 
 def test_stage_notes_where_another_capture_is(tmp_path: Path) -> None:
     folders = SubjectFolders(tmp_path / "data" / "other")
-    _configure(folders, "multiface", tmp_path)
+    (tmp_path / "there").mkdir()
+    _configure(folders, "multiface", tmp_path / "there")
     capture(folders)
     assert [p.name for p in folders.capture.iterdir()] == ["source.json"]
 
