@@ -19,6 +19,7 @@ PLAYER := viewer/dist/index.html
 .PHONY: repro test view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
+	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
 test: $(READY)

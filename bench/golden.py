@@ -23,8 +23,8 @@ import yaml
 from bench.run import STAGES, Project, own_params
 from facefolds_core.errors import report_user_errors
 
-UNTIMED = ("timings", "training", "config", "checkpoints")
-"""Folders that hold times, or what was asked for."""
+UNTIMED = ("timings", "training", "config", "checkpoints", "locks")
+"""Folders that hold times, processes, or what was asked for."""
 
 TINY = """\
 subjects:

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from facefolds_core.errors import UserError
+from facefolds_core.errors import UserError, disk_error, is_disk_error
 from facefolds_core.files import atomic_file
 from facefolds_core.reading import check_regular, no_memory, remake
 
@@ -69,10 +69,8 @@ class FrameStore:
         except MemoryError:  # Arrow's own too
             raise no_memory(path) from None
         except (pa.ArrowException, KeyError, ValueError, TypeError, OverflowError, OSError) as error:
-            if isinstance(error, OSError) and error.errno == errno.ENOMEM:
-                raise no_memory(path) from None
-            if isinstance(error, PermissionError):
-                raise
+            if is_disk_error(error):
+                raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
             raise UserError("damaged frame store", file=path, found=str(error), remedy=remake(path)) from None
         self.height, self.width, self.channels = shape
         self._table = table  # holds the mapped file

@@ -138,7 +138,7 @@ def _level(
     video = params.video
     crfs = None
     if meter is not None and video.target_psnr is not None and not video.lossless:
-        crfs = {codec: _crf(content, CODECS[codec], video, meter, video.target_psnr) for codec in video.codec}
+        crfs = {codec: _crf(folder, content, CODECS[codec], video, meter, video.target_psnr) for codec in video.codec}
     level = write_level(folder, name, content, params, crfs)
     if meter is None:
         return level
@@ -162,9 +162,9 @@ def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) ->
     return level.model_copy(update=update)
 
 
-def _crf(content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMeter, target: float) -> int:
+def _crf(folder: Path, content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMeter, target: float) -> int:
     layout = content.layout
-    with TemporaryDirectory() as scratch:
+    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:

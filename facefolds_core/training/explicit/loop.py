@@ -27,9 +27,10 @@ from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
 from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
-from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.state import TextureState, model_bytes
 from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
-from facefolds_core.training.log import open_log
+from facefolds_core.training.log import log_metrics, open_log
+from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
 from facefolds_core.training.volume.outline import largest_body
@@ -135,20 +136,26 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
         fit = fit_scene(cameras.scene, volume, params.level_halfwidth)
         for note in fit.notes:
             bar.write(f"train: {note}")
+        check_space(model_folder, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
         levels = plan(fit, params.iterations)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
+        patiently(live.make_summary)
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
         time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
     )
-    with atomic_folder(model_folder) as temporary:
-        save_model(model, spec, temporary)
-        write_json(temporary / "training.json", asdict(report))
-        write_json(temporary / "fit.json", trainer.summary(spec))
-        draw_fit(temporary / "fit.png", fit, spec.num_layers)
+
+    def write() -> None:
+        with atomic_folder(model_folder) as temporary:
+            save_model(model, spec, temporary)
+            write_json(temporary / "training.json", asdict(report))
+            write_json(temporary / "fit.json", trainer.summary(spec))
+            draw_fit(temporary / "fit.png", fit, spec.num_layers)
+
+    patiently(write)
     return report
 
 
@@ -264,9 +271,7 @@ class _Trainer:
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
             if i % 10 == 9:
-                live.step = self.iteration
-                live.log_metric("psnr", self.psnr)
-                live.log_metric("texel_rows", level.texels[0])
+                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True

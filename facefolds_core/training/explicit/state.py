@@ -20,6 +20,11 @@ UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent."""
 
 
+def model_bytes(texels: tuple[int, int], layers: int, frames: int) -> int:
+    """Of the textures of a model with all its layers: float32, colour and alpha of the layers and of each frame."""
+    return 4 * texels[0] * texels[1] * (3 + 4 * layers + frames * (3 + layers))
+
+
 class TextureState:
     """Grids of `GridTextures` flattened to M = H W texels, each stacked with its two moments.
 
