@@ -64,7 +64,7 @@ class TextureState:
         self.steps = np.zeros(self.frame_colour.shape[1], np.int64)
         if self.device.type == "cpu":
             self.texture = torch.empty(m, n, 4)
-            self.gradient = torch.zeros(shading_kernel.PARTS, m, n, 4)
+            self.gradient = torch.zeros(n, m, 4)
 
     def reset_alpha(self) -> None:
         """Back to the initial opacity; colours stay. For layers that have moved."""
@@ -135,7 +135,7 @@ class TextureState:
                 images,
                 self.background.numpy(),
                 texture.numpy().reshape(h, w, n, 4),
-                self.gradient.numpy().reshape(-1, h, w, n, 4),
+                self.gradient.numpy().reshape(n, h, w, 4),
                 veil,
                 solid,
                 background_rate,
@@ -154,7 +154,7 @@ class TextureState:
             )
         else:
             squares = self._reference_step(
-                views, rays, images, frame, texture, veil, solid, background_rate, rates, keep, correct
+                views, rays, images, frame, texture, veil, solid, background_rate, faint, rates, keep, correct
             )
         return float(squares) / (3 * len(rays))
 
@@ -168,6 +168,7 @@ class TextureState:
         veil: float,
         solid: float,
         background_rate: float,
+        faint: float,
         rates: NDArray[np.float32],
         keep: float,
         correct: NDArray[np.float32],
@@ -182,7 +183,7 @@ class TextureState:
         )
         n = texture.shape[1]
         gradient, moved, squares = reference.shade(
-            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, solid, background_rate
+            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, solid, background_rate, faint
         )
         self.background[at] = moved
         reference.adam_step(
@@ -211,7 +212,7 @@ class TextureState:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
         (h, w), frames = self.shape, len(self.steps)
         n = self.layers.shape[2]
-        peak = torch.zeros(shading_kernel.PARTS, h, w, n)
+        peak = torch.zeros(n, h, w)
         for i in range(max(passes, frames)):
             rays = np.arange(i % passes, len(views.pixel), passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
@@ -219,8 +220,8 @@ class TextureState:
                 shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy())
             else:
                 codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
-                peak[0] = torch.maximum(peak[0], reference.contributions(codes, texture).cpu())
-        return peak.amax(0).view(-1, n).to(self.device)
+                torch.maximum(peak, reference.contributions(codes, texture).cpu(), out=peak)
+        return peak.view(n, -1).T.contiguous().to(self.device)
 
     def hide(self, unseen: Tensor) -> None:
         """Make texels [M, N] bool transparent."""

@@ -236,6 +236,7 @@ def _shade(
     jitter: Array,
     background: Array,
     gradient: Array,
+    touched: NDArray[np.bool_],
     veil: float,
     solid: float,
 ) -> tuple[float, Array, Array]:
@@ -255,6 +256,7 @@ def _shade(
         STEP * voxel,
         samples,
         gradient,
+        touched,
         residual,
         through,
         veil,
@@ -266,7 +268,7 @@ def _shade(
 def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, environment: Environment) -> None:
     """Empty the voxels for which EVIDENCE is missing, in place: the mean over rays, by their weights there, of how far
     what they see in the volume is from the environment behind it. What no ray reaches stays."""
-    gradient = np.zeros((kernel.PARTS, *grid.shape), np.float32)
+    gradient, touched = kernel.empty_gradient(grid.shape)
     background, _, _ = environment.look_up(rays.origins, rays.directions)
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, STEP * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
@@ -277,7 +279,7 @@ def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, e
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
     seen = replace(rays, colours=target)
-    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, 0.0, 0.0)
+    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
     evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
@@ -299,7 +301,7 @@ def _train(
 ) -> float:
     """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
     grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
-    gradient = np.zeros((kernel.PARTS, *values.shape), np.float32)
+    gradient, touched = kernel.empty_gradient(values.shape)
     count = min(RAYS, len(rays.origins))
     recent = math.nan
     for i in range(iterations):
@@ -311,14 +313,14 @@ def _train(
         part = _Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
         squares, residual, through = _shade(
-            grid[0], occupied, lower, voxel, part, jitter, background, gradient, VEIL, SOLID
+            grid[0], occupied, lower, voxel, part, jitter, background, gradient, touched, VEIL, SOLID
         )
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - 0.9 * i / iterations if last else 1.0
         environment.step(taps, weights, through[:, None] * residual, scale)
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
-        kernel.adam_step(grid, gradient, share, scale * rate, scale * RATE_COLOUR, bias1, bias2, SMOOTH)
+        kernel.adam_step(grid, gradient, touched, share, scale * rate, scale * RATE_COLOUR, bias1, bias2, SMOOTH)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()
