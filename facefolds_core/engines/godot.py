@@ -1,4 +1,4 @@
-"""An asset for Godot 3: what its add-on in engines/godot reads (docs/engines.md).
+"""An asset for Godot 3: what its add-on in engines/godot reads (docs/guide/engines.md).
 
 Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player of WebM cannot seek. So the folder
 holds plain binary meshes with y up, and every frame as a picture of its own.
