@@ -1,0 +1,44 @@
+"""Registries: another entry is a file, known by its name before anything is imported."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from pydantic import ValidationError
+
+from facefolds_core.captures.sources import is_generated
+from facefolds_core.params import Subject, subject
+from facefolds_core.registry import SOURCES, Registry
+
+
+def test_every_source_reads() -> None:
+    assert {"actor", "multiface", "transforms"} <= set(SOURCES.names) == set(get_args(subject.SourceName))
+    assert all(callable(SOURCES[name].read) for name in SOURCES.names)
+    assert [name for name in SOURCES.names if is_generated(name)] == ["actor"]
+
+
+def test_a_source_that_is_none_is_refused_with_the_names() -> None:
+    with pytest.raises(KeyError):
+        SOURCES["_actor"]
+    with pytest.raises(ValidationError, match="'actor', 'multiface' or 'transforms'"):
+        Subject(source="colmap", path="x")
+
+
+def test_another_entry_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("__init__", "_shared", "one", "two"):
+        (tmp_path / "many" / f"{name}.py").parent.mkdir(exist_ok=True)
+        (tmp_path / "many" / f"{name}.py").write_text("VALUE = 3\n")
+    monkeypatch.setattr("facefolds_core.registry._ROOT", tmp_path)
+    assert Registry("facefolds_core.many").names == ("one", "two")
+
+
+def test_parameters_know_the_names_without_the_modules(project_root: Path) -> None:
+    code = (
+        "import sys, facefolds_core.params; print([m for m in sys.modules if m.startswith('facefolds_core.captures')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=project_root, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
