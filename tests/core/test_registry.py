@@ -10,12 +10,15 @@ from typing import get_args
 import pytest
 from av.codec import Codec
 from pydantic import ValidationError
+from typer.testing import CliRunner
 
 from facefolds_core.asset import codecs
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.captures.sources import is_generated
+from facefolds_core.cli import app
 from facefolds_core.params import Subject, compress, subject
-from facefolds_core.registry import SOURCES, Registry
+from facefolds_core.registry import EXPORTERS, SOURCES, Registry
+from tests.assets import make_asset
 
 
 def test_every_source_reads() -> None:
@@ -37,6 +40,14 @@ def test_every_codec_is_what_its_file_says() -> None:
         assert codec.name == name
         assert Codec(codec.encoder, "w").is_encoder and Codec(codec.decoder, "r").is_decoder
     assert get_args(compress.CodecName) == get_args(codecs.CodecName) == tuple(CODECS)
+
+
+@pytest.mark.parametrize("name", EXPORTERS.names)
+def test_every_exporter_writes_and_says_what(name: str, tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset", layers=2, frames=1, resolution=32)
+    done = CliRunner().invoke(app, ["export", name, str(tmp_path / "asset"), str(tmp_path / "out")])
+    assert done.exit_code == 0 and done.stdout.startswith(f"export: {tmp_path / 'out'}: 2 layers")
+    assert (tmp_path / "out").exists() and (EXPORTERS[name].__doc__ or "").strip()
 
 
 def test_another_entry_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
