@@ -143,10 +143,11 @@ def _has(overrides: Any, name: str) -> bool:
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
-    """Write `subject.json` and one file for each stage; returns their paths."""
+    """Write `subject.json`, one file a stage, and `levels.json` (see `config`); returns their paths."""
     core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
-    values = {"subject": core}
+    values: dict[str, Any] = {"subject": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
+    values["levels"] = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
     for name, value in values.items():
         write_json(folder / f"{name}.json", value)
     return [folder / f"{name}.json" for name in values]
