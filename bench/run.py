@@ -21,6 +21,7 @@ import yaml
 from bench.results import ROOT, Means
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.facts import read_fact
 from facefolds_core.files import read_json, write_text
 from facefolds_core.model import load_model
 from facefolds_core.paths import SubjectFolders
@@ -132,7 +133,7 @@ def training_of(folders: SubjectFolders) -> dict[str, Any]:
     """training.json, and under "restarts" how often a level diverged and was begun again."""
     fit = folders.model / "fit.json"
     events = read_json(fit)["events"] if fit.exists() else []
-    restarts = sum("diverged" in event for event in events)
+    restarts = sum(read_fact(event).kind == "diverged" for event in events)
     return {**read_json(folders.model / "training.json"), "restarts": restarts}
 
 

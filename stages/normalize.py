@@ -19,7 +19,7 @@ def summary(plan: Plan) -> str:
     """One line on the scene."""
     scene = plan.scene
     train, held = len(scene.indices("train")), len(scene.indices("holdout"))
-    culled = sum(": culled," in line for line in scene.left_out)
+    culled = sum(one.kind == "culled" for one in scene.left_out)
     return (
         f"{len(scene.cameras)} cameras ({train} train, {held} holdout; {culled} culled), {scene.num_frames} frames, "
         f"{scene.width} x {scene.height} pixels, in {scene.folder}"

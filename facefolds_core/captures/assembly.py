@@ -18,6 +18,7 @@ from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.geometry.cameras import Camera
@@ -74,11 +75,11 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     similarity, notes = normalizing_similarity(still, subject.front)
     culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
     kept, frames, incomplete = complete_subset(capture, culling.kept)
-    left_out = [*capture.left_out, *notes, *culling.lines, *incomplete]
+    left_out = [*capture.left_out, *notes, *culling.facts, *incomplete]
     fps = capture.fps if len(frames) > 1 else 0.0
     sound = None if capture.sound is None else sound_start([capture.sound.seconds[f] for f in frames], fps)
     if capture.sound is not None and sound is None:
-        left_out.append(f"{capture.sound.path.name}: the frames in use are not evenly spaced, so no sound fits them")
+        left_out.append(fact("sound_does_not_fit", file=capture.sound.path.name))
     splits = split_cameras([capture.views[c].name for c in kept], subject, left_out, capture.root)
     width, height = fit_box(*check_image_sizes(capture, kept, frames), params.long_side, params.short_side)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import Lens
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import FrameRange, Subject
 
@@ -84,7 +85,7 @@ class Capture:
         images: (camera index, frame index) -> file. Incomplete where the capture is.
         masks: likewise, files of true opacity, where there are any.
         tracking: for all K frames, or None.
-        left_out: one line for each thing of the capture that is not here, with the reason, and for each guess made.
+        left_out: a fact for each thing of the capture that is not here, with the reason, and for each guess made.
         sound: None where the capture is silent.
     """
 
@@ -95,7 +96,7 @@ class Capture:
     images: Mapping[tuple[int, int], Path]
     masks: Mapping[tuple[int, int], Path]
     tracking: Tracking | None
-    left_out: tuple[str, ...]
+    left_out: tuple[Fact, ...]
     sound: Sound | None = None
 
     def place(self, camera: int, frame: int) -> str:
@@ -160,7 +161,7 @@ def frame_rate(subject: Subject, default: float, count: int) -> float:
     return rate / step
 
 
-def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int], list[int], list[str]]:
+def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int], list[int], list[Fact]]:
     """The cameras and frames between which no image is missing.
 
     A camera that lacks more than half of the frames is left out; of the frames, those stay that every other camera has.
@@ -169,7 +170,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
         cameras: indices of those to use.
 
     Returns:
-        cameras, frames, and a line for each one left out.
+        cameras, frames, and a fact for each one left out.
 
     Raises:
         UserError: if no frame is left.
@@ -178,7 +179,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
     has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
     kept = [c for c in cameras if 2 * len(has[c]) >= total]
     left_out = [
-        f"camera {capture.views[c].name}: has {len(has[c])} of {total} frames, fewer than half"
+        fact("camera_incomplete", camera=capture.views[c].name, has=len(has[c]), of=total)
         for c in cameras
         if c not in kept
     ]
@@ -186,7 +187,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
     for f in range(total):
         lacking = [capture.views[c].name for c in kept if f not in has[c]]
         if lacking:
-            left_out.append(f"frame {capture.frame_ids[f]}: no image from {shorten(lacking)}")
+            left_out.append(fact("frame_incomplete", frame=capture.frame_ids[f], cameras=lacking))
         else:
             frames.append(f)
     if not kept or not frames:
@@ -227,12 +228,6 @@ def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence
     if expected is None:
         raise ValueError("no cameras or frames to check")
     return expected
-
-
-def shorten(names: Sequence[str], most: int = 12) -> str:
-    """A list in words: 'a, b, c and 40 more'."""
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
 def closest_rotation(w2c: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.reading import is_regular, read_text
 
@@ -114,7 +115,7 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
 
 def krt_reference(
     cameras: list[Calibration], image: tuple[int, int], given: tuple[int, int] | None, path: Path
-) -> tuple[tuple[int, int], str | None]:
+) -> tuple[tuple[int, int], Fact | None]:
     """Find out which image size K refers to.
 
     Two hypotheses: the images at hand, or the dataset's full size. A principal point lies near the middle of the image,
@@ -125,7 +126,7 @@ def krt_reference(
         given: `krt_size` of params.yaml, which overrides.
 
     Returns:
-        (width, height), and a note on what was found out, None where there was nothing to find.
+        (width, height), and a fact on what was found out, None where there was nothing to find.
 
     Raises:
         UserError: if neither hypothesis fits.
@@ -155,9 +156,8 @@ def krt_reference(
             found=words,
             remedy="set `krt_size: [width, height]` of this subject in params.yaml",
         )
-    relation = "already scaled to the images" if best == image else "for full-size images; scaled"
-    note = f"note: K of KRT is {relation} ({words}; images {image[0]} x {image[1]}); `krt_size` overrides"
-    return best, note
+    kind = "krt_is_scaled" if best == image else "krt_is_of_full_size"
+    return best, fact(kind, point=[float(x) for x in points], image=list(image))
 
 
 def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import Capture, Tracking, shorten
+from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import HoldoutEvery, NormalizeParams, Subject
@@ -77,8 +78,8 @@ def _mean_pose(tracking: Tracking) -> tuple[Array, Array]:
     return facing, up
 
 
-def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, list[str]]:
-    """Centre (3,), rotation (3, 3) and notes, from the cameras alone."""
+def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, list[Fact]]:
+    """Centre (3,), rotation (3, 3) and facts, from the cameras alone."""
     cameras = [view.camera for view in capture.views]
     centre = nearest_to_axes(cameras)
     if front is None:
@@ -94,7 +95,7 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
         return (
             centre,
             orientation(facing, up),
-            ["note: no `front` camera and no tracked mesh; +x is the cameras' mean direction"],
+            [fact("front_guessed")],
         )
     names = [camera.name for camera in cameras]
     if front not in names:
@@ -110,8 +111,8 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
     return centre, orientation(-camera.forward, -camera.rotation[1]), []
 
 
-def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similarity, list[str]]:
-    """Capture -> normalised coordinates, and notes.
+def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similarity, list[Fact]]:
+    """Capture -> normalised coordinates, and facts on what was guessed.
 
     Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh,
     centre and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject
@@ -120,7 +121,7 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
     Raises:
         UserError: if the front camera does not exist, or all cameras stand in the centre.
     """
-    notes: list[str] = []
+    notes: list[Fact] = []
     if capture.tracking is not None:
         centre, rotation = _from_tracking(capture.tracking)
     else:
@@ -157,11 +158,11 @@ def view_angles(cameras: Sequence[Camera]) -> Array:
 class Culling:
     """Attributes:
     kept: indices of the cameras within the angles.
-    lines: for each other one, its name and angles.
+    facts: on each other one, with its angles.
     """
 
     kept: list[int]
-    lines: list[str]
+    facts: list[Fact]
 
 
 def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Culling:
@@ -172,8 +173,8 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
     """
     angles = view_angles(cameras)
     inside = (np.abs(angles[:, 0]) <= params.max_elevation) & (np.abs(angles[:, 1]) <= params.max_azimuth)
-    lines = [
-        f"camera {camera.name}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees"
+    facts = [
+        fact("culled", camera=camera.name, elevation=float(elevation), azimuth=float(azimuth))
         for camera, (elevation, azimuth), used in zip(cameras, angles, inside, strict=True)
         if not used
     ]
@@ -186,16 +187,16 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
             found=f"(elevation, azimuth) of {shorten(each)}",
             remedy="check `front`, or raise `max_elevation` and `max_azimuth` of `normalize` for this subject",
         )
-    return Culling([int(i) for i in np.flatnonzero(inside)], lines)
+    return Culling([int(i) for i in np.flatnonzero(inside)], facts)
 
 
-def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[str], file: object) -> tuple[Split, ...]:
+def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact], file: object) -> tuple[Split, ...]:
     """ "train" or "holdout" for each of the cameras that are used, in their order.
 
     `every: n` holds out the cameras at positions p (from 0) with (p + 1) % n == 0.
 
     Args:
-        unused: lines on cameras that were left out, to say why one that is named is not there.
+        unused: facts on cameras that were left out, to say why one that is named is not there.
 
     Raises:
         UserError: if a camera to hold out is not there, or no camera is left for training.
@@ -205,7 +206,7 @@ def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[str],
     else:
         held = set(subject.holdout)
     for name in sorted(held - set(names)):
-        reasons = [line for line in unused if line.startswith(f"camera {name}:")]
+        reasons = [str(one) for one in unused if one.camera == name]
         raise UserError(
             "a held-out camera is not there",
             file=str(file),

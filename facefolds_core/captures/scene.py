@@ -23,13 +23,15 @@ from numpy.typing import NDArray
 
 from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, read_fact
 from facefolds_core.files import read_json, write_json
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.reading import check_regular, is_there, remake
 
-SCENE_VERSION = 1
+SCENE_VERSION = 2
+"""Version 1 had lines of text in `left_out`; it is still read."""
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
 
@@ -49,7 +51,7 @@ class Scene:
         times: (K,) seconds from the first frame.
         fps: frames a second of the capture (playback rate of the asset); 0 for a static scene.
         from_capture: capture coordinates -> normalised coordinates.
-        left_out: one line for each camera, frame or image of the capture that is not here, with the reason.
+        left_out: a fact for each camera, frame or image of the capture that is not here, with the reason.
         folder: where it was read from.
     """
 
@@ -60,7 +62,7 @@ class Scene:
     times: NDArray[np.float64]
     fps: float
     from_capture: Similarity
-    left_out: tuple[str, ...]
+    left_out: tuple[Fact, ...]
     folder: Path
 
     @property
@@ -147,7 +149,7 @@ def write_scene(scene: Scene, folder: Path) -> None:
             "times": scene.times.tolist(),
             "fps": scene.fps,
             "from_capture": scene.from_capture.to_json(),
-            "left_out": list(scene.left_out),
+            "left_out": [one.to_json() for one in scene.left_out],
         },
     )
 
@@ -163,11 +165,11 @@ def read_scene(folder: str | Path) -> Scene:
     remedy = remake(path)
     check_regular(path, remedy)
     value: Any = read_json(path, remedy=remedy)
-    if not isinstance(value, dict) or value.get("version") != SCENE_VERSION:
+    if not isinstance(value, dict) or value.get("version") not in range(1, SCENE_VERSION + 1):
         raise UserError(
             "a normalised scene of another version",
             file=path,
-            expected=f"version {SCENE_VERSION}",
+            expected=f"version 1 to {SCENE_VERSION}",
             found=value.get("version") if isinstance(value, dict) else type(value).__name__,
             remedy=remedy,
         )
@@ -184,7 +186,7 @@ def read_scene(folder: str | Path) -> Scene:
             times=np.array(value["times"], float),
             fps=float(value["fps"]),
             from_capture=Similarity.from_json(value["from_capture"]),
-            left_out=tuple(value["left_out"]),
+            left_out=tuple(read_fact(one) for one in value["left_out"]),
             folder=folder,
         )
         _check(scene)
@@ -198,7 +200,7 @@ def read_scene(folder: str | Path) -> Scene:
 def _check(scene: Scene) -> None:
     """ValueError for what `write_scene` never writes; the cameras' numbers are checked by `check_camera`."""
     cameras, frames = scene.cameras, len(scene.frame_ids)
-    words = [scene.subject, *scene.frame_ids, *scene.left_out, *(camera.name for camera in cameras)]
+    words = [scene.subject, *scene.frame_ids, *(camera.name for camera in cameras)]
     if not cameras or not frames or not all(isinstance(word, str) for word in words):
         raise ValueError("no cameras, no frames, or names that are no text")
     if any((c.K.shape, c.w2c.shape) != ((3, 3), (3, 4)) for c in cameras):

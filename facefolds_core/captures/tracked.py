@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Tracking
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.reading import check_folder, is_there, read_bytes, read_text
 
@@ -148,7 +149,7 @@ def _check_extent(points: Array, file: Path) -> None:
         )
 
 
-def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, list[str], list[str]]:
+def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, list[str], list[Fact]]:
     """The tracked mesh of all frames that have one.
 
     Args:
@@ -156,7 +157,7 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         frames: names of frames.
 
     Returns:
-        tracking (None where no frame has any), the frames that it covers (all where None), lines on those left out.
+        tracking (None where no frame has any), the frames that it covers (all where None), facts on those left out.
 
     Raises:
         UserError: for a damaged file, or a mesh whose number of vertices changes.
@@ -168,16 +169,12 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
     check_folder(folder, _REMEDY)
     tracked = [n for n in frames if is_there(meshes(n)[2]) and (is_there(meshes(n)[0]) or is_there(meshes(n)[1]))]
     if not tracked:
-        return (
-            None,
-            frames,
-            [f"tracked mesh: none in {folder} with its _transform.txt; cameras give centre and orientation"],
-        )
-    left_out = [f"frame {name}: no tracked mesh or no head pose" for name in frames if name not in tracked]
+        return None, frames, [fact("no_mesh", folder=str(folder))]
+    left_out = [fact("frame_without_mesh", frame=name) for name in frames if name not in tracked]
     topology = next((meshes(name)[1] for name in tracked if is_there(meshes(name)[1])), None)
     faces, count = None, None
     if topology is None:
-        left_out.append(f"tracked mesh: {folder} has no .obj, so no faces; it gives centre and orientation only")
+        left_out.append(fact("mesh_without_faces", folder=str(folder)))
     else:
         points, faces = read_obj(topology)
         count = len(points)

@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import shorten
 from facefolds_core.errors import UserError
+from facefolds_core.facts import shorten
 from facefolds_core.geometry.cameras import Camera
 
 Array = NDArray[np.float64]

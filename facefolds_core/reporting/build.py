@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.facts import worded
 from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
@@ -122,7 +123,10 @@ def context(subject: Subject) -> dict[str, Any]:
         **layers(subject),
         "textures": textures(subject.asset),
         "curves": curves(facts),
-        "fit_notes": [*(facts.fit or {}).get("reasons", []), *(facts.fit or {}).get("events", [])],
+        "fit_notes": [
+            *(facts.fit or {}).get("reasons", []),
+            *(worded(event) for event in (facts.fit or {}).get("events", [])),
+        ],
         "waterfall": tables.waterfall(facts.waterfall),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),

@@ -11,6 +11,7 @@ import yaml
 from bench.results import ROOT
 from bench.run import Project, merged, own_params, score_model, training_of
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.files import write_json
 from facefolds_core.model.storage import save_model
 from facefolds_core.scoring.perceptual import Perceptual
@@ -62,7 +63,15 @@ def test_levels_that_were_begun_again_are_counted(tmp_path: Path) -> None:
     folders = Project(tmp_path, "x").folders
     write_json(folders.model / "training.json", {"seconds": 3})
     assert training_of(folders) == {"seconds": 3, "restarts": 0}
-    write_json(folders.model / "fit.json", {"events": ["level 1 diverged", "a mesh left out"]})
+    write_json(
+        folders.model / "fit.json",
+        {
+            "events": [
+                fact("diverged", level=1, rate=0.1).to_json(),
+                fact("mesh_is_off", share=0.5, distance=1).to_json(),
+            ]
+        },
+    )
     assert training_of(folders)["restarts"] == 1
 
 

@@ -168,7 +168,7 @@ def test_a_byte_order_mark_hides_no_camera(tmp_path: Path) -> None:
     folders = run(tmp_path / "c", "multiface")
     scene = json.loads((folders.scene / "scene.json").read_text())
     assert [camera["name"] for camera in scene["cameras"]] == [name for name, _, _ in RING]
-    assert not [line for line in scene["left_out"] if not line.startswith("note")]
+    assert not [one for one in scene["left_out"] if not one["words"].startswith("note")]
 
 
 @pytest.mark.parametrize("name", ["KRT", "frame_list.txt", f"tracked_mesh/{SEGMENT}/000003.obj"])
@@ -275,7 +275,7 @@ def test_names_that_cannot_be_are_missing_images(tmp_path: Path, label: str) -> 
     edit_transforms(path, 1, file_path=label)
     folders = run(tmp_path / "c", "transforms", front="400003")
     left_out = json.loads((folders.scene / "scene.json").read_text())["left_out"]
-    assert any("no image" in line for line in left_out)
+    assert any("no image" in one["words"] for one in left_out)
 
 
 @pytest.mark.parametrize("fps", [1e-300, 1e300, 1e-3])

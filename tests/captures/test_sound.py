@@ -31,7 +31,7 @@ def scene_sound(root: Path, frames: FrameRange | tuple[str, ...] | None, samples
     capture = read_multiface(root / "capture", subject)
     plan = plan_scene(capture, "x", subject, NormalizeParams(), root / "scene")
     write_plan(plan, NormalizeParams())
-    return root / "scene" / "audio.wav", list(plan.scene.left_out)
+    return root / "scene" / "audio.wav", [str(one) for one in plan.scene.left_out]
 
 
 def heard(path: Path) -> np.ndarray:

@@ -76,7 +76,7 @@ def test_entries_without_image_are_left_out_and_reported(tmp_path: Path) -> None
     (tmp_path / "images" / "400002.png").unlink()
     capture = read_transforms(tmp_path, subject(tmp_path))
     assert [view.name for view in capture.views] == ["400001", "400003", "400004", "400005"]
-    assert capture.left_out == ("frames[1] (images/400002.png): no image images/400002.png",)
+    assert [str(one) for one in capture.left_out] == ["frames[1] (images/400002.png): no image images/400002.png"]
 
 
 def test_paths_without_extension(tmp_path: Path) -> None:

@@ -80,7 +80,10 @@ def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
     choice = choose_cameras(scene, replace(CameraFit.alike(COUNT, PARAMS), errors=errors))
     # Training cameras are 0, 1, 2, 4, 5, 6.
     assert choice.scene.indices("train") == [0, 1, 2, 5, 6] and choice.scene.indices("holdout") == [3]
-    assert len(choice.notes) == 1 and "cam4" in choice.notes[0] and choice.gains.shape == (5, 3)
+    assert [(n.kind, n.camera) for n in choice.notes] == [("camera_contradicts", "cam4")] and choice.gains.shape == (
+        5,
+        3,
+    )
     summary = choice.summary["cam4"]
     assert isinstance(summary, dict) and summary["used"] is False
 

@@ -15,12 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from facefolds_core.captures.capture import Capture, Sound, View, closest_rotation, frame_rate, select_frames, shorten
+from facefolds_core.captures.capture import Capture, Sound, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import check_folder, is_there, read_text
@@ -52,10 +53,10 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     used, left_out = _cameras(calibration, photos, root)
     names = sorted({frame for camera in used for frame in photos[camera.name]})
     listed = _listed(root / "frame_list.txt", segment)
-    left_out += [f"frame {name}: in frame_list.txt, but no camera has an image" for name in listed if name not in names]
+    left_out += [fact("frame_without_images", frame=name) for name in listed if name not in names]
     frames = select_frames(names, subject.frames, root / "images" / segment, f"segment {segment}")
-    tracking, frames, lines = read_tracking(root / "tracked_mesh" / segment, frames)
-    left_out += lines
+    tracking, frames, facts = read_tracking(root / "tracked_mesh" / segment, frames)
+    left_out += facts
     views, note = _views(used, photos, root, subject)
     left_out += [note] if note else []
     images = {
@@ -132,12 +133,12 @@ def _listed(path: Path, segment: str) -> list[str]:
 
 def _cameras(
     calibration: list[Calibration], photos: dict[str, dict[str, Path]], root: Path
-) -> tuple[list[Calibration], list[str]]:
-    """The cameras with both calibration and images, and lines on the others."""
+) -> tuple[list[Calibration], list[Fact]]:
+    """The cameras with both calibration and images, and facts on the others."""
     known = {camera.name for camera in calibration}
     used = [camera for camera in calibration if photos.get(camera.name)]
-    left_out = [f"camera {camera.name}: in KRT, but has no images" for camera in calibration if camera not in used]
-    left_out += [f"camera {name}: has images, but is not in KRT" for name in photos if name not in known]
+    left_out = [fact("camera_without_images", camera=camera.name) for camera in calibration if camera not in used]
+    left_out += [fact("camera_without_calibration", camera=name) for name in photos if name not in known]
     if not used:
         raise UserError(
             "no camera has both images and a calibration",
@@ -151,7 +152,7 @@ def _cameras(
 
 def _views(
     used: list[Calibration], photos: dict[str, dict[str, Path]], root: Path, subject: Subject
-) -> tuple[tuple[View, ...], str | None]:
+) -> tuple[tuple[View, ...], Fact | None]:
     """Cameras for the images at hand, and a note on the size that KRT refers to."""
     sizes = []
     for camera in used:

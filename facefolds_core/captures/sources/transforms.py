@@ -20,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
+from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.values import json_matrix, json_number, short, wrong
+from facefolds_core.facts import fact, shorten
 from facefolds_core.files import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.params import CaptureParams, Subject
@@ -91,7 +92,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
         raise wrong(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
     common = {key: entry for key, entry in value.items() if key != "frames"}
     entries = [_entry(e, common, path, f"frames[{i}]") for i, e in enumerate(value["frames"])]
-    left_out = [f"{e.place}: no image {e.label}" for e in entries if e.image is None]
+    left_out = [fact("image_missing", place=e.place, image=e.label) for e in entries if e.image is None]
     present = [e for e in entries if e.image is not None]
     if not present:
         raise wrong(

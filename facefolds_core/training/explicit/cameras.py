@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.facts import Fact, fact
 from facefolds_core.training.volume.cameras import CameraFit
 
 
@@ -18,13 +19,13 @@ class CameraChoice:
     Attributes:
         scene: cameras that are left out have the split "out".
         gains: (C, 3) of the training cameras that are left.
-        notes: a line for each thing that a user should know.
+        notes: a fact for each thing that a user should know.
         summary: for `fit.json`.
     """
 
     scene: Scene
     gains: NDArray[np.float64]
-    notes: tuple[str, ...]
+    notes: tuple[Fact, ...]
     summary: dict[str, object]
 
 
@@ -39,15 +40,11 @@ def choose_cameras(scene: Scene, found: CameraFit) -> CameraChoice:
     out = [train[position] for position in outliers]
     splits = tuple("out" if i in out else split for i, split in enumerate(scene.splits))
     median = float(np.nanmedian(found.errors)) if np.isfinite(found.errors).any() else 0.0
-    notes = [
-        f"camera {names[p]} is left out: on the subject it differs {found.errors[p] / median:.1f} times as much from "
-        "what the others see as the median camera does; check its calibration"
-        for p in outliers
-    ]
+    notes = [fact("camera_contradicts", camera=names[p], times=float(found.errors[p] / median)) for p in outliers]
     if (found.gains != 1).any():
         low, high = found.gains.min(0), found.gains.max(0)
-        spans = ", ".join(f"{c} {a:.2f} to {b:.2f}" for c, a, b in zip("rgb", low, high, strict=True))
-        notes.append(f"cameras differ in exposure or white balance; taken out: gains {spans} (fit.json: cameras)")
+        spans = {c: [float(a), float(b)] for c, a, b in zip("rgb", low, high, strict=True)}
+        notes.append(fact("gains", **spans))
     summary: dict[str, object] = {
         name: {
             "gain": [round(float(v), 4) for v in found.gains[p]],

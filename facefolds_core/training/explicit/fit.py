@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
 from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
 from facefolds_core.training.volume.fit import Volume, seen_share
@@ -52,7 +53,7 @@ class Fit:
     rgb: Array
     texels: tuple[int, int]
     reasons: tuple[str, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Fact, ...]
     losses: dict[float, float]
     volume_psnr: float
 
@@ -100,7 +101,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[float(centre[0])], source), *notes),
+        reasons=(*_reasons(params, losses[float(centre[0])], source), *map(str, notes)),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
@@ -124,7 +125,7 @@ def _reasons(params: ExplicitParams, lost: float, source: str) -> tuple[str, ...
 
 def _trusted_surface(
     scene: Scene, volume: Volume, centre: Array, params: ExplicitParams
-) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[str, ...]]:
+) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
     """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
     surface = scene.load_surface()
     if surface is None:
@@ -133,10 +134,7 @@ def _trusted_surface(
     share = share_off(volume, centre, vertices, surface[1], params.mesh, params.start)
     if share <= params.mesh.max_share_off:
         return surface, ()
-    return None, (
-        f"the tracked mesh is left out: in {share:.0%} of the directions it lies over {params.mesh.max_distance} units "
-        "from what the images show (is its scale or its place wrong?)",
-    )
+    return None, (fact("mesh_is_off", share=share, distance=params.mesh.max_distance),)
 
 
 def share_off(

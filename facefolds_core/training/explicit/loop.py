@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
@@ -118,7 +119,7 @@ class _Trainer:
                 return
             self.state.restore(saved)
             self.rate /= 3
-            self.events.append(f"level {number}: diverged, begun again with learning rate {self.rate:.3g}")
+            self.events.append(fact("diverged", level=number, rate=self.rate))
             bar.write(f"train: {self.events[-1]}")
         raise UserError(
             "training diverged",
@@ -232,16 +233,13 @@ class _Trainer:
         hidden = state.contributions(self.views, self._stride()) < least
         hidden |= state.beside(self.params.start.beside_opacity)
         state.hide(hidden)
-        self.events.append(
-            f"{float(hidden.float().mean()):.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
-            "or lie beside the subject"
-        )
+        self.events.append(fact("texels_cleared", share=float(hidden.float().mean()), least=least))
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
         self.events += [
-            f"layer {i} dropped: alpha at most {float(peak[i]):.4f}" for i in range(n) if not first <= i <= last
+            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(n) if not first <= i <= last
         ]
         radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
@@ -278,7 +276,7 @@ class _Trainer:
             "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
             "volume_psnr": self.fit.volume_psnr,
             "cameras": self.cameras.summary,
-            "events": self.events,
+            "events": [event.to_json() for event in self.events],
         }
 
 

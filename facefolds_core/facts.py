@@ -1,0 +1,113 @@
+"""What a user should know of a step: records, with one place that words them.
+
+A scene says what of its capture it left out, a training what happened to it. Code asks a fact's kind and values; people
+read `str(fact)`. Files hold both: the record, and its words beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+TEXT = "text"
+"""The kind of a line that an older version wrote, or that is nothing but words."""
+
+WORDS = {
+    TEXT: "{text}",
+    # of a capture
+    "camera_without_images": "camera {camera}: in KRT, but has no images",
+    "camera_without_calibration": "camera {camera}: has images, but is not in KRT",
+    "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
+    "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
+    "frame_without_images": "frame {frame}: in frame_list.txt, but no camera has an image",
+    "frame_without_mesh": "frame {frame}: no tracked mesh or no head pose",
+    "frame_incomplete": "frame {frame}: no image from {cameras}",
+    "image_missing": "{place}: no image {image}",
+    "no_mesh": "tracked mesh: none in {folder} with its _transform.txt; cameras give centre and orientation",
+    "mesh_without_faces": "tracked mesh: {folder} has no .obj, so no faces; it gives centre and orientation only",
+    "krt_is_scaled": "note: K of KRT is already scaled to the images (median principal point ({point[0]:.1f}, "
+    "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
+    "krt_is_of_full_size": "note: K of KRT is for full-size images; scaled (median principal point ({point[0]:.1f}, "
+    "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
+    "front_guessed": "note: no `front` camera and no tracked mesh; +x is the cameras' mean direction",
+    "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
+    # of a training
+    "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
+    "the others see as the median camera does; check its calibration",
+    "gains": "cameras differ in exposure or white balance; taken out: gains r {r[0]:.2f} to {r[1]:.2f}, "
+    "g {g[0]:.2f} to {g[1]:.2f}, b {b[0]:.2f} to {b[1]:.2f} (fit.json: cameras)",
+    "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
+    "from what the images show (is its scale or its place wrong?)",
+    "diverged": "level {level}: diverged, begun again with learning rate {rate:.3g}",
+    "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
+    "or lie beside the subject",
+    "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
+}
+"""Kind -> its words."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One thing that a user should know.
+
+    Attributes:
+        kind: a key of `WORDS`.
+        values: what the words name: `camera` and `frame` by name, numbers, lists; as JSON has them.
+    """
+
+    kind: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """In words."""
+        return WORDS[self.kind].format(**{key: _listed(value) for key, value in self.values.items()})
+
+    @property
+    def camera(self) -> str | None:
+        """The camera that it is about, if it is about one."""
+        return self.values.get("camera")
+
+    def to_json(self) -> dict[str, Any]:
+        return {"kind": self.kind, **self.values, "words": str(self)}
+
+
+def fact(kind: str, **values: Any) -> Fact:
+    """`fact("culled", camera="400002", elevation=61.0, azimuth=2.0)`."""
+    return Fact(kind, values)
+
+
+def read_fact(value: Any) -> Fact:
+    """A fact of a file; a line of text, as older versions wrote, is one of kind `TEXT`.
+
+    Raises:
+        ValueError: if it is none of ours.
+    """
+    if isinstance(value, str):
+        return fact(TEXT, text=value)
+    if not isinstance(value, dict) or not isinstance(value.get("kind"), str) or value["kind"] not in WORDS:
+        raise ValueError(f"{str(value)[:100]} is no fact")
+    found = Fact(value["kind"], {key: part for key, part in value.items() if key not in ("kind", "words")})
+    try:
+        str(found)
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise ValueError(f"{str(value)[:100]} has not what a fact of its kind has: {error!r}") from None
+    return found
+
+
+def worded(value: Any) -> str:
+    """A fact of a file in words; what is none of ours, as it stands there."""
+    try:
+        return str(read_fact(value))
+    except ValueError:
+        return str(value)
+
+
+def _listed(value: Any) -> Any:
+    return shorten(value) if isinstance(value, list | tuple) and all(isinstance(v, str) for v in value) else value
+
+
+def shorten(names: Sequence[str], most: int = 12) -> str:
+    """A list in words: 'a, b, c and 40 more'."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
