@@ -13,7 +13,7 @@ from facefolds_core.captures.actor import write_capture
 from facefolds_core.captures.agreement import agreement
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.multiface import read_multiface
+from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
 
