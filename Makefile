@@ -75,4 +75,4 @@ blender: .venv-blender/.installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config dvc.lock
+	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config data/.timings data/.locks dvc.lock

@@ -61,7 +61,7 @@ def test_no_other_name_does(project: TinyProject, name: str) -> None:
     assert kept(project) == before
 
 
-@pytest.mark.parametrize("name", ["../precious", "a/b", ".."])
+@pytest.mark.parametrize("name", ["../precious", "a/b", "..", "../../outside", "a/../../../outside"])
 def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str) -> None:
     """DVC deletes the outputs of a stage before it runs it: .dvcignore keeps them from being outputs."""
     with_subject(project, name)
@@ -69,6 +69,19 @@ def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str
     project.repro("--ignore-errors")
     project.repro("--single-item", f"capture@{name}")
     assert kept(project) == before
+
+
+@pytest.mark.parametrize("name", ["../../../farther", "a/../../../../../x/../farther"])
+def test_nor_far_outside(project: TinyProject, name: str) -> None:
+    """Past the project's folder .dvcignore says nothing: there an output is a dependency, too, which DVC refuses."""
+    path = project.root.parents[1] / "farther" / "capture" / "kept.txt"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("precious")
+    with_subject(project, name)
+    status, output = project.repro("--ignore-errors")
+    assert status != 0
+    assert "as both a dependency and an output" in output
+    assert path.read_text() == "precious"
 
 
 @pytest.mark.parametrize(
@@ -87,7 +100,7 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     before = kept(tiny)
     status, output = tiny.run("dvc", "exp", "run", "-S", change)
     assert status != 0
-    assert "not a name for a subject" in output
+    assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
     after = {name: digest for name, digest in kept(tiny).items() if ".git/" not in name}
     assert after == {name: digest for name, digest in before.items() if ".git/" not in name}
 
