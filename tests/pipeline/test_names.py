@@ -78,7 +78,7 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     for folder in ("outside/capture", "project"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "outside" / "capture" / "kept.txt").write_text("precious")
-    tiny = TinyProject(project_root, tmp_path / "project")
+    tiny = TinyProject(project_root, tmp_path / "project", own_code=True)
     (tiny.root / ".dvc" / "config").write_text("[core]\n    analytics = false\n")
     (tiny.root / ".gitignore").write_text("/data/*\n__pycache__\n")
     commit = ("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")

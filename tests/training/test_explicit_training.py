@@ -22,9 +22,18 @@ from facefolds_core.training.volume import fit as volume_fit
 from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
+ROUGH = ((24, 60), (48, 60))
+"""Levels of the starting volume, which takes most of the time."""
+ROUGHER = ((24, 40),)
+
 
 def _params(**values: object) -> TrainParams:
     return TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values})
+
+
+@pytest.fixture
+def rougher(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(volume_fit, "LEVELS", ROUGHER)
 
 
 def _held_out_psnr(scene: Scene, folder: Path) -> float:
@@ -46,7 +55,9 @@ def _held_out_psnr(scene: Scene, folder: Path) -> float:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("explicit")
     scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius)
-    train_explicit(scene, _params(), folder / "model", folder / "log")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(volume_fit, "LEVELS", ROUGH)
+        train_explicit(scene, _params(), folder / "model", folder / "log")
     return scene, folder / "model"
 
 
@@ -54,12 +65,19 @@ def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]
     assert _held_out_psnr(*trained) > 22
 
 
+@pytest.mark.nightly
+def test_it_is_from_a_whole_volume(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
+    assert _held_out_psnr(trained[0], tmp_path / "model") > 22
+
+
 def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
     names = {p.name for p in trained[1].iterdir()}
     assert names == {"model.safetensors", "model.json", "training.json", "fit.json", "fit.png"}
 
 
-def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(volume_fit, "LEVELS", ROUGH)
     train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
     a, b = (load_model(folder).state_dict() for folder in (trained[1], tmp_path / "model"))
     for name, tensor in a.items():
@@ -124,7 +142,9 @@ def test_plan_spends_all_iterations() -> None:
     assert levels[-1].texels == (128, 96)
 
 
-def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_divergence_is_reported(
+    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rougher: None
+) -> None:
     monkeypatch.setattr(TextureState, "step", lambda self, *args: float("nan"))
     with pytest.raises(UserError, match="diverged"):
         train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
@@ -132,7 +152,7 @@ def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, mon
 
 
 def test_divergence_is_rolled_back(
-    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rougher: None
 ) -> None:
     real, calls = TextureState.step, []
 
@@ -141,7 +161,7 @@ def test_divergence_is_rolled_back(
         return float("nan") if len(calls) == 30 else real(self, *args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(TextureState, "step", fail_once)
-    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
+    train_explicit(trained[0], _params(iterations=60), tmp_path / "model", tmp_path / "log")
     assert "diverged" in (tmp_path / "model" / "fit.json").read_text()
 
 
@@ -194,8 +214,9 @@ def test_pictures_without_a_subject_are_refused(tmp_path: Path, monkeypatch: pyt
 
 
 def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
-    trained: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    trained: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(volume_fit, "LEVELS", ROUGH)
     scene = make_scene(tmp_path / "scene", size=64, surface_radius=1.25 * OPAQUE[0].radius)
     train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
     assert "left out" in (tmp_path / "model" / "fit.json").read_text()

@@ -137,13 +137,18 @@ def test_environment_learns_what_it_is_shown() -> None:
     assert np.abs(seen - wanted).mean() < 0.06
 
 
-def test_a_sphere_is_found_from_images_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "levels, voxel", [(((24, 60), (48, 60)), 0.016), pytest.param(fit.LEVELS, 0.008, marks=pytest.mark.nightly)]
+)
+def test_a_sphere_is_found_from_images_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, levels: tuple[tuple[int, int], ...], voxel: float
+) -> None:
+    monkeypatch.setattr(fit, "LEVELS", levels)
     scene = make_scene(tmp_path, size=64)
     volume = outline.largest_body(fit.fit_volume(scene, 0, 0.3, tqdm(disable=True)))
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9))
-    # Voxels are 0.008 wide here.
-    assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=0.008)
+    assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=voxel)
 
 
 def test_cameras_that_look_elsewhere_are_refused(tmp_path: Path) -> None:
