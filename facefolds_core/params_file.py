@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from pydantic import ValidationError
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
-from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject
+from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
 from facefolds_core.parsing import brief, parse_yaml
 from facefolds_core.paths import check_path_text, check_subject_name
-
-T = TypeVar("T", bound=Section)
 
 
 class Params(Section):
@@ -44,33 +42,16 @@ class Params(Section):
     def stage(self, stage: str, subject: str) -> Section:
         """The section of `stage` for `subject`: params.yaml's values, then the subject's overrides."""
         overrides: dict[str, Any] = getattr(self.subject(subject), stage)
-        merged = _merge(self.sections.get(stage, {}), overrides)
+        values = merged(self.sections.get(stage, {}), overrides)
         place = f"{stage} (for subject {subject})" if overrides else stage
-        return _validate(STAGE_SECTIONS[stage], merged, self.path, place)
+        return section_of(stage, values, self.path, place)
 
 
-def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, value in override.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
-        merged[key] = _merge(merged[key], value) if both else value
-    return merged
-
-
-def _validate(kind: type[T], value: Any, file: str | Path, place: str) -> T:
+def _subject(name: str, entry: Any, path: Path) -> Subject:
     try:
-        return kind.model_validate(value)
+        return Subject.model_validate(entry)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join([place, *(str(part) for part in first["loc"])])
-        raise UserError(
-            "a parameter is wrong",
-            file=file,
-            place=where,
-            expected=first["msg"],
-            found=brief(first["input"]),
-            remedy="mend it; docs/subjects.md and facefolds_core/params.py describe all keys",
-        ) from None
+        raise user_error(error, (Subject,), path, f"subjects.{name}") from None
 
 
 def load_params(path: str | Path = "params.yaml") -> Params:
@@ -117,7 +98,7 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             )
     for name in value["subjects"]:
         check_subject_name(name, path)
-    subjects = {name: _validate(Subject, entry, path, f"subjects.{name}") for name, entry in value["subjects"].items()}
+    subjects = {name: _subject(name, entry, path) for name, entry in value["subjects"].items()}
     for name, subject in subjects.items():
         check_path_text(subject.path, name, path)
     params = Params(subjects=subjects, sections=sections, path=str(path))

@@ -8,6 +8,8 @@ Python's `json`: who reads a number checks it.
 from __future__ import annotations
 
 import json
+import re
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -91,7 +93,7 @@ def parse_yaml(text: str, file: str | Path, remedy: str) -> Any:
     import yaml  # here: what reads an asset needs parse_json only, and PyYAML comes with an extra
 
     try:
-        loader = yaml.SafeLoader(text)
+        loader = _yaml_loader()(text)
         node = loader.get_single_node()
         if node is None:
             return None
@@ -119,6 +121,22 @@ def parse_yaml(text: str, file: str | Path, remedy: str) -> Any:
         ) from None
     _check_numbers(value, file, remedy)
     return value
+
+
+@cache
+def _yaml_loader() -> Any:
+    """PyYAML follows YAML 1.1, in which 1e-3 is a text; DVC reads and writes YAML 1.2, in which it is a number."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        """Own tables of resolvers: those of SafeLoader stay as they are."""
+
+    Loader.add_implicit_resolver(
+        "tag:yaml.org,2002:float",
+        re.compile(r"[-+]?(?:[0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$"),
+        list("-+.0123456789"),
+    )
+    return Loader
 
 
 def _check_node(root: Any, file: str | Path, remedy: str) -> None:

@@ -37,7 +37,8 @@ def compress(folders: SubjectFolders) -> str:
 
     path, ladder = folders.surfaces / "surfaces.npz", {}
     if params.levels and holds_sheets(path):
-        ladder = decimated_ladder(read_sheets(path), [level.mesh_resolution**2 for level in params.levels])
+        counts = [level.mesh_resolution**2 for level in params.levels]
+        ladder = decimated_ladder(read_sheets(path), counts, read_stage(DecimateParams, folders.config))
 
     def decimate(resolution: int) -> list[TexturedMesh]:
         if ladder:

@@ -76,7 +76,8 @@ def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None
                 place=f"layer {layer} (0 is the outermost)",
                 expected="a surface in front of the sphere centre",
                 found="no crossing",
-                remedy="train longer, with fewer layers (train.layers) or a smaller train.level_halfwidth",
+                remedy="train longer, with fewer layers (train.layers) or a smaller distance between them "
+                "(train.geometry.halfwidth; train.level_halfwidth of the perceptrons)",
             )
 
 

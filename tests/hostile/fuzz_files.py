@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 import torch
 
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config import read_subject, read_train
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
@@ -40,7 +40,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.storage import ModelSpec, build_model, load_model, save_model
-from facefolds_core.params import Subject, TrainParams
+from facefolds_core.params import Subject
 from facefolds_core.params_file import Params, write_configs
 from facefolds_core.reporting.facts import read_images
 from tests.ellipsoids import Ellipsoids
@@ -134,7 +134,7 @@ KINDS = (
     Kind(("surfaces/surfaces.npz",), _surfaces),
     Kind(("meshes/meshes.npz",), _meshes),
     Kind(("model/model.safetensors", "model/model.json"), _quiet(lambda folder: load_model(folder / "model"))),
-    Kind(("config/train.json",), _quiet(lambda folder: read_stage(TrainParams, folder / "config"))),
+    Kind(("config/train.json",), _quiet(lambda folder: read_train(folder / "config"))),
     Kind(("config/subject.json",), _quiet(lambda folder: read_subject(folder / "config"))),
     Kind(
         ("evaluation/per_image.parquet",), _quiet(lambda folder: read_images(folder / "evaluation/per_image.parquet"))

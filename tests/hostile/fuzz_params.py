@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from facefolds_core.config import read_stage, read_subject
-from facefolds_core.params import STAGE_SECTIONS
+from facefolds_core.config import read_stage, read_subject, read_train
+from facefolds_core.params import SECTIONS, STAGE_SECTIONS
 from facefolds_core.params_file import idle_keys, load_params, write_configs
 from facefolds_core.paths import SubjectFolders, check_capture_place, subject_folders
 from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
@@ -136,8 +136,10 @@ def _read_damaged_config(folder: Path, random: np.random.Generator) -> None:
     path.write_bytes(content)
     if name == "subject":
         read_subject(folders.config)
+    elif name == "train":
+        read_train(folders.config)
     else:
-        read_stage(STAGE_SECTIONS[name], folders.config)
+        read_stage(SECTIONS[name][0], folders.config)
 
 
 def _pick(choices: Any, random: np.random.Generator) -> Any:

@@ -24,12 +24,13 @@ SCRIPTS = {
         show(picture.rgb, picture.opacity, picture.depth, tracked_mesh(0.3).vertices)
     """,
     "train": """
-        from facefolds_core.params import TrainParams
+        from facefolds_core.params import ExplicitParams
         from facefolds_core.training.explicit.loop import train_explicit
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius)
-        params = TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 4, "iterations": 183})
+        volume = {"levels": [{"resolution": 16, "iterations": 20}, {"resolution": 32, "iterations": 20}]}
+        params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183, "volume": volume})
         train_explicit(scene, params, folder / "model", folder / "log")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,

@@ -10,9 +10,8 @@ import torch
 from facefolds_core import scatter
 from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.model.grids import GridTextures
-from facefolds_core.params import TrainParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
-from facefolds_core.training.explicit.loop import BACKGROUND_RATE, FAINT, LATE_VEIL
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
@@ -35,11 +34,12 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
     }
 
 
-FAST = TrainParams()
+FAST = ExplicitParams()
+OPACITY, LATE, RATE = FAST.losses.opacity, FAST.losses.late_opacity, FAST.background.rate
 SETTINGS = {
-    "rounds of geometry": (FAST.lambda_veil, 0.0, BACKGROUND_RATE, 0.0),
-    "textures": (FAST.lambda_veil * LATE_VEIL, FAST.lambda_solid, BACKGROUND_RATE, FAINT),
-    "stronger": (0.02, 0.05, BACKGROUND_RATE, 0.05),
+    "rounds of geometry": (OPACITY, 0.0, RATE, 0.0),
+    "textures": (OPACITY * LATE, FAST.losses.binarisation, RATE, FAST.textures.min_alpha),
+    "stronger": (0.02, 0.05, RATE, 0.05),
 }
 """Prices of opacity and half opacity, the background's rate, what is faint: as in production, and one that shows."""
 

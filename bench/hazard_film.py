@@ -1,0 +1,150 @@
+"""Pictures in memory: what hazards change, and the clean views that every cell is scored on."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures import actor
+from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, make_rig, write_capture
+from facefolds_core.captures.assembly import plan_scene, write_plan
+from facefolds_core.captures.multiface import read_multiface
+from facefolds_core.captures.scene import Scene, Split, read_scene, write_scene
+from facefolds_core.files import atomic_folder
+from facefolds_core.frame_store import Image, write_frames
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+
+EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "-85": -85.0}
+"""Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; the outermost training cameras lie
+at 72."""
+EXTREME_ELEVATION = 5.0
+
+
+@dataclass(frozen=True)
+class Film:
+    """A capture of the actor: one whole cycle of its performance, every twelfth camera of the rig held out."""
+
+    options: ActorOptions = field(default_factory=ActorOptions)
+    cameras: int = 24
+    frames: int = 4
+    height: int = 96
+    width: int = 64
+
+    @property
+    def key(self) -> str:
+        """Names the film and the code that makes it."""
+        return sha256(f"{self!r} {source_digest()}".encode()).hexdigest()[:16]
+
+
+def source_digest() -> int:
+    """CRC-32 of the sources of the actor."""
+    digest = 0
+    for path in sorted(Path(actor.__file__).parent.glob("*.py")):
+        digest = zlib.crc32(path.read_bytes(), digest)
+    return digest
+
+
+@dataclass(frozen=True)
+class Shots:
+    """A normalised scene with its pictures.
+
+    Attributes:
+        images: (camera, frame) -> (H, W, 3) uint8.
+        masks: the same of held-out cameras -> (H, W, 1) uint8.
+        surface: tracked mesh, vertices (K, V, 3) and faces (F, 3), or None.
+    """
+
+    scene: Scene
+    images: dict[tuple[int, int], Image]
+    masks: dict[tuple[int, int], Image]
+    surface: tuple[NDArray[np.float32], NDArray[np.int32]] | None
+
+
+def shoot(film: Film, cache: Path) -> Shots:
+    """The film through the pipeline's own reader; rendered once, then kept in `cache`."""
+    folder = cache / film.key
+    if not (folder / "scene.json").exists():
+        params = CaptureParams(cameras=film.cameras, frames=film.frames, height=film.height, width=film.width)
+        extremes = [camera_at(name, a, EXTREME_ELEVATION, film.width, film.height) for name, a in EXTREMES.items()]
+        rig = make_rig(params).cameras
+        subject = Subject(source="actor", path="", holdout=tuple(c.name for c in [*rig[11::12], *extremes]))
+        with TemporaryDirectory() as raw:
+            write_capture(raw, params, options=film.options, rig=ActorRig((*rig, *extremes)))
+            capture = read_multiface(Path(raw), subject, params.fps)
+            write_plan(plan_scene(capture, "actor", subject, NormalizeParams(), folder), NormalizeParams())
+    return read_shots(folder)
+
+
+def read_shots(folder: Path) -> Shots:
+    """A scene's folder, whole in memory."""
+    scene = read_scene(folder)
+    frames, masks = scene.open_frames(), scene.open_masks()
+    images = {key: frames.image(*key).copy() for key in frames}
+    return Shots(
+        scene, images, {key: masks.image(*key).copy() for key in masks or ()} if masks else {}, scene.load_surface()
+    )
+
+
+def write_shots(shots: Shots, folder: Path) -> Scene:
+    """What the trainers read."""
+    size = shots.scene.height, shots.scene.width
+    with atomic_folder(folder) as temporary:
+        write_scene(shots.scene, temporary)
+        for name, channels, images in (("frames", 3, shots.images), ("masks", 1, shots.masks)):
+            if images:
+                rows = ((*key, image) for key, image in sorted(images.items()))
+                write_frames(temporary / f"{name}.arrow", (*size, channels), rows)
+        if shots.surface is not None:
+            np.savez(temporary / "surface.npz", vertices=shots.surface[0], faces=shots.surface[1])
+    return read_scene(folder)
+
+
+def keep_cameras(shots: Shots, kept: list[int]) -> Shots:
+    """Only these cameras, in their order."""
+    place = {camera: position for position, camera in enumerate(kept)}
+    scene = replace(
+        shots.scene,
+        cameras=tuple(shots.scene.cameras[i] for i in kept),
+        splits=tuple(shots.scene.splits[i] for i in kept),
+    )
+    images, masks = (
+        {(place[c], k): image for (c, k), image in pictures.items() if c in place}
+        for pictures in (shots.images, shots.masks)
+    )
+    return replace(shots, scene=scene, images=images, masks=masks)
+
+
+def of_split(shots: Shots, split: Split) -> Shots:
+    """The training or the held-out cameras alone."""
+    return keep_cameras(shots, shots.scene.indices(split))
+
+
+def keep_frames(shots: Shots, kept: list[int]) -> Shots:
+    """Only these frames; they keep their times."""
+    place = {frame: position for position, frame in enumerate(kept)}
+    scene = replace(shots.scene, frame_ids=tuple(shots.scene.frame_ids[k] for k in kept), times=shots.scene.times[kept])
+    images, masks = (
+        {(c, place[k]): image for (c, k), image in pictures.items() if k in place}
+        for pictures in (shots.images, shots.masks)
+    )
+    surface = None if shots.surface is None else (shots.surface[0][kept], shots.surface[1])
+    return replace(shots, scene=scene, images=images, masks=masks, surface=surface)
+
+
+def map_cameras(shots: Shots, change: Callable[[int, Camera], Camera]) -> Shots:
+    """`change` is given the index and the camera."""
+    cameras = tuple(change(i, camera) for i, camera in enumerate(shots.scene.cameras))
+    return replace(shots, scene=replace(shots.scene, cameras=cameras))
+
+
+def map_images(shots: Shots, change: Callable[[int, Image], Image]) -> Shots:
+    """`change` is given the camera's index and the picture."""
+    return replace(shots, images={key: change(key[0], image) for key, image in shots.images.items()})
