@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, sync_playwright
 from tests.chromium import BROWSERS, Chromium, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
-BROWSER = ("tests/viewer/", "tests/reporting/test_browser.py")
+BROWSER = ("tests/viewer/", "tests/reporting/test_browser.py", "tests/core/test_chromium.py")
 LONGEST = ("tests/pipeline/test_end_to_end", *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
 """What several workers begin with."""
 
@@ -57,8 +57,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.is_relative_to(ROOT / "tests" / "pipeline"):
             item.add_marker(pytest.mark.pipeline)
-        if {"chromium", "player_folder"} & set(getattr(item, "fixturenames", ())):
+        fixtures = getattr(item, "fixturenames", ())
+        if "chromium" in fixtures or "player_folder" in fixtures:
             item.add_marker(pytest.mark.browser)
+        if "browser" in fixtures:
             item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["TargetClosedError"]))
     items.sort(key=lambda item: _rank(item.nodeid))
 

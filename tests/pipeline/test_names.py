@@ -51,6 +51,7 @@ def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, command: 
     assert kept(project) == before
 
 
+@pytest.mark.nightly  # tests/core/test_names.py refuses the same names, without DVC
 @pytest.mark.parametrize("name", [*SHELL[2:], *PATHS[2:]])
 def test_no_other_name_does(project: TinyProject, name: str) -> None:
     with_subject(project, name)

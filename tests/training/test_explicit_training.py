@@ -22,6 +22,8 @@ from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
+pytestmark = pytest.mark.slow
+
 GEOMETRY, MESH = ExplicitParams().geometry, ExplicitParams().mesh
 
 

@@ -113,6 +113,7 @@ def test_learning_rates_decay_exponentially() -> None:
     assert rates == pytest.approx({"manifold": 7e-4 * 0.05**2, "texture": 1e-3 * 0.2**2})
 
 
+@pytest.mark.slow
 def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
     # One textured opaque sphere of radius 0.33; the single layer starts 0.02 too far out and must move in.
     scene = make_scene(tmp_path, OPAQUE, size=48, frames=1)

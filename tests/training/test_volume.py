@@ -155,6 +155,7 @@ def test_environment_learns_what_it_is_shown() -> None:
     assert np.abs(seen - wanted).mean() < 0.06
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", [48, pytest.param(96, marks=pytest.mark.nightly)])
 def test_a_sphere_is_found_from_images_alone(tmp_path: Path, resolution: int) -> None:
     scene = make_scene(tmp_path, size=64)
