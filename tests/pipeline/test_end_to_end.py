@@ -140,7 +140,10 @@ def unfinished(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     [
         (PARAMS.replace("every: 4", "every: 1"), "holdout"),
         (PARAMS.replace("{every: 4}", "[nobody]"), "nobody"),
-        (PARAMS.replace("normalize: {}", "normalize: {max_azimuth: 0.001}"), "azimuth"),
+        (PARAMS.replace("normalize: {}", "normalize: {max_azimuth: 0.001, max_elevation: 0.001}"), "azimuths up to"),
+        pytest.param(  # one camera is left, and trained on
+            PARAMS.replace("normalize: {}", "normalize: {max_azimuth: 0.001}"), "azimuth", marks=pytest.mark.nightly
+        ),
         (PARAMS + "texure: {}\n", "texure"),
         (PARAMS.replace("subjects:", "subjects: ["), "line"),
     ],
