@@ -23,22 +23,11 @@ subjects:
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     normalize: {stabilize: true}
-    train: {iterations: 10, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
-  killed:
-    source: actor
-    path: facefolds_core/captures/actor
-    holdout: {every: 4}
-    train: {iterations: 400, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+    train: {iterations: 300, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
   fast:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {preset: fast, layers: 3, iterations: 130}
-  fast_stabilised:
-    source: actor
-    path: facefolds_core/captures/actor
-    holdout: {every: 4}
-    normalize: {stabilize: true}
     train:
       preset: fast
       layers: 3
