@@ -113,7 +113,7 @@ class TinyProject:
         with chdir(self.root), redirect_stdout(said), redirect_stderr(said):
             sys.argv = [name, "--subject", "actor"]
             try:
-                runpy.run_module(f"stages.{name}", run_name="__main__")
+                runpy.run_path(str(self.root / "stages" / f"{name}.py"), run_name="__main__")
             except SystemExit as end:
                 return int(end.code or 0), said.getvalue()
             finally:
