@@ -57,7 +57,7 @@ VICTIMS = ("dvc", "stage", "group")
 
 
 def target(stage: str) -> str:
-    """What DVC calls the subject's stage; `configure` is all subjects'."""
+    """What DVC calls the stage."""
     return stage if stage == "configure" else f"{stage}@{NAME}"
 
 
@@ -94,10 +94,16 @@ class Project:
     def one(self, stage: str) -> tuple[str, ...]:
         return ("dvc", "repro", "--force", "--single-item", target(stage))
 
+    def made(self) -> dict[str, str]:
+        """Digests of what all stages made."""
+        data = self.data.parent
+        beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(data / n).items()}
+        return {**digests(self.data), **beside}
+
     def untouched(self) -> dict[str, str]:
         """What is neither a stage's output nor DVC's own."""
         found = fingerprint(self.tiny.root)
-        own = (f"data/{NAME}", ".dvc", "dvc.lock")
+        own = (f"data/{NAME}", "data/.config", "data/.code", "data/.timings", "data/.locks", ".dvc", "dvc.lock")
         kept = f"data/{NAME}/.mygame-settings"
         return {k: v for k, v in found.items() if k.startswith(kept) or not k.startswith(own)}
 
@@ -118,7 +124,7 @@ def prepare(folder: Path, stages: tuple[str, ...]) -> Project:
     for stage in stages:
         status, output = tiny.run("dvc", "repro", "--single-item", target(stage))
         assert status == 0, output
-    project.results = digests(project.data)
+    project.results = project.made()
     shutil.copy(project.lock, folder / "base.lock")
     for stage in stages[-1:] if len(stages) < len(STAGES) else stages:
         project.seconds[stage] = _timed(tiny, *project.one(stage))
@@ -183,7 +189,7 @@ def _recover(project: Project, command: tuple[str, ...], what: str, counts: Coun
             counts.add(what, Outcome("crashed", f"{' '.join(step)}: {output[-600:]}"))
             return
     counts.add(what, Outcome("accepted"))
-    found = digests(project.data)
+    found = project.made()
     wrong = sorted(name for name in {*found, *project.results} if found.get(name) != project.results.get(name))
     if wrong:
         counts.kept_wrong.append(f"{what}: other results than undisturbed: {', '.join(wrong)}")

@@ -15,7 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import MlpParams, train_params
-from facefolds_core.training import loop, patience
+from facefolds_core.training import loop, patience, trained
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.rays import RaySampler
@@ -315,7 +315,7 @@ def test_a_model_that_could_not_be_written_is_not_trained_again(
 
     with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
         patched.setattr(patience, "SECONDS", 0.0)
-        patched.setattr(loop, "save_model", full)
+        patched.setattr(trained, "save_model", full)
         run(scene, params(), tmp_path)
     assert caught.value.filename == str(tmp_path / "model")
     monkeypatch.setattr(loop, "train_step", None)  # nothing is left to be done
