@@ -1,5 +1,7 @@
 # make repro   set up, then run the pipeline for every subject in params.yaml
-# make test    set up, then run the tests
+# make check   set up, then the fast tests, and lint: before each commit
+# make test    set up, then run the tests, all but those marked `nightly`, on as many processes as there are cores (WORKERS=1 for one)
+# make nightly set up, then run all tests: what `nightly` marks shows at length what another test shows
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
@@ -16,14 +18,25 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint lint-player wheel bench charts blender clean
+# Tests with threads of their own need two; more would wait for one another.
+WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+
+.PHONY: repro check test nightly view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
+check: $(READY)
+	$(PYTEST) -m "not (slow or pipeline or browser or nightly)"
+	@$(MAKE) --no-print-directory lint
+
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(PYTEST) -m "not nightly"
+
+nightly: $(READY)
+	$(PYTEST)
 
 view: $(READY) $(PLAYER)
 	$(BIN)/facefolds view $(ASSET)

@@ -19,7 +19,7 @@ from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
-from facefolds_core.facts import fact
+from facefolds_core.facts import Fact, fact
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import FrameStore, Image, write_frames
 from facefolds_core.geometry.cameras import Camera
@@ -167,7 +167,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     return scene
 
 
-def _doubts(plan: Plan, written: Path) -> list[str]:
+def _doubts(plan: Plan, written: Path) -> list[Fact]:
     """A note if the pictures of the first frame do not agree about the tracked mesh."""
     tracking = plan.capture.tracking
     if plan.vertices is None or tracking is None or tracking.faces is None:
@@ -178,10 +178,7 @@ def _doubts(plan: Plan, written: Path) -> list[str]:
     found = agreement(cameras, vertices, tracking.faces, lambda i: store.image(first[i], 0))
     if found is None or found >= AGREE:
         return []
-    return [
-        f"note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation {found:.2f}; of "
-        "sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh another's?"
-    ]
+    return [fact("pictures_disagree", correlation=found)]
 
 
 def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:

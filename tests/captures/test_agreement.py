@@ -46,7 +46,7 @@ def changed(capture: Capture, change: Callable[[list[Camera]], list[Camera]]) ->
 def notes(capture: Capture, folder: Path) -> list[str]:
     params = NormalizeParams()
     scene = write_plan(plan_scene(capture, "actor", subject(capture.root), params, folder), params)
-    return [line for line in scene.left_out if "do not agree" in line]
+    return [str(line) for line in scene.left_out if line.kind == "pictures_disagree"]
 
 
 def test_a_sound_capture_gets_no_note(capture: Capture, tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.training.trained import Trained
 from tests.scenes import OPAQUE, make_scene
 
+pytestmark = pytest.mark.slow
+
 SMALL = {
     "sample": {"resolution": 48},
     "decimate": {"resolution": 10},

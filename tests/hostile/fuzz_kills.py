@@ -117,9 +117,6 @@ class Project:
 def prepare(folder: Path, stages: tuple[str, ...]) -> Project:
     """Run the pipeline undisturbed; note what it makes and how long it takes."""
     tiny = TinyProject(ROOT, folder, PARAMS)
-    for name in ("stages", "facefolds_core"):  # links: what numba compiled once is found again
-        shutil.rmtree(folder / name)
-        (folder / name).symlink_to(ROOT / name)
     for name in (f"data/{NAME}/.mygame-settings/a", "data/other/b"):
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text("a user's file")

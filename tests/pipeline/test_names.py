@@ -51,6 +51,7 @@ def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, command: 
     assert kept(project) == before
 
 
+@pytest.mark.nightly  # tests/core/test_names.py refuses the same names, without DVC
 @pytest.mark.parametrize("name", [*SHELL[2:], *PATHS[2:]])
 def test_no_other_name_does(project: TinyProject, name: str) -> None:
     with_subject(project, name)
@@ -91,7 +92,7 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     for folder in ("outside/capture", "project"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "outside" / "capture" / "kept.txt").write_text("precious")
-    tiny = TinyProject(project_root, tmp_path / "project")
+    tiny = TinyProject(project_root, tmp_path / "project", own_code=True)
     (tiny.root / ".dvc" / "config").write_text("[core]\n    analytics = false\n")
     (tiny.root / ".gitignore").write_text("/data/*\n__pycache__\n")
     commit = ("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")
