@@ -17,7 +17,6 @@ from facefolds_core.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 Clock = Literal["wall", "processor"]
-Name = Literal["layers", "mesh", "texture"]
 Means = dict[str, float | None]
 
 
@@ -117,31 +116,22 @@ class Cell(Entry):
 
 
 class Row(Entry):
-    """An asset with one value of its subject's configuration changed (bench/sweeps.py).
+    """An asset with a few values of its subject's configuration changed (bench/sweeps.py).
 
     Attributes:
-        params: "section.key" -> value of what differs.
-        digest: of configuration, code and data, where it was measured without DVC.
-        scores, cost: of metrics.json; empty if it failed.
-        pictures_a_second: that the OpenGL renderer draws; 0 where not measured.
-        train_seconds, export_seconds: of the stages that the change concerns, on `clock` ("processor": all threads
-            together); 0 where they were not run for it.
+        params: "section.key" -> value of what differs, numbers only.
+        figures: scores of the asset and costs, as `facefolds collect` has them, and pictures a second that `renderer`
+            draws; empty if it failed.
     """
 
-    sweep: Name
+    sweep: str
     subject: str
     value: Annotated[int, Field(ge=1)]
-    params: dict[str, int]
-    digest: str = ""
+    params: dict[str, int | float]
     commit: str
     machine: str
-    scores: Means = {}
-    cost: dict[str, int] = {}
-    pictures_a_second: float = 0.0
+    figures: dict[str, float] = {}
     renderer: str = ""
-    clock: Clock = "wall"
-    train_seconds: float = 0.0
-    export_seconds: float = 0.0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -149,13 +139,13 @@ class Row(Entry):
 
     @property
     def bytes(self) -> int:
-        return self.cost["mesh_bytes"] + self.cost["texture_bytes"]
+        """Of meshes and texture video."""
+        return int(self.figures["mesh_bytes"] + self.figures["texture_bytes"])
 
     @property
-    def psnr(self) -> float | None:
-        """Of the subject, where the capture has masks; else of the whole frame."""
-        subject = self.scores.get("psnr_subject")
-        return self.scores.get("psnr") if subject is None else subject
+    def psnr(self) -> float:
+        """Of the subject, where the capture has masks; else of the whole frame. Nothing of a failed one."""
+        return self.figures.get("psnr_subject", self.figures.get("psnr", float("nan")))
 
 
 Kind = TypeVar("Kind", bound=Entry)
