@@ -207,7 +207,11 @@ def own_spots(rows: Sequence[Row], cost: str) -> dict[str, list[tuple[int, float
     found: dict[str, list[tuple[int, float, float]]] = {sweep: [] for sweep in SWEEPS}
     for row in sorted(rows, key=lambda row: row.value):
         if not row.failure:
-            x = {"bytes": row.bytes, "triangles": row.figures["triangles"], "pictures": row.figures.get("pictures_a_second")}[cost]
+            x = {
+                "bytes": row.bytes,
+                "triangles": row.figures["triangles"],
+                "pictures": row.figures.get("pictures_a_second"),
+            }[cost]
             found[row.sweep] += [(row.value, x, row.psnr)] if x else []
     return found
 

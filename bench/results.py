@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Generic, Literal, TypeVar
@@ -174,6 +175,15 @@ class Store(Generic[Kind]):
         except (KeyError, TypeError, ValueError) as error:
             raise UserError("garbled results", file=self.path, found=str(error)[:300], remedy=remedy) from None
 
+    def fill(self, blanks: Iterable[Kind], measure: Callable[[Kind], Kind], force: bool = False) -> Iterator[Kind]:
+        """Measure what is not there (or all), and keep each as soon as it is measured."""
+        done = set() if force else {entry.key for entry in self.read()}
+        for blank in blanks:
+            if blank.key not in done:
+                found = measure(blank)
+                self.add(found)
+                yield found
+
     def add(self, entry: Kind) -> None:
         """Keep it in place of the same one measured before. The file is read again: others may have added to it."""
         kept = [other for other in self.read() if other.key != entry.key]
@@ -193,16 +203,12 @@ def mean(values: list[float | None]) -> float | None:
 
 def commit_name(folder: Path = ROOT) -> str:
     """First 12 digits of the commit, "+" if tracked files differ from it; "unknown" outside a git checkout."""
-
-    def git(*arguments: str) -> str:
-        done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, check=False)
-        return done.stdout.strip()
-
-    commit = git("rev-parse", "--short=12", "HEAD")
     # Results themselves are tracked: they must not make their own commit look changed.
     own = [f":(top,exclude){path}" for path in ("bench/results", "docs/images")]
-    changed = "+" if git("status", "--porcelain", "-uno", "--", ":/", *own) else ""
-    return commit + changed or "unknown"
+    commands = ["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "-uno", "--", ":/", *own]
+    said = [subprocess.run(["git", "-C", folder, *c], capture_output=True, text=True, check=False) for c in commands]
+    commit, changed = (done.stdout.strip() for done in said)
+    return commit + ("+" if changed else "") or "unknown"
 
 
 def machine_name(device: str) -> str:

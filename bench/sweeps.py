@@ -104,7 +104,9 @@ def queue_cell(name: str, value: int, subject: str) -> None:
     Raises:
         UserError: with DVC's own words, if it refuses.
     """
-    options = [f"++subjects.{subject}.{key}={json.dumps(given)}" for key, given in changes(name, value, subject).items()]
+    options = [
+        f"++subjects.{subject}.{key}={json.dumps(given)}" for key, given in changes(name, value, subject).items()
+    ]
     overrides = [part for option in options for part in ("-S", option)]
     command = ["exp", "run", "--quiet", "--queue", "--name", f"{name}-{subject}-{value}", *overrides]
     done = subprocess.run(

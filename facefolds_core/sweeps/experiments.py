@@ -52,7 +52,8 @@ def runs_of(shown: Any, distinct: bool = True) -> tuple[list[Run], int]:
     measured = {run.subject for run in runs if run.figures}
     known = [run for run in runs if run.figures or (run.error and (run.subject in measured or not measured))]
     subjects = sorted({run.subject for run in known})
-    return [row for subject in subjects for row in _rows([run for run in known if run.subject == subject], distinct)], pending
+    groups = [[run for run in known if run.subject == subject] for subject in subjects]
+    return [row for group in groups for row in _rows(group, distinct)], pending
 
 
 def _revisions(shown: Any) -> Iterator[_Shown]:
