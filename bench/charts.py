@@ -282,7 +282,7 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter("{x:g}")
         axes.grid(True, alpha=0.3)
-        axes.legend()
+        axes.legend(loc="lower right")
 
 
 def waterfall(found: Mapping[str, Sequence[Mapping[str, Any]]], path: Path) -> None:

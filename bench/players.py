@@ -1,6 +1,6 @@
 """Pictures a second in a browser: `python -m bench.players data/actor/asset`.
 
-Assets as they ship (coarser or finer ones: docs/results.md), a Gaussian-splat player from
+Assets as they ship (coarser or finer ones: docs/research/ablations.md), a Gaussian-splat player from
 npm with splats of the first one's head, and one opaque mesh as the floor: in the same browser, one after the other,
 from the same cameras. A picture's time runs until its pixels can be read back; nothing waits for a screen. Also: time
 and bytes to the first picture, and memory. Needs Chromium, npm, and the player that `make view` builds.

@@ -1,9 +1,9 @@
 """The paper's ablations, and bytes against accuracy: a DVC experiment a cell, and what became of it.
 
 python -m bench.sweeps queue mesh      layers, mesh, texture, or rate: the paper's export and ours at five rates
-dvc exp run --run-all                  runs what was queued (or `dvc queue start -j 2`: docs/sweeps.md)
+dvc exp run --run-all                  runs what was queued (or `dvc queue start -j 2`: docs/guide/sweeps.md)
 python -m bench.sweeps collect         what has ended, into bench/results/sweeps.json
-python -m bench.sweeps draw            the tables of docs/results.md and the charts, from what is there
+python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there
 
 A cell is the subject's own configuration with a few values changed. Stages that cells share run once.
 """
@@ -38,7 +38,7 @@ from facefolds_core.sweeps.table import Run, write_runs
 
 RESULTS = Path("bench/results/sweeps.json")
 IMAGES = Path("docs/images")
-DOCUMENT = Path("docs/results.md")
+DOCUMENT = Path("docs/research/ablations.md")
 RATE_FRAMES = 60
 """Of the actor: codecs are compared honestly only on sequences of real length."""
 FACTORS = (17, 22, 27, 32, 38)
