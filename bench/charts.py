@@ -127,15 +127,12 @@ def _speed_panel(axes: Axes, measurements: Sequence[Measurement], name: str) -> 
 def conditions_text(data: Sequence[Measurement]) -> str:
     """Clock, machine, commits and dates of what is drawn, one line."""
     at = max(data, key=lambda m: m.date).conditions
-    wall, shared = (
-        f"wall clock, {at.threads} threads",
-        f"processor time / {at.threads} (a machine shared with other work)",
-    )
+    shared = f"processor time / {at.threads} (a machine shared with other work)"
+    clock = shared if at.clock == "processor" else f"wall clock, {at.threads} threads"
     commits: dict[str, set[str]] = defaultdict(set)
     for m in data:
         commits[m.preset].add(m.conditions.commit[:8])
     made = ", ".join(f"{preset} {'/'.join(sorted(names))}" for preset, names in commits.items())
-    clock = wall if at.clock == "wall" else shared
     return f"{clock}; {at.machine}; {_dates([m.date for m in data])}; commits: {made}"
 
 
