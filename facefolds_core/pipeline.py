@@ -114,7 +114,7 @@ def evaluate(
     params: EvaluateParams | None = None,
     perceptual: Perceptual | None = None,
 ) -> Evaluation:
-    """Score an asset, and the model that it was made of, on the scene's held-out cameras (docs/metrics.md).
+    """Score an asset, and the model that it was made of, on the scene's held-out cameras (docs/reference/metrics.md).
 
     Args:
         perceptual: the perceptual metrics; by default those whose weights are on this machine.
