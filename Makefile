@@ -70,7 +70,10 @@ bench: $(READY)
 
 charts: repro
 	$(BIN)/python -m bench.export_waterfall --chart
-	$(BIN)/python -m bench.sweeps rate
+	$(BIN)/python -m bench.sweeps queue rate
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc exp run --run-all
+	$(BIN)/python -m bench.sweeps collect
+	$(BIN)/python -m bench.sweeps draw
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'

@@ -194,12 +194,10 @@ def main(
     """Measure the matrix, draw it, print its tables and write them into docs/research/hazards.md."""
     with report_user_errors("hazards"):
         store = Store(results, "cells", Cell)
-        done = set() if force else {cell.key for cell in store.read()}
         if not draw_only:
-            for blank in plan(subject, [k for k in only.split(",") if k], presets.split(","), seeds):
-                if blank.key not in done:
-                    store.add(run_cell(blank, data, data / "bench" / "films"))
-                    typer.echo(f"hazards: {describe(store.read()[-1])}")
+            blanks = plan(subject, [k for k in only.split(",") if k], presets.split(","), seeds)
+            for cell in store.fill(blanks, lambda blank: run_cell(blank, data, data / "bench" / "films"), force):
+                typer.echo(f"hazards: {describe(cell)}")
         text = hazard_tables(store.read())
         typer.echo(f"\n{text}")
         if results == RESULTS:
