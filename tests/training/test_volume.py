@@ -19,6 +19,8 @@ from facefolds_core.training.volume import fit, kernel, outline, reference
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
 from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.room import Room
+from facefolds_core.training.volume.subject import subject_of
 from tests.scenes import OPAQUE, make_scene
 
 LOWER = np.array([-0.4, -0.3, -0.35])
@@ -85,7 +87,9 @@ def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -
     grid = np.zeros((91, 91, 91, 4), np.float32)
     grid[..., 0] = (inside / 0.01 * 10).clip(-kernel.LIMIT, kernel.LIMIT)
     grid[..., 1] = 1
-    return Volume(grid, np.full(3, -0.45), 0.01, Environment(np.zeros(3, np.float32), 1.0), 0, 30.0, CameraFit.alike(1))
+    return Volume(
+        grid, np.full(3, -0.45), 0.01, Room(np.zeros(3, np.float32), 1.0, 0.45, 4), 0, 30.0, CameraFit.alike(1)
+    )
 
 
 def test_profile_of_a_ball() -> None:
@@ -111,7 +115,7 @@ def test_what_floats_is_removed() -> None:
     both = replace(ball, grid=np.where(crumb.grid[..., :1] > ball.grid[..., :1], crumb.grid, ball.grid))
     outward = np.array([[1.0, 0.0, 0.0]])
     assert outline.profile(both, np.zeros(3), outward).radius[0] == pytest.approx(0.43, abs=0.01)
-    cleaned = outline.largest_body(both)
+    cleaned = subject_of(both)
     assert outline.profile(cleaned, np.zeros(3), outward).radius[0] == pytest.approx(0.25, abs=0.01)
 
 
@@ -139,7 +143,7 @@ def test_environment_learns_what_it_is_shown() -> None:
 
 def test_a_sphere_is_found_from_images_alone(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, size=64)
-    volume = outline.largest_body(fit.fit_volume(scene, 0, 0.3, tqdm(disable=True)))
+    volume = subject_of(fit.fit_volume(scene, 0, 0.3, tqdm(disable=True)))
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9))
     # Voxels are 0.008 wide here.

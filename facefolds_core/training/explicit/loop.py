@@ -32,7 +32,7 @@ from facefolds_core.training.explicit.views import Images, Views, check_images, 
 from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
-from facefolds_core.training.volume.outline import largest_body
+from facefolds_core.training.volume.subject import subject_of
 
 RAYS_PER_TEXEL = 2.5
 """Of one frame, in one step."""
@@ -128,7 +128,7 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=iterations() + params.iterations, desc="train", unit="it")
-        volume = largest_body(fit_volume(scene, params.seed, params.lr_volume, bar))
+        volume = subject_of(fit_volume(scene, params.seed, params.lr_volume, bar))
         cameras = choose_cameras(scene, volume.cameras)
         for note in cameras.notes:
             bar.write(f"train: {note}")

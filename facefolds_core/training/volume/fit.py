@@ -1,7 +1,7 @@
 """Fit a volume to the training images of one frame, without masks, mesh or any other guess of where the subject is.
 
 The box holds what enough cameras see near the scene's origin. It starts as fog, half opaque; behind it stands the
-environment (`environment.py`). Where cameras disagree the fog clears, where they agree it thickens."""
+room (`room.py`). Where cameras disagree the fog clears, where they agree it thickens."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
-from facefolds_core.training.volume.environment import Environment
+from facefolds_core.training.volume.room import Room
 
 Array = NDArray[np.float32]
 
@@ -50,6 +50,9 @@ PIXEL = 0.7
 LEVELS = ((48, 120), (96, 120))
 """Voxels along the longest side, and iterations."""
 
+ROOM = (48, 80)
+"""Voxels a side of the outer zone, by level."""
+
 EVIDENCE = 0.005
 """Squared colour distance, summed over channels, from what lies behind: a voxel whose rays are all nearer to it is
 cleared. It explains nothing that the background does not, as a dark shell before a dark wall."""
@@ -66,7 +69,7 @@ class Volume:
         grid: (X, Y, Z, 4) raw density and rgb; the optical depth of a voxel is softplus(raw).
         lower: (3,) position of voxel (0, 0, 0), units.
         voxel: its side, units.
-        environment: what is behind.
+        room: what is behind.
         frame: index of the frame that it was fitted to.
         psnr: on the training rays of the last iterations, dB.
         cameras: what single training cameras do differently.
@@ -75,7 +78,7 @@ class Volume:
     grid: Array
     lower: NDArray[np.float64]
     voxel: float
-    environment: Environment
+    room: Room
     frame: int
     psnr: float
     cameras: CameraFit
@@ -151,7 +154,8 @@ def fit_volume(scene: Scene, seed: int, rate: float, bar: tqdm) -> Volume:
     lower, upper = bounding_box(cameras)
     random = np.random.default_rng(seed)
     mean = np.mean([image.mean((0, 1)) for image in images], 0) / 255
-    environment = Environment(mean.astype(np.float32), max(float(np.linalg.norm(c.centre)) for c in cameras))
+    reach = max(float(np.linalg.norm(c.centre)) for c in cameras)
+    room = Room(mean.astype(np.float32), reach, REACH, ROOM[0])
     grid, voxel, psnr = None, 0.0, 0.0
     found = CameraFit.alike(len(cameras))
     for number, (resolution, iterations) in enumerate(LEVELS):
@@ -164,12 +168,14 @@ def fit_volume(scene: Scene, seed: int, rate: float, bar: tqdm) -> Volume:
         rays = _rays(cameras, images, voxel)
         rays = replace(rays, colours=found.corrected(rays.colours, rays.camera))
         last = number == len(LEVELS) - 1
-        psnr = _train(grid, share, lower, voxel, rays, environment, iterations, last, rate, random, bar)
+        if number > 0:
+            room.refine(ROOM[number])
+        psnr = _train(grid, share, lower, voxel, rays, room, iterations, last, rate, random, bar)
         rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, STEP * voxel)
         found = found.refined(rgb, alpha, rays.colours, rays.camera)
     assert grid is not None
-    _clear(grid, lower, voxel, rays, environment)
-    return Volume(grid, lower, voxel, environment, frame, psnr, found)
+    _clear(grid, lower, voxel, rays, room)
+    return Volume(grid, lower, voxel, room, frame, psnr, found)
 
 
 def iterations() -> int:
@@ -263,11 +269,11 @@ def _shade(
     return squares, residual, through
 
 
-def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, environment: Environment) -> None:
+def _clear(grid: Array, lower: NDArray[np.float64], voxel: float, rays: _Rays, room: Room) -> None:
     """Empty the voxels for which EVIDENCE is missing, in place: the mean over rays, by their weights there, of how far
-    what they see in the volume is from the environment behind it. What no ray reaches stays."""
+    what they see in the volume is from the room behind it. What no ray reaches stays."""
     gradient = np.zeros((kernel.PARTS, *grid.shape), np.float32)
-    background, _, _ = environment.look_up(rays.origins, rays.directions)
+    background = room.look_up(rays.origins, rays.directions)
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, STEP * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
     # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
@@ -290,7 +296,7 @@ def _train(
     lower: NDArray[np.float64],
     voxel: float,
     rays: _Rays,
-    environment: Environment,
+    room: Room,
     iterations: int,
     last: bool,
     rate: float,
@@ -307,16 +313,16 @@ def _train(
             occupied = _occupied(grid[0, ..., 0])
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         origins, directions = rays.origins[chosen], rays.directions[chosen]
-        background, taps, weights = environment.look_up(origins, directions)
         part = _Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
+        behind = room.look(origins, directions, jitter)
         squares, residual, through = _shade(
-            grid[0], occupied, lower, voxel, part, jitter, background, gradient, VEIL, SOLID
+            grid[0], occupied, lower, voxel, part, jitter, behind.colours, gradient, VEIL, SOLID
         )
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - 0.9 * i / iterations if last else 1.0
-        environment.step(taps, weights, through[:, None] * residual, scale)
+        room.step(behind, through[:, None] * residual, scale, rate)
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
         kernel.adam_step(grid, gradient, share, scale * rate, scale * RATE_COLOUR, bias1, bias2, SMOOTH)
         error = squares / (3 * count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,6 @@ MAP_NODES = 96
 SURE = 0.5
 """Opacity from which on a direction, or a pixel, is taken to hold the subject."""
 
-SOLID_DEPTH = 0.1
-"""Optical depth of a voxel from which on it belongs to a body (`largest_body`)."""
-
 
 @dataclass(frozen=True)
 class Profile:
@@ -52,19 +49,6 @@ class Profile:
     inner: Array
     opacity: NDArray[np.float32]
     rgb: NDArray[np.float32]
-
-
-def largest_body(volume: Volume) -> Volume:
-    """The volume without what floats beside its largest connected body."""
-    depth = np.logaddexp(0, volume.grid[..., 0])
-    labels, count = ndimage.label(depth > SOLID_DEPTH)
-    if count < 2:
-        return volume
-    mass = ndimage.sum_labels(depth, labels, np.arange(1, count + 1))
-    body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=2)
-    grid = volume.grid.copy()
-    grid[~body, 0] = np.minimum(grid[~body, 0], math.log(math.expm1(1e-5)))
-    return replace(volume, grid=grid)
 
 
 def profile(volume: Volume, centre: Array, directions: Array) -> Profile:
