@@ -2,7 +2,8 @@
 # make test    set up, then run the tests
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
-# make lint    ruff, mypy and the layer check
+# make lint    ruff, mypy and the layer check; prettier and eslint for the player
+# make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
@@ -15,7 +16,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint bench charts blender clean
+.PHONY: repro test view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
@@ -24,20 +25,31 @@ test: $(READY)
 	$(BIN)/python -m pytest
 
 view: $(READY) $(PLAYER)
-	$(BIN)/python -m stages.view $(ASSET)
+	$(BIN)/facefolds view $(ASSET)
 
 $(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.json viewer/build.mjs
 	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 
 report: $(READY)
-	$(BIN)/python -m stages.report $(SUBJECT)
+	$(BIN)/facefolds report $(SUBJECT)
 
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory lint-player; else echo "the player was not linted: no npm (apt-get install nodejs npm)" >&2; fi
+
+lint-player: viewer/node_modules/.package-lock.json
+	npm --prefix viewer run --silent lint
+
+viewer/node_modules/.package-lock.json: viewer/package-lock.json
+	cd viewer && npm ci --no-audit --no-fund --loglevel=error
+	@touch $@
+
+wheel: $(READY) $(PLAYER)
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 bench: $(READY)
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
@@ -52,7 +64,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
-	$(BIN)/python -m stages.doctor
+	$(BIN)/facefolds doctor
 	@touch $(READY)
 
 blender: .venv-blender/.installed

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.captures.actor import frame_times, make_rig, render
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene, Split, read_scene
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.export.between import Moved, between_rows, sources
 from facefolds_core.export.stores import read_meshes
 from facefolds_core.files import atomic_file, read_json, write_json
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.params import CaptureParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress

@@ -21,12 +21,11 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config import read_train
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_file, atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.packaging.views import spread
-from facefolds_core.params import TrainParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.waterfall import Step, waterfall
 from facefolds_core.training.report import pick_device
@@ -68,7 +67,7 @@ def main(
         for subject in subjects:
             folders = SubjectFolders(data / subject)
             scene = read_scene(folders.scene)
-            model = load_model(folders.model, pick_device(read_stage(TrainParams, folders.config).device))
+            model = load_model(folders.model, pick_device(read_train(folders.config).device))
             steps = found[subject] = waterfall(scene, model, folders, spread(scene.num_frames, frames))
             with atomic_folder(folders.root / "waterfall") as temporary:
                 write_json(temporary / "waterfall.json", {"subject": subject, "steps": [asdict(s) for s in steps]})

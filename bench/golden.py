@@ -72,6 +72,15 @@ def without_times(value: Any) -> Any:
     return [without_times(v) for v in value] if isinstance(value, list) else value
 
 
+def without_fingerprint(content: bytes) -> bytes:
+    """A safetensors file whose description says nothing of the configuration: numbers, names and shapes only."""
+    size = int.from_bytes(content[:8], "little")
+    header = json.loads(content[8 : 8 + size])
+    spec = json.loads(header["__metadata__"]["spec"])
+    header["__metadata__"] = without_times(spec)
+    return json.dumps(header, sort_keys=True).encode() + content[8 + size :]
+
+
 def digests(folder: Path) -> dict[str, str]:
     """File of one subject's folder -> SHA-256 of what it says."""
     found = {}
@@ -82,6 +91,8 @@ def digests(folder: Path) -> dict[str, str]:
         content = path.read_bytes()
         if path.suffix == ".json":
             content = json.dumps(without_times(json.loads(content)), sort_keys=True).encode()
+        if path.suffix == ".safetensors":
+            content = without_fingerprint(content)
         found[name.as_posix()] = hashlib.sha256(content).hexdigest()
     return found
 

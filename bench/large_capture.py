@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from bench.processes import in_a_process
-from bench.runs import check_train_params
 from facefolds_core.captures.actor.capture import krt_block
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.images import decode_image
@@ -31,7 +30,7 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import NormalizeParams, Subject
+from facefolds_core.params import ExplicitParams, NormalizeParams, Subject
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.report import TrainingReport, peak_memory
 
@@ -112,7 +111,7 @@ def normalize(source: Path, scene: Path) -> tuple[float, float, int]:
 def train(scene: Path, folder: Path) -> tuple[TrainingReport, float, float]:
     """The report of preset `fast`, processor seconds, and the part of its peak memory that it allocated, GiB."""
     processor = time.process_time()
-    report = train_explicit(read_scene(scene), check_train_params({"preset": "fast"}), folder / "model", folder / "log")
+    report = train_explicit(read_scene(scene), ExplicitParams(), folder / "model", folder / "log")
     return report, time.process_time() - processor, report.peak_memory_bytes / GIB
 
 

@@ -14,8 +14,8 @@ from bench.chromium import chromium
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_file
+from facefolds_core.player import find_player
 from facefolds_core.serving import serving
-from stages.view import PLAYER, check_player
 
 HEIGHT, DESKTOP, PHONE = 780, 1000, 390
 GAP = 12
@@ -47,7 +47,7 @@ def main(
     """From left to right: on a desktop, with its layers pulled apart, on a phone."""
     with report_user_errors("pictures"):
         frame = read_asset(asset).num_frames // 2
-        with chromium() as browser, serving(check_player(PLAYER), {"asset": asset}) as address:
+        with chromium() as browser, serving(find_player(), {"asset": asset}) as address:
             panes = [
                 shot(browser, address, DESKTOP, f"view=20,5,0.92,0,0,-0.02&frame={frame}"),
                 shot(browser, address, DESKTOP, "view=40,14,3.6,0.4,0.1,-0.05&frame=0&spread=1&background=787c84"),

@@ -26,11 +26,11 @@ from bench.results import commit_name, machine_name
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import Asset
+from facefolds_core.cli.render import parse_size, pick_level
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_json
+from facefolds_core.player import find_player
 from facefolds_core.serving import serving
-from stages.render import parse_size, pick_level
-from stages.view import PLAYER, check_player
 
 PAGES = Path(__file__).parent / "browser"
 PATIENCE = 300_000
@@ -126,7 +126,7 @@ def build_pages(out: Path) -> None:
     if not (PAGES / "node_modules").is_dir():
         subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=PAGES, check=True)
     subprocess.run([npm, "run", "--silent", "build", "--", f"--outdir={out}"], cwd=PAGES, check=True)
-    shutil.copytree(check_player(PLAYER), out / "player", ignore=shutil.ignore_patterns("*.map"))
+    shutil.copytree(find_player(), out / "player", ignore=shutil.ignore_patterns("*.map"))
     for name in ("ours", "splats", "mesh"):
         (out / f"{name}.html").write_text(HTML.format(name))
     shutil.copyfile(out / "mesh.html", out / "index.html")

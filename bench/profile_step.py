@@ -22,10 +22,10 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from bench.common import find_scenes
 from bench.results import machine_name
-from bench.runs import check_train_params
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.model import intersection, textures
+from facefolds_core.params import MlpParams, train_params
 from facefolds_core.training import loop
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.report import device_name
@@ -167,8 +167,8 @@ def main(
 ) -> None:
     """Print a profile of one training step as Markdown."""
     with report_user_errors("profile_step"):
-        params = check_train_params({"preset": preset, "device": device, **({"rays": rays} if rays else {})})
-        if params.model != "mlp":
+        params = train_params({"preset": preset, "device": device, **({"rays": rays} if rays else {})})
+        if not isinstance(params, MlpParams):
             raise UserError("not a perceptron preset", place="--preset", expected="paper or quick", found=preset)
         scene = read_scene(find_scenes([subject], data)[subject])
         with TemporaryDirectory() as folder:

@@ -30,11 +30,11 @@ from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
 from facefolds_core.asset.writer import LevelContent
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import report_user_errors
 from facefolds_core.export.stores import read_meshes, read_windows
 from facefolds_core.files import atomic_file, read_json, write_json
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.views import spread, training_cameras

@@ -20,18 +20,19 @@ import typer
 from bench.common import conditions_now, find_scenes, keep, words
 from bench.processes import in_a_process
 from bench.results import ClockKind, Measurement, Results
-from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole
+from bench.runs import Job, measure_on_the_way, measure_whole
 from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene, write_scene
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import merged, nested, train_params, value_at
 
 RESULTS = Path("bench/results/robustness.json")
 
 GEOMETRY_RATES: dict[str, tuple[str, ...]] = {
     "paper": ("lr_manifold",),
     "quick": ("lr_manifold",),
-    "fast": ("lr_volume",),
+    "fast": ("volume.learning_rate",),
 }
 """Keys of `train` that are learning rates of the geometry. A preset without any has no such rows."""
 
@@ -83,8 +84,9 @@ def overrides(variant: Variant, preset: str) -> dict[str, Any] | None:
         keys = GEOMETRY_RATES.get(preset, ())
         if not keys:
             return None
-        usual = check_train_params({"preset": preset})
-        values |= {key: variant.rate * getattr(usual, key) for key in keys}
+        usual = train_params({"preset": preset})
+        for key in keys:
+            values = merged(values, nested(key, variant.rate * value_at(usual, key)))
     return values
 
 
@@ -259,7 +261,7 @@ def main(
                         if values is None:
                             typer.echo(f"robustness: {preset} has nothing to disturb by {variant.name!r}: left out")
                             continue
-                        params = check_train_params({"preset": preset, "device": device, **values})
+                        params = train_params({"preset": preset, "device": device, **values})
                         if params.model == "explicit" and iterations:
                             params = params.model_copy(update={"iterations": iterations})
                         job = Job(subject, scene, params, variant.name, conditions, data / subject / "bench" / "robust")

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from pydantic import ValidationError
 
 from bench.clock import Clock, milestones, time_source
 from bench.results import Conditions, Measurement, Scores
@@ -19,7 +18,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.packaging.views import spread
-from facefolds_core.params import TrainParams
+from facefolds_core.params import ExplicitParams, MlpParams, TrainParams
 from facefolds_core.scoring.evaluation import METRICS, score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView
@@ -96,7 +95,7 @@ def measure_on_the_way(job: Job, budgets: Sequence[float], record: Record) -> No
         # Before the step and not after it: a checkpoint never lies beyond a budget that is not yet recorded.
         if clock.seconds > saved + CHECKPOINT_SECONDS:
             save()
-        train_step(run.state, run.sampler, job.params)
+        train_step(run.state, run.sampler, mlp_of(job.params))
 
     for passed in milestones(clock, budgets, step):
         peak = peak or peak_memory(run.sampler.device)
@@ -107,11 +106,11 @@ def measure_on_the_way(job: Job, budgets: Sequence[float], record: Record) -> No
 
 
 def _begin(scene: Scene, job: Job, clock: Clock, first: float) -> TrainingRun:
-    run = begin(scene, job.params, job.scratch)
+    run = begin(scene, mlp_of(job.params), job.scratch)
     if run.state.iteration and run.state.seconds > first:
         shutil.rmtree(run.checkpoints)
         clock.set(0.0)
-        run = begin(scene, job.params, job.scratch)
+        run = begin(scene, mlp_of(job.params), job.scratch)
     if run.state.iteration:
         clock.set(run.state.seconds)
     return run
@@ -122,7 +121,7 @@ def measure_whole(job: Job, budget: float, record: Record) -> Measurement:
     clock = Clock(time_source(job.conditions.clock, job.conditions.threads))
     scene = read_scene(job.scene)
     with TemporaryDirectory() as folder:
-        report = train_explicit(scene, job.params, Path(folder) / "model", Path(folder) / "log")
+        report = train_explicit(scene, explicit_of(job.params), Path(folder) / "model", Path(folder) / "log")
         with clock.paused():
             device = pick_device(job.params.device)
             scores = score(
@@ -185,14 +184,15 @@ def _means(images: list[dict[str, float | None]]) -> Scores:
     )
 
 
-def check_train_params(values: dict[str, object]) -> TrainParams:
-    """TrainParams of a preset and overrides.
+def mlp_of(params: TrainParams) -> MlpParams:
+    """The section of a perceptron preset."""
+    if not isinstance(params, MlpParams):
+        raise UserError("not a perceptron preset", expected="paper or quick", found=params.preset)
+    return params
 
-    Raises:
-        UserError: if a key or value is wrong.
-    """
-    try:
-        return TrainParams.model_validate(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise UserError("a parameter is wrong", place=str(values), expected=first["msg"]) from None
+
+def explicit_of(params: TrainParams) -> ExplicitParams:
+    """The section of an explicit preset."""
+    if not isinstance(params, ExplicitParams):
+        raise UserError("not an explicit preset", expected="fast", found=params.preset)
+    return params

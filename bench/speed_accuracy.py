@@ -19,9 +19,9 @@ from bench.chart import draw, write_plot_data
 from bench.common import conditions_now, find_scenes, keep, numbers, words
 from bench.processes import in_a_process
 from bench.results import ClockKind, Measurement, Results, describe
-from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole
+from bench.runs import Job, explicit_of, measure_on_the_way, measure_whole
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.training.explicit.loop import LEAST_ITERATIONS
+from facefolds_core.params import train_params
 
 SECONDS = "10,30,60,120,300,900"
 PRESETS = "fast,quick,paper"
@@ -54,17 +54,17 @@ def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
     """Runs of about `budgets` seconds each. If none is known yet, a first one, not kept, warms caches and is timed."""
     like = job.measurement(1.0, 0.0, 0, 0, None)
     known = [(m.iterations, m.seconds) for m in results.read() if m.key() == like.key() and m.scores is not None]
-    guess = job.params.iterations
+    guess, least = job.params.iterations, explicit_of(job.params).least_iterations
     if not known:
         first = in_a_process(measure_whole, job, budgets[0], ignore)
         guess = next_iterations(budgets[0], [(first.iterations, first.seconds)], guess)
     for budget in budgets:
         for _ in range(2):
-            iterations = max(LEAST_ITERATIONS, next_iterations(budget, known, guess))
+            iterations = max(least, next_iterations(budget, known, guess))
             shorter = replace(job, params=job.params.model_copy(update={"iterations": iterations}))
             made = in_a_process(measure_whole, shorter, budget, partial(keep, results.path))
             known = [run for run in known if run[0] != iterations] + [(iterations, made.seconds)]
-            better = max(LEAST_ITERATIONS, next_iterations(budget, known, guess))
+            better = max(least, next_iterations(budget, known, guess))
             if abs(made.seconds - budget) <= NEAR * budget or better == iterations:
                 break
 
@@ -114,7 +114,7 @@ def main(
             scenes = find_scenes(words(subjects), data)
             for preset in words(presets):
                 for subject, scene in scenes.items():
-                    params = check_train_params({"preset": preset, "device": device})
+                    params = train_params({"preset": preset, "device": device})
                     scratch = data / subject / "bench" / f"{conditions.commit}-{clock}{conditions.threads}"
                     try:
                         measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)

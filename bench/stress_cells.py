@@ -9,7 +9,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from unittest.mock import patch
 from zlib import crc32
 
 import cv2
@@ -19,29 +18,31 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from bench.results import commit_name, read_entries
-from bench.runs import check_train_params
 from bench.stress_film import Shots, held_out, shoot, training, write_shots
 from bench.stress_hazards import HAZARDS, Hazard
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file, write_json
 from facefolds_core.model import RadianceManifolds, load_model
-from facefolds_core.params import TrainParams
+from facefolds_core.params import ExplicitParams, TrainParams, merged, train_params
 from facefolds_core.scoring.metrics import psnr, shown
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.loop import train
-from facefolds_core.training.volume import fit as volume_fit
 
 RESULTS = Path("bench/results/stress.json")
 VERSION = 1
 CLEAN = Hazard("clean", "clean", (0, 0, 0), "-")
 
-VOLUME_LEVELS, VOLUME_RAYS = ((40, 50), (64, 50)), 4096
-"""In place of `volume.fit.LEVELS` and `RAYS`: less than half the iterations, a quarter of the rays."""
-
 CUT: dict[str, dict[str, Any]] = {
-    "fast": {"iterations": 240},
+    "fast": {
+        "iterations": 240,
+        # Less than half the iterations, a quarter of the rays.
+        "volume": {
+            "levels": [{"resolution": 40, "iterations": 50}, {"resolution": 64, "iterations": 50}],
+            "rays": 4096,
+        },
+    },
     "paper": {
         "manifold_width": 64,
         "output_scale": 1.0,
@@ -156,7 +157,7 @@ def run_cell(blank: Cell, cache: Path, pictures: Path) -> Cell:
     hazard = next((h for h in HAZARDS if h.key == blank.hazard), CLEAN)
     shots, truth = disturbed(hazard, blank.strength, blank.seed, cache)
     values = {"preset": blank.preset, "seed": blank.seed, "device": "cpu", **CUT[blank.preset]}
-    params = check_train_params({**values, **hazard.train(check_train_params(values), blank.strength)})
+    params = train_params(merged(values, hazard.train(train_params(values), blank.strength)))
     found: dict[str, Any] = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit_name(Path(__file__).parent),
@@ -191,9 +192,8 @@ def disturbed(hazard: Hazard, strength: float, seed: int, cache: Path) -> tuple[
 
 def _train(scene: Scene, params: TrainParams, folder: Path) -> tuple[RadianceManifolds, int]:
     """The model, and how often a level of training was begun again."""
-    if params.model == "explicit":
-        with patch.multiple(volume_fit, LEVELS=VOLUME_LEVELS, RAYS=VOLUME_RAYS):
-            train_explicit(scene, params, folder / "model", folder / "log")
+    if isinstance(params, ExplicitParams):
+        train_explicit(scene, params, folder / "model", folder / "log")
         events = json.loads((folder / "model" / "fit.json").read_text())["events"]
         restarts = sum("diverged" in event for event in events)
     else:

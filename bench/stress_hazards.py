@@ -5,22 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.stress_film import Film, Shots, keep_cameras, keep_frames, map_cameras, map_images
 from facefolds_core.captures.actor import ActorOptions
-from facefolds_core.captures.frames import Image
 from facefolds_core.captures.scene import SPHERE_CENTRE
+from facefolds_core.frame_store import Image
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import TrainParams
+from facefolds_core.params import TrainParams, nested, value_at
 
 Random = np.random.Generator
 Disturb = Callable[[Shots, float, Random], Shots]
 
-GEOMETRY_RATE = {"paper": "lr_manifold", "fast": "lr_volume"}
-"""The key of `train` that is the learning rate of the geometry, for each preset."""
+GEOMETRY_RATE = {"mlp": "lr_manifold", "explicit": "volume.learning_rate"}
+"""The key of `train` that is the learning rate of the geometry, for each model."""
+
+SPACING = {"mlp": "level_halfwidth", "explicit": "geometry.halfwidth"}
+"""The key that is half the distance between the outermost and the innermost layer."""
 
 WHITE_BALANCE = 0.25
 """Stops of white balance for each stop of exposure, in red and, independently, in blue."""
@@ -57,10 +61,13 @@ class Hazard:
     def label(self, strength: float) -> str:
         return self.unit.format(f"{strength:.3g}")
 
-    def train(self, usual: TrainParams, strength: float) -> dict[str, float]:
+    def train(self, usual: TrainParams, strength: float) -> dict[str, Any]:
         """Values of `train` that differ from the usual ones."""
-        keys = [GEOMETRY_RATE[usual.preset]] if self.rate else ["level_halfwidth"] if self.spacing else []
-        return {key: strength * getattr(usual, key) for key in keys}
+        names = GEOMETRY_RATE if self.rate else SPACING if self.spacing else None
+        if names is None:
+            return {}
+        key = names[usual.model]
+        return nested(key, strength * value_at(usual, key))
 
 
 def fewer_cameras(shots: Shots, count: float, random: Random) -> Shots:

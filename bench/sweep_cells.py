@@ -21,11 +21,11 @@ import yaml
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.model.device import pick_device
-from facefolds_core.params import EvaluateParams, TrainParams
+from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.reporting.facts import STAGE_OUTPUTS
@@ -202,7 +202,7 @@ def own_metrics(cell: Cell) -> tuple[dict[str, float | None], dict[str, int]] | 
 def measure(folders: SubjectFolders) -> tuple[dict[str, float | None], dict[str, int]]:
     """Scores of the asset on the held-out cameras, as `evaluate` has them, and its sizes."""
     params = read_stage(EvaluateParams, folders.config)
-    perceptual = find_perceptual(pick_device(read_stage(TrainParams, folders.config).device))
+    perceptual = find_perceptual(pick_device(read_train(folders.config).device))
     asset = read_asset(folders.asset)
     scores = asset_scores(read_scene(folders.scene), asset, params.background, perceptual)
     return averages(scores, "asset"), asset_cost(asset.manifest)

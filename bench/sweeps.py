@@ -235,7 +235,7 @@ def draw_all(
     picture: Annotated[Path, typer.Option(help="The chart; an SVG is written beside it.")] = PICTURE,
     document: Annotated[Path, typer.Option(help="Its tables are replaced, between their markers.")] = DOCUMENT,
 ) -> None:
-    """Tables, charts, points for `dvc plots`, and a table for `stages.recommend`, from what has been measured."""
+    """Tables, charts, points for `dvc plots`, and a table for `facefolds recommend`, from what has been measured."""
     with report_user_errors("sweeps"):
         rows = read_rows(results)
         draw(rows, picture)
@@ -249,7 +249,7 @@ def draw_all(
 
 
 def as_run(row: Row) -> Run:
-    """A row as `stages.recommend` reads it; what is not under `params` is as the subject has it."""
+    """A row as `facefolds recommend` reads it; what is not under `params` is as the subject has it."""
     figures = {name: value for name, value in row.scores.items() if value is not None}
     figures |= {name: float(value) for name, value in row.cost.items()}
     figures |= {"pictures_a_second": row.pictures_a_second} if row.pictures_a_second else {}

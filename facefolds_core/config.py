@@ -10,18 +10,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from facefolds_core.errors import UserError
-from facefolds_core.params import STAGE_SECTIONS, Section, Subject
+from facefolds_core.params import SECTIONS, Section, Subject, TrainParams, TrainSection
 
 S = TypeVar("S", bound=Section)
+T = TypeVar("T")
 _REMEDY = "run `dvc repro`, which writes it from params.yaml"
 
 
-def _read(kind: type[S], path: Path) -> S:
+def _read(adapter: TypeAdapter[T], path: Path) -> T:
     try:
-        return kind.model_validate_json(path.read_text(encoding="utf-8"))
+        return adapter.validate_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy=_REMEDY) from None
     except (ValidationError, UnicodeDecodeError) as error:
@@ -30,10 +31,15 @@ def _read(kind: type[S], path: Path) -> S:
 
 def read_subject(folder: Path) -> Subject:
     """The subject's own keys (without overrides)."""
-    return _read(Subject, folder / "subject.json")
+    return _read(TypeAdapter(Subject), folder / "subject.json")
 
 
 def read_stage(kind: type[S], folder: Path) -> S:
-    """The section of one stage, by its class: `read_stage(TrainParams, folders.config)`."""
-    name = next(name for name, section in STAGE_SECTIONS.items() if section is kind)
-    return _read(kind, folder / f"{name}.json")
+    """The section of one stage by its class: `read_stage(TextureParams, folders.config)`. `train` has `read_train`."""
+    name = next(name for name, kinds in SECTIONS.items() if kinds == (kind,))
+    return _read(TypeAdapter(kind), folder / f"{name}.json")
+
+
+def read_train(folder: Path) -> TrainParams:
+    """The section `train`, of whichever model it is."""
+    return _read(TypeAdapter[TrainParams](TrainSection), folder / "train.json")

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
-from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject
-
-T = TypeVar("T", bound=Section)
+from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
 
 
 class Params(Section):
@@ -42,33 +41,27 @@ class Params(Section):
     def stage(self, stage: str, subject: str) -> Section:
         """The section of `stage` for `subject`: params.yaml's values, then the subject's overrides."""
         overrides: dict[str, Any] = getattr(self.subject(subject), stage)
-        merged = _merge(self.sections.get(stage, {}), overrides)
+        values = merged(self.sections.get(stage, {}), overrides)
         place = f"{stage} (for subject {subject})" if overrides else stage
-        return _validate(STAGE_SECTIONS[stage], merged, self.path, place)
+        return section_of(stage, values, self.path, place)
 
 
-def _merge(base: dict[str, Any], override: dict[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, value in override.items():
-        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
-        merged[key] = _merge(merged[key], value) if both else value
-    return merged
+class _Loader(yaml.SafeLoader):
+    """PyYAML follows YAML 1.1, in which 1e-3 is a string; DVC writes YAML 1.2, in which it is a number."""
 
 
-def _validate(kind: type[T], value: Any, file: str | Path, place: str) -> T:
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(?:[0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+
+
+def _subject(name: str, entry: Any, path: Path) -> Subject:
     try:
-        return kind.model_validate(value)
+        return Subject.model_validate(entry)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join([place, *(str(part) for part in first["loc"])])
-        raise UserError(
-            "a parameter is wrong",
-            file=file,
-            place=where,
-            expected=first["msg"],
-            found=repr(first["input"]),
-            remedy="mend it; docs/subjects.md and facefolds_core/params.py describe all keys",
-        ) from None
+        raise user_error(error, (Subject,), path, f"subjects.{name}") from None
 
 
 def load_params(path: str | Path = "params.yaml") -> Params:
@@ -79,7 +72,7 @@ def load_params(path: str | Path = "params.yaml") -> Params:
     """
     path = Path(path)
     try:
-        value = yaml.safe_load(path.read_text(encoding="utf-8"))
+        value = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
     except FileNotFoundError:
         raise UserError(
             "file not found", file=path, remedy="run the command in the project's root folder, which has params.yaml"
@@ -115,9 +108,7 @@ def load_params(path: str | Path = "params.yaml") -> Params:
                 found=repr(section),
                 remedy=f"write `{name}: {{key: value}}`",
             )
-    subjects = {
-        str(name): _validate(Subject, entry, path, f"subjects.{name}") for name, entry in value["subjects"].items()
-    }
+    subjects = {str(name): _subject(str(name), entry, path) for name, entry in value["subjects"].items()}
     params = Params(subjects=subjects, sections=sections, path=str(path))
     for name in subjects:
         for stage in STAGE_SECTIONS:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.errors import UserError
@@ -14,6 +13,7 @@ from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets, read_grids, read_meshes
 from facefolds_core.files import atomic_folder
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import BakeParams
 from facefolds_core.paths import SubjectFolders
@@ -34,7 +34,7 @@ def bake(folders: SubjectFolders) -> str:
         count = len(baked.keys())
         if params.hold > 0 and any(frame > 0 for _, frame in baked):
             baked = FrameStore(path.rename(temporary / "baked.arrow"))
-            weights = texel_weights(rays, baked, cameras)
+            weights = texel_weights(rays, baked, cameras, params.hold_frames)
             write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
             baked.path.unlink()
     return f"{count} textures fitted to {len(rays)} rays, in {folders.textures}"
@@ -53,7 +53,7 @@ def _fit(folders: SubjectFolders, params: BakeParams, path: Path) -> tuple[Codes
     check_match(meshes, sheets, textures, samples, folders)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     rays = gather_rays(cameras, meshes, sheets)
-    baker = Baker(meshes, sheets, rays, textures.height)
+    baker = Baker(meshes, sheets, rays, textures.height, params.damping)
     shape = (textures.height, textures.width, 4)
     write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
     return rays.shipped, len(cameras)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from facefolds_core.asset import AssetSource
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
-from facefolds_core.captures.frames import FrameStore
+from facefolds_core.asset.writer import AssetSource
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.export.collapse import decimated_ladder
@@ -19,6 +18,7 @@ from facefolds_core.export.stores import (
     read_surfaces,
     read_windows,
 )
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams, DecimateParams
@@ -37,7 +37,8 @@ def compress(folders: SubjectFolders) -> str:
 
     path, ladder = folders.surfaces / "surfaces.npz", {}
     if params.levels and holds_sheets(path):
-        ladder = decimated_ladder(read_sheets(path), [level.mesh_resolution**2 for level in params.levels])
+        counts = [level.mesh_resolution**2 for level in params.levels]
+        ladder = decimated_ladder(read_sheets(path), counts, read_stage(DecimateParams, folders.config))
 
     def decimate(resolution: int) -> list[TexturedMesh]:
         if ladder:

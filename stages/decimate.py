@@ -17,7 +17,7 @@ def decimate(folders: SubjectFolders) -> str:
     path = folders.surfaces / "surfaces.npz"
     grids = read_grids(folders.samples / "grids.npz")
     if holds_sheets(path):
-        meshes = decimate_sheets(read_sheets(path), params.resolution**2)
+        meshes = decimate_sheets(read_sheets(path), params.resolution**2, params)
     else:
         meshes = decimate_layers(read_surfaces(path), grids, grids.centre, params)
     order = layer_order(meshes, grids.centre)

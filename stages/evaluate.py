@@ -6,11 +6,11 @@ import sys
 
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config import read_stage, read_train
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
-from facefolds_core.params import EvaluateParams, TrainParams
+from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import evaluate, frame_rate_factor
 from facefolds_core.scoring.perceptual import find_perceptual
@@ -21,7 +21,7 @@ from stages.common import run_stage
 
 def evaluate_subject(folders: SubjectFolders) -> str:
     params = read_stage(EvaluateParams, folders.config)
-    device = pick_device(read_stage(TrainParams, folders.config).device)
+    device = pick_device(read_train(folders.config).device)
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     cost = read_cost(folders, asset.manifest)
     perceptual = find_perceptual(device)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import UserError
 from facefolds_core.export.sampling import sample_grids, write_textures
 from facefolds_core.export.stores import write_grids
@@ -14,19 +14,20 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
 from facefolds_core.model import RadianceManifolds, load_model
 from facefolds_core.model.device import pick_device
-from facefolds_core.params import SampleParams, TrainParams
+from facefolds_core.params import SampleParams
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
 
 
 def sample(folders: SubjectFolders) -> str:
     params = read_stage(SampleParams, folders.config)
-    model = load_model(folders.model, pick_device(read_stage(TrainParams, folders.config).device))
+    model = load_model(folders.model, pick_device(read_train(folders.config).device))
     scene = read_scene(folders.scene)
     check_match(model, scene, folders)
     window = FULL_WINDOW
     if params.window == "auto":
-        window = visible_window(model, [scene.cameras[i] for i in scene.indices("train")])
+        cameras = [scene.cameras[i] for i in scene.indices("train")]
+        window = visible_window(model, cameras, params.auto_window)
     grids = sample_grids(model, params.resolution, window)
     with atomic_folder(folders.samples) as temporary:
         opacity = write_textures(temporary / "textures.arrow", model, grids)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
-from facefolds_core.params import TrainParams
+from facefolds_core.config import read_train
+from facefolds_core.params import ExplicitParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.loop import train
@@ -12,9 +12,9 @@ from stages.common import run_stage
 
 
 def train_stage(folders: SubjectFolders) -> str:
-    params = read_stage(TrainParams, folders.config)
+    params = read_train(folders.config)
     scene = read_scene(folders.scene)
-    if params.model == "explicit":
+    if isinstance(params, ExplicitParams):
         report = train_explicit(scene, params, folders.model, folders.training_log)
     else:
         report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset import AssetSource, Manifest, write_asset
+from facefolds_core.asset import Manifest
 from facefolds_core.asset.cropping import CroppedLayer, crop_layers
-from facefolds_core.captures.frames import FrameStore, write_frames
+from facefolds_core.asset.writer import AssetSource, write_asset
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, write_scene
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_directions

@@ -25,5 +25,6 @@ await build({
   logLevel: "warning",
 });
 await cp(join(here, "public"), out, { recursive: true });
-for (const file of ["draco_wasm_wrapper.js", "draco_decoder.wasm"]) await cp(join(draco, file), join(out, "draco", file));
+for (const file of ["draco_wasm_wrapper.js", "draco_decoder.wasm"])
+  await cp(join(draco, file), join(out, "draco", file));
 console.log(`built ${out}`);

@@ -126,7 +126,7 @@ def render(view: dict[str, Any]) -> None:
 def orbit(
     azimuth: float, elevation: float, distance: float, size: tuple[int, int], field_of_view: float
 ) -> dict[str, Any]:
-    """An upright camera at the subject: azimuth to its left and elevation in degrees, as of `stages.render`."""
+    """An upright camera at the subject: azimuth to its left and elevation in degrees, as of `facefolds render`."""
     a, e = math.radians(azimuth), math.radians(elevation)
     outward = Vector((math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)))
     right = (-outward).cross(Vector((0, 0, 1))).normalized()

@@ -7,12 +7,30 @@ starts a closed group of pictures.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Protocol
 
 from facefolds_core.errors import UserError
-from facefolds_core.params import CodecName, VideoCodec
+
+CodecName = Literal["h264", "vp9", "av1"]
+
+
+class VideoSettings(Protocol):
+    """How a texture video is encoded: `compress.video` of params.yaml, or anything else with these."""
+
+    @property
+    def codec(self) -> Sequence[CodecName]: ...
+    @property
+    def crf(self) -> int: ...
+    @property
+    def lossless(self) -> bool: ...
+    @property
+    def preset(self) -> str: ...
+    @property
+    def keyframe_interval(self) -> int: ...
+
 
 X264_FIXED = {
     "scenecut": 0,
@@ -71,7 +89,7 @@ class Codec:
         """The encoder's own constant rate factor for about the quality of x264's."""
         return min(self.worst_crf, max(1, round(self.crf_scale * x264_crf + self.crf_offset)))
 
-    def options(self, params: VideoCodec, crf: int) -> dict[str, str]:
+    def options(self, params: VideoSettings, crf: int) -> dict[str, str]:
         """FFmpeg's options; `crf` on the encoder's own scale."""
         interval = params.keyframe_interval
         if self.name == "h264":

@@ -12,12 +12,25 @@ order would cost more than half of the bytes of a quantised mesh.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import DracoPy
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import MeshCodec
+
+
+class MeshSettings(Protocol):
+    """How a mesh is encoded: `compress.mesh` of params.yaml, or anything else with these."""
+
+    @property
+    def quantization_bits(self) -> int: ...
+    @property
+    def texture_coordinate_bits(self) -> int: ...
+    @property
+    def compression_level(self) -> int: ...
+
 
 DEGENERATE = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
@@ -35,7 +48,7 @@ def degenerate_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32]) ->
     return np.asarray(np.linalg.norm(np.cross(a, b), axis=-1) <= DEGENERATE * longest)
 
 
-def encode_mesh(mesh: TexturedMesh, codec: MeshCodec) -> tuple[bytes, TexturedMesh]:
+def encode_mesh(mesh: TexturedMesh, codec: MeshSettings) -> tuple[bytes, TexturedMesh]:
     """Encode a layer.
 
     Faces that have no area, or lose it by quantisation, are left out: they cover no pixel. In order (level 0) vertices
@@ -66,7 +79,7 @@ def _flat(data: bytes) -> NDArray[np.bool_]:
     return degenerate_faces(mesh.vertices, mesh.faces)
 
 
-def _encode(mesh: TexturedMesh, codec: MeshCodec, keep_order: bool) -> bytes:
+def _encode(mesh: TexturedMesh, codec: MeshSettings, keep_order: bool) -> bytes:
     quantized = codec.quantization_bits > 0
     return bytes(
         DracoPy.encode(

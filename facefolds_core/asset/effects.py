@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import rpack
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -46,6 +45,8 @@ class EffectsPicture:
     @classmethod
     def of(cls, maps: Sequence[Map]) -> EffectsPicture:
         """Quantise maps and pack them."""
+        import rpack  # readers do not need it
+
         largest = float(np.quantile(np.abs(np.concatenate([table.ravel() for table in maps])), COVERED))
         scale = max(largest, 1e-3)
         sizes = [(table.shape[1], table.shape[0]) for table in maps]

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import rpack
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
@@ -69,6 +68,8 @@ class AtlasLayout:
         among those of at most HARDWARE_SIDE a side, if there are any, else of LARGE_SIDE, else of MAX_SIDE; among
         equals the one with the shorter long side.
         """
+        import rpack  # readers do not need it
+
         cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
         narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
         widths = sorted({round(float(w)) for w in np.geomspace(narrow, wide, WIDTHS_TRIED)})

@@ -23,8 +23,8 @@ from facefolds_core.asset.manifest import (
 )
 from facefolds_core.asset.packing import AtlasLayout, inside
 from facefolds_core.asset.video import decode_video, unpack_picture
-from facefolds_core.asset.writer import file_sha256
 from facefolds_core.errors import UserError
+from facefolds_core.files import file_sha256
 from facefolds_core.geometry.meshes import TexturedMesh
 
 Frame = tuple[NDArray[np.uint8], ...]

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core import __version__
-from facefolds_core.asset.codecs import CODECS, Codec
+from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
 from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
-from facefolds_core.asset.draco import encode_mesh
+from facefolds_core.asset.draco import MeshSettings, encode_mesh
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Coordinates,
@@ -29,18 +30,26 @@ from facefolds_core.asset.manifest import (
 )
 from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
 from facefolds_core.asset.video import encode_video, pack_frame, probe_video
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder
+from facefolds_core.files import atomic_folder, file_sha256
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import CodecName, CompressParams, VideoCodec
 
 STATIC_FPS = 1.0
 """Written for a static scene, whose one frame has no rate."""
 FULL = "full"
 """Name of the level that holds everything."""
+
+
+class AssetSettings(Protocol):
+    """How an asset is encoded: the section `compress` of params.yaml, or anything else with these."""
+
+    @property
+    def mesh(self) -> MeshSettings: ...
+    @property
+    def video(self) -> VideoSettings: ...
 
 
 @dataclass(frozen=True)
@@ -66,7 +75,7 @@ def write_asset(
     windows: Sequence[Window],
     textures: FrameStore,
     source: AssetSource,
-    params: CompressParams,
+    params: AssetSettings,
 ) -> Manifest:
     """Write the folder of an asset, whole or not at all; an older one is replaced.
 
@@ -135,7 +144,7 @@ class LevelContent:
         """The layers' textures, N of (h, w, 4)."""
         return [layer.cut(self.textures.image(layer.source, index)) for layer in self.layers]
 
-    def encode(self, path: Path, codec: Codec, params: VideoCodec, crf: int, frames: int | None = None) -> None:
+    def encode(self, path: Path, codec: Codec, params: VideoSettings, crf: int, frames: int | None = None) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
         pictures = (pack_frame(self.frame(index), layout) for index in range(count))
@@ -144,7 +153,7 @@ class LevelContent:
 
 
 def write_level(
-    folder: Path, name: str, content: LevelContent, params: CompressParams, crfs: Mapping[CodecName, int] | None = None
+    folder: Path, name: str, content: LevelContent, params: AssetSettings, crfs: Mapping[CodecName, int] | None = None
 ) -> Level:
     """Write the files of one level into `folder`: NAME_00.drc ..., NAME.mp4 ...; returns its part of the manifest.
 
@@ -180,7 +189,7 @@ def write_level(
     return Level(name=name, layers=entries, texture=texture, bytes=size)
 
 
-def _write_layer(path: Path, layer: CroppedLayer, rect: Rect, params: CompressParams) -> Layer:
+def _write_layer(path: Path, layer: CroppedLayer, rect: Rect, params: AssetSettings) -> Layer:
     data, decoded = encode_mesh(layer.mesh, params.mesh)
     path.write_bytes(data)
     return Layer(
@@ -205,12 +214,6 @@ def _video_entry(path: Path, codec: Codec) -> Video:
         mime=facts.mime,
         level=facts.level,
     )
-
-
-def file_sha256(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file's bytes."""
-    with path.open("rb") as handle:
-        return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
 def check_inputs(meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: FrameStore) -> int:

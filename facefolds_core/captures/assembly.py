@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
-from facefolds_core.captures.frames import Image, write_frames
 from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
@@ -19,6 +18,7 @@ from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
+from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject

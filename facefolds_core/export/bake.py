@@ -19,18 +19,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.bake_kernel import PARTS, SCALE, accumulate, render, true_positions, update
 from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.rendering.raster import cast_mesh
 
-DAMPING = 0.05
-"""Added to a texel's sum of weights: what is hardly seen hardly moves."""
+_USUAL = BakeParams()
 
 Image = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
@@ -120,10 +120,13 @@ class Baker:
         sheets: that they came from.
         rays: of the training cameras.
         size: texels a side of the shipped textures.
+        damping: in a step's denominator, see `BakeParams`.
     """
 
-    def __init__(self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int) -> None:
-        self.rays = rays
+    def __init__(
+        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, damping: float = _USUAL.damping
+    ) -> None:
+        self.rays, self._damping = rays, damping
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
         self._sums: Float = np.zeros((PARTS, len(meshes), size, size, 6), np.float32)
 
@@ -145,7 +148,7 @@ class Baker:
         shown = values.copy()
         for _ in range(iterations):
             accumulate(self.rays.shipped, target, shown, self._sums)
-            update(values.reshape(-1, 4), self._sums.reshape(PARTS, -1, 6), DAMPING, shown.reshape(-1, 4))
+            update(values.reshape(-1, 4), self._sums.reshape(PARTS, -1, 6), self._damping, shown.reshape(-1, 4))
         return np.stack([_finished(image) for image in shown])
 
 

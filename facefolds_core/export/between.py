@@ -24,18 +24,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.export.textures import premultiply, straight
+from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.params import BetweenParams
 from facefolds_core.progress import progress as progress_bar
 
-SMALLEST = 16
-"""Texels a side below which no motion is looked for: frames are mixed."""
-
-FIXED_POINT_STEPS = 6
-LEAST_CROWD = 1e-3
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
-BEHIND = 0.5
-"""Grey behind the composite: an outline must not look like the edge of something black."""
+"""Weights of red, green and blue: BT.601's."""
+
+_USUAL = BetweenParams()
 
 Image = NDArray[np.uint8]
 Float = NDArray[np.float32]
@@ -52,16 +49,19 @@ class Motion:
 
     forward: Float
     backward: Float
+    params: BetweenParams = _USUAL
 
     @classmethod
-    def between(cls, first: Image, second: Image) -> Motion:
+    def between(cls, first: Image, second: Image, params: BetweenParams) -> Motion:
         """Of two pictures (S, S) uint8."""
-        return cls(dense_flow(first, second), dense_flow(second, first))
+        least = params.min_side
+        return cls(dense_flow(first, second, least), dense_flow(second, first, least), params)
 
     def at(self, t: float) -> Moved:
         """How to make the frame at k + t, 0 < t < 1."""
-        first, second = sources(t * self.forward), sources((1 - t) * self.backward)
-        weight, other = (1 - t) * crowd(first), t * crowd(second)
+        steps, least = self.params.fixed_point_steps, self.params.min_crowd
+        first, second = sources(t * self.forward, steps), sources((1 - t) * self.backward, steps)
+        weight, other = (1 - t) * crowd(first, least), t * crowd(second, least)
         return Moved(first, second, np.asarray(other / (weight + other), np.float32)[..., None])
 
 
@@ -84,13 +84,13 @@ class Moved:
         return straight(one + self.share * (other - one))
 
 
-def dense_flow(first: Image, second: Image) -> Float:
+def dense_flow(first: Image, second: Image, min_side: int = _USUAL.min_side) -> Float:
     """(S, S, 2) float32: where the texels of `first` went. 0 for small pictures, and where the flow is not finite.
 
     Args:
         first, second: (S, S) uint8.
     """
-    if min(first.shape) < SMALLEST:
+    if min(first.shape) < min_side:
         return np.zeros((*first.shape, 2), np.float32)
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)  # the result depends on how many share the picture
@@ -102,21 +102,21 @@ def dense_flow(first: Image, second: Image) -> Float:
     return np.where(np.isfinite(flow).all(-1, keepdims=True), flow, np.float32(0))
 
 
-def sources(displacement: Float) -> Float:
+def sources(displacement: Float, steps: int = _USUAL.fixed_point_steps) -> Float:
     """(S, S, 2) columns and rows: which texel x of a frame is at each y = x + displacement(x)."""
     rows, columns = np.mgrid[: displacement.shape[0], : displacement.shape[1]].astype(np.float32)
     grid = np.stack([columns, rows], -1)
     found = grid - displacement
-    for _ in range(FIXED_POINT_STEPS):
+    for _ in range(steps):
         found = grid - look_up(displacement, found)
     return found
 
 
-def crowd(places: Float) -> Float:
+def crowd(places: Float, least: float = _USUAL.min_crowd) -> Float:
     """(S, S) float32 > 0: texels of the frame a texel, from where they come from; 1 where nothing is stretched."""
     (down_x, right_x), (down_y, right_y) = (np.gradient(places[..., axis]) for axis in (0, 1))
     density = np.abs(right_x * down_y - down_x * right_y)
-    return np.asarray(cv2.GaussianBlur(density, (0, 0), 1.0) + LEAST_CROWD, np.float32)
+    return np.asarray(cv2.GaussianBlur(density, (0, 0), 1.0) + least, np.float32)
 
 
 def look_up(image: Float, at: Float) -> Float:
@@ -125,7 +125,7 @@ def look_up(image: Float, at: Float) -> Float:
     return np.asarray(found, np.float32)
 
 
-def picture(store: FrameStore, layers: int, frame: int) -> Image:
+def picture(store: FrameStore, layers: int, frame: int, behind: float = _USUAL.behind) -> Image:
     """(S, S) uint8: all layers of a frame, composited from the outermost in, over grey."""
     seen = np.zeros((store.height, store.width, 3), np.float32)
     through = np.ones((store.height, store.width, 1), np.float32)
@@ -133,20 +133,22 @@ def picture(store: FrameStore, layers: int, frame: int) -> Image:
         texture = premultiply(store.image(layer, frame))
         seen += through * texture[..., :3]
         through *= 1 - texture[..., 3:]
-    grey = seen @ GREY + np.float32(BEHIND) * through[..., 0]
+    grey = seen @ GREY + np.float32(behind) * through[..., 0]
     return np.asarray(np.rint(grey * 255).clip(0, 255), np.uint8)
 
 
-def motions(store: FrameStore, layers: int, frames: int) -> Iterator[Motion]:
+def motions(store: FrameStore, layers: int, frames: int, params: BetweenParams = _USUAL) -> Iterator[Motion]:
     """From each frame to the next: frames - 1 of them, with two pictures in memory."""
-    last = picture(store, layers, 0)
+    last = picture(store, layers, 0, params.behind)
     for frame in range(1, frames):
-        here = picture(store, layers, frame)
-        yield Motion.between(last, here)
+        here = picture(store, layers, frame, params.behind)
+        yield Motion.between(last, here, params)
         last = here
 
 
-def between_rows(store: FrameStore, factor: int, progress: bool = True) -> Iterator[tuple[int, int, Image]]:
+def between_rows(
+    store: FrameStore, factor: int, params: BetweenParams = _USUAL, progress: bool = True
+) -> Iterator[tuple[int, int, Image]]:
     """All textures at `factor` times the frame rate, one at a time: frame by frame, layers from the outermost in.
 
     Frame k of the store is frame k * factor, as it was. After the last one nothing is known: it is held, so that the
@@ -160,7 +162,7 @@ def between_rows(store: FrameStore, factor: int, progress: bool = True) -> Itera
         (layer, frame, (S, S, 4) uint8).
     """
     layers, frames = (1 + max(key[i] for key in store.keys()) for i in (0, 1))  # noqa: SIM118
-    flows = motions(store, layers, frames)
+    flows = motions(store, layers, frames, params)
     for frame in progress_bar(range(frames), desc="between", unit="frame", disable=not progress):
         motion = next(flows, None)
         for step in range(factor):
@@ -173,12 +175,12 @@ def between_rows(store: FrameStore, factor: int, progress: bool = True) -> Itera
 
 
 @contextmanager
-def at_frame_rate(store: FrameStore, factor: int, folder: Path) -> Iterator[FrameStore]:
+def at_frame_rate(store: FrameStore, factor: int, folder: Path, params: BetweenParams = _USUAL) -> Iterator[FrameStore]:
     """The store of `between_rows`, in a file in `folder` that is gone afterwards; of a factor of 1 the store itself."""
     if factor == 1:
         yield store
         return
     with TemporaryDirectory(dir=folder, prefix=".between-") as scratch:
         path = Path(scratch) / "textures.arrow"
-        write_frames(path, (store.height, store.width, store.channels), between_rows(store, factor))
+        write_frames(path, (store.height, store.width, store.channels), between_rows(store, factor, params))
         yield FrameStore(path)

@@ -20,58 +20,53 @@ from facefolds_core.export.refit import refit_radii
 from facefolds_core.export.sheets import Array, directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.params import DecimateParams
 
-MEASURED_LAYERS = 3
-"""Layers that the error is measured on, each for its share of all: neighbours are nearly parallel."""
-
-HIDDEN = 0.05
-"""Share of its opacity that a place counts with at least, however much lies before it."""
-
-EMPTY = 1e-3
-"""What a place without opacity counts: it orders the collapses there."""
-
-LEAST_AREA = 1e-3
-"""A triangle keeps this share of a grid cell's half: it must not degenerate."""
-
-MARGIN = 2
-"""A triangle is kept if it comes this near, in samples, to one that is not transparent in all frames: filters reach
-across a texel."""
+_USUAL = DecimateParams()
 
 
-def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
+def decimate_sheets(sheets: Sheets, max_vertices: int, params: DecimateParams = _USUAL) -> list[TexturedMesh]:
     """Meshes of all layers, outermost first, over one triangulation.
 
     A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
     frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
     """
-    return decimated_ladder(sheets, [max_vertices])[max_vertices]
+    return decimated_ladder(sheets, [max_vertices], params)[max_vertices]
 
 
-def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
+def decimated_ladder(
+    sheets: Sheets, counts: Sequence[int], params: DecimateParams = _USUAL
+) -> dict[int, list[TexturedMesh]]:
     """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
     st, towards, faces = sheets.st.reshape(-1, 2), directions(sheets), sheet_faces(sheets)
-    groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
-    shows = contribution(sheets.opacity)
+    by = params.collapse
+    groups = np.array_split(np.arange(sheets.num_layers), min(by.measured_layers, sheets.num_layers))
+    shows = contribution(sheets.opacity, by.min_visibility)
     weights = np.stack([shows[group].sum(0).reshape(-1) for group in groups], -1)
     points = np.stack([_positions(sheets, int(group[len(group) // 2]), towards) for group in groups], 1)
-    quadrics = build_quadrics(points, faces, weights[faces].max(1) + EMPTY)
+    quadrics = build_quadrics(points, faces, weights[faces].max(1) + by.empty_weight)
     cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
     targets = sorted(set(counts), reverse=True)
     borders = _borders(len(sheets.st))
-    left = collapse(st, towards, borders, points, faces, quadrics, np.array(targets), LEAST_AREA * cell)
-    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
+    left = collapse(st, towards, borders, points, faces, quadrics, np.array(targets), by.min_area * cell)
+    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * by.margin + 1, 2 * by.margin + 1))
     near = np.ascontiguousarray(opaque.transpose(1, 2, 0))
     return {
-        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], towards)
+        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], towards, params)
         for target, corners in zip(targets, left, strict=True)
     }
 
 
 def _meshes(
-    sheets: Sheets, shows: Array, near: NDArray[np.bool_], faces: NDArray[np.int64], towards: Array
+    sheets: Sheets,
+    shows: Array,
+    near: NDArray[np.bool_],
+    faces: NDArray[np.int64],
+    towards: Array,
+    params: DecimateParams,
 ) -> list[TexturedMesh]:
     """The layers over a triangulation, radii fitted, what holds nothing left out."""
-    fitted = refit_radii(sheets, shows, faces, towards)
+    fitted = refit_radii(sheets, shows, faces, towards, params.refit)
     kept = covers(faces, len(sheets.st), near)
     meshes = []
     for layer in range(sheets.num_layers):
@@ -80,11 +75,11 @@ def _meshes(
     return meshes
 
 
-def contribution(opacity: NDArray[np.uint8]) -> Array:
-    """(N, n, n) compositing weights of the layers seen from outside towards c, at least `HIDDEN` times the opacity."""
+def contribution(opacity: NDArray[np.uint8], least: float) -> Array:
+    """(N, n, n) compositing weights of the layers seen from outside towards c, at least `least` times the opacity."""
     alpha = opacity / 255.0
     through = np.concatenate([np.ones_like(alpha[:1]), np.cumprod(1 - alpha, 0)[:-1]])
-    return np.asarray(alpha * np.maximum(through, HIDDEN))
+    return np.asarray(alpha * np.maximum(through, least))
 
 
 def _positions(sheets: Sheets, layer: int, towards: Array) -> Array:

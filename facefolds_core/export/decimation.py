@@ -27,8 +27,7 @@ from facefolds_core.geometry.sphere_uv import Window, points_to_uv, texel_uv, uv
 from facefolds_core.params import DecimateParams
 from facefolds_core.progress import progress as progress_bar
 
-AGGRESSIVENESS = (3, 5, 7)
-"""Tried in turn: the least that reaches the target is best. 3 does for all but a handful of vertices."""
+_USUAL = DecimateParams()
 
 FLAT = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
@@ -71,7 +70,7 @@ def decimate_layers(
         )
     meshes = []
     for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
-        coarse = decimate(surface, params.resolution**2, centre)
+        coarse = decimate(surface, params.resolution**2, centre, params.aggressiveness)
         if len(coarse.faces) == 0:
             raise UserError(
                 "decimation left nothing of a layer",
@@ -85,18 +84,20 @@ def decimate_layers(
     return meshes
 
 
-def decimate(surface: Surface, max_vertices: int, centre: Array) -> Surface:
+def decimate(
+    surface: Surface, max_vertices: int, centre: Array, aggressiveness: Sequence[float] = _USUAL.aggressiveness
+) -> Surface:
     """Collapse edges until at most `max_vertices` vertices are left; drop faces that turned over or lost their area.
 
     Layers are level sets that rays towards `centre` meet first, so every face looks away from it.
     """
     vertices, faces = surface.vertices.astype(np.float64), surface.faces.astype(np.intp)
     # Euler: an open sheet has F = 2 V - 2 - B triangles, B its border vertices, a few times sqrt(V) after decimation.
-    for aggressiveness in AGGRESSIVENESS:
+    for attempt in aggressiveness:
         target = min(2 * max_vertices, len(surface.faces))
         while len(vertices) > max_vertices and target > 0:
             found, index = fast_simplification.simplify(
-                surface.vertices, surface.faces, target_count=target, agg=aggressiveness
+                surface.vertices, surface.faces, target_count=target, agg=attempt
             )
             kept = index[upright_faces(found, index, centre)].astype(np.intp)
             vertices, faces = compact(found.astype(np.float64), largest_component(kept, len(found)))

@@ -17,25 +17,28 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.bake_kernel import PARTS
 from facefolds_core.export.hold_kernel import add_weights, hold
+from facefolds_core.frame_store import FrameStore
+from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 
-WEIGHED = 6
-"""Frames, evenly spread, in which it is looked how much a texel shows; the greatest counts."""
+_USUAL = BakeParams()
 
 
-def texel_weights(codes: NDArray[np.uint16], textures: FrameStore, cameras: int) -> NDArray[np.float32]:
+def texel_weights(
+    codes: NDArray[np.uint16], textures: FrameStore, cameras: int, looked_at: int = _USUAL.hold_frames
+) -> NDArray[np.float32]:
     """(N, S, S, 2): W of colour and of alpha.
 
     Args:
         codes: (P, N, 2) rays of all training cameras (`bake.Rays.shipped`).
         textures: layered frame store.
         cameras: how many those are.
+        looked_at: frames, evenly spread; the greatest weight counts.
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
-    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, min(WEIGHED, len(frames)))})
+    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, min(looked_at, len(frames)))})
     weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
     for frame in chosen:
         sums = np.zeros((PARTS, *weights.shape), np.float32)

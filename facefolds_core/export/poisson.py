@@ -29,10 +29,6 @@ from facefolds_core.progress import progress as progress_bar
 MIN_SAMPLES = 16
 """Fewer valid samples than this make no surface."""
 
-TRIM_EDGES = 1.5
-"""The sheet's rim is never cut closer than this many mean edges of the Poisson mesh: where its triangles are larger
-than the sample spacing, a smaller distance would cut off the rim's triangles although they cover samples."""
-
 Array = NDArray[np.float64]
 
 
@@ -149,7 +145,7 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Reco
         )
     vertices, faces = screened_poisson(samples.points, samples.normals, params.depth, params.point_weight)
     if len(faces):
-        vertices, faces = trim(vertices, faces, samples, params.trim)
+        vertices, faces = trim(vertices, faces, samples, params)
     if len(faces) == 0:
         raise UserError(
             "Poisson reconstruction gave no surface near the samples",
@@ -194,20 +190,22 @@ def screened_poisson(points: Array, normals: Array, depth: int, point_weight: fl
     return np.asarray(mesh.vertex_matrix(), np.float64), np.asarray(mesh.face_matrix(), np.intp)
 
 
-def trim(vertices: Array, faces: NDArray[np.intp], samples: Samples, spacings: float) -> tuple[Array, NDArray[np.intp]]:
+def trim(
+    vertices: Array, faces: NDArray[np.intp], samples: Samples, params: ReconstructParams
+) -> tuple[Array, NDArray[np.intp]]:
     """Keep what lies near the samples, and of that the largest component.
 
     Args:
         vertices, faces: (V, 3), (F, 3) of the closed surface.
-        spacings: a vertex stays within this many local sample spacings of the nearest sample.
+        params: how far from the nearest sample a vertex may stay.
 
     Returns:
         vertices and faces, the latter possibly none.
     """
     edges = vertices[faces[:, 1]] - vertices[faces[:, 0]]
-    least = TRIM_EDGES * float(np.linalg.norm(edges, axis=-1).mean())
+    least = params.trim_edges * float(np.linalg.norm(edges, axis=-1).mean())
     distance, nearest = cKDTree(samples.points).query(vertices)
-    near = distance <= np.maximum(spacings * samples.spacing[nearest], least)
+    near = distance <= np.maximum(params.trim * samples.spacing[nearest], least)
     return compact(vertices, largest_component(faces[near[faces].all(1)], len(vertices)))
 
 

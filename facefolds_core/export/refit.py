@@ -19,16 +19,10 @@ from facefolds_core.export.collapse_kernel import locate
 from facefolds_core.export.sheets import Array
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.sphere_uv import st_to_uv
-
-STAY = 0.1
-"""Pull towards the sample's own radius, in shares of what the samples around a vertex weigh."""
-
-LEAST_COSINE = 0.02
-EMPTY = 1e-4
-"""What a place that never shows weighs."""
+from facefolds_core.params import RefitParams
 
 
-def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], towards: Array) -> Sheets:
+def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], towards: Array, params: RefitParams) -> Sheets:
     """The same sheets with new radii at the vertices that `faces` use, nested as before.
 
     Args:
@@ -47,9 +41,10 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], towards:
     fitted = np.empty((sheets.num_layers, len(used)))
     for layer, radii in enumerate(sheets.radii.reshape(sheets.num_layers, -1).astype(np.float64)):
         cosines = radial_cosines(sheets, layer).reshape(-1)
-        weights = ((shows[layer].reshape(-1) + EMPTY) * np.maximum(cosines, LEAST_COSINE) ** 2)[inside]
+        weight = shows[layer].reshape(-1) + params.empty_weight
+        weights = (weight * np.maximum(cosines, params.min_cosine) ** 2)[inside]
         normal = matrix.T @ diags(weights) @ matrix
-        stay = diags(STAY * normal.diagonal() + 1e-6)
+        stay = diags(params.stay * normal.diagonal() + 1e-6)
         right = matrix.T @ (weights / radii[inside]) + stay @ (1 / radii[used])
         fitted[layer] = 1 / spsolve((normal + stay).tocsc(), right)
     result = sheets.radii.reshape(sheets.num_layers, -1).copy()

@@ -13,10 +13,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.errors import UserError
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.progress import progress as progress_bar
 
@@ -76,7 +76,8 @@ def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None
                 place=f"layer {layer} (0 is the outermost)",
                 expected="a surface in front of the sphere centre",
                 found="no crossing",
-                remedy="train longer, with fewer layers (train.layers) or a smaller train.level_halfwidth",
+                remedy="train longer, with fewer layers (train.layers) or a smaller distance between them "
+                "(train.geometry.halfwidth; train.level_halfwidth of the perceptrons)",
             )
 
 

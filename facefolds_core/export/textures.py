@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.progress import progress as progress_bar
 
 Float = NDArray[np.float32]

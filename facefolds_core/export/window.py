@@ -19,35 +19,29 @@ from numpy.typing import NDArray
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv
+from facefolds_core.params import AutoWindowParams
 
-EPSILON = 1 / 255
-"""Largest change of a looked-at ray's colour: one step of an 8-bit image."""
-
-RAYS_PER_CAMERA = 2500
-FRAMES = 3
-MARGIN_STEPS = 2.0
-"""Margin on each side, in steps of the lattice of rays on the surface."""
+_USUAL = AutoWindowParams()
 
 
-def visible_window(model: LayeredModel, cameras: Sequence[Camera], rays_per_camera: int = RAYS_PER_CAMERA) -> Window:
-    """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `EPSILON`.
+def visible_window(model: LayeredModel, cameras: Sequence[Camera], params: AutoWindowParams = _USUAL) -> Window:
+    """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `max_change`.
 
     Args:
         model: looked at without its view branch, in its first, middle and last frame.
         cameras: the training cameras.
-        rays_per_camera: size of the lattice of rays laid over each image, at most.
 
     Returns:
         the window, cut to the hemisphere; the whole hemisphere if the model is transparent everywhere.
     """
-    frames = sorted({round(f) for f in np.linspace(0, model.num_frames - 1, FRAMES)})
+    frames = sorted({round(f) for f in np.linspace(0, model.num_frames - 1, params.frames)})
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for camera in cameras:
-        stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / rays_per_camera)))
-        seen, step = _seen_uv(model, camera, stride, frames)
+        stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / params.rays_per_camera)))
+        seen, step = _seen_uv(model, camera, stride, frames, params.max_change)
         if len(seen):
             low, high = np.minimum(low, seen.min(0)), np.maximum(high, seen.max(0))
-            margin = max(margin, MARGIN_STEPS * step)
+            margin = max(margin, params.margin * step)
     if not np.isfinite(low).all():
         return FULL_WINDOW
     (u0, v0), (u1, v1) = np.maximum(low - margin, -1.0), np.minimum(high + margin, 1.0)
@@ -63,11 +57,11 @@ def removed_weight(model: LayeredModel, camera: Camera, stride: int, frame: int,
 
 
 def _seen_uv(
-    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int]
+    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int], max_change: float
 ) -> tuple[NDArray[np.float64], float]:
     """(u, v) (M, 2) of the crossings that count, and the distance of neighbouring rays on the surface, in (u, v)."""
     uv, weights, hit, points = _crossings(model, camera, stride, frames)
-    seen = hit & (weights > EPSILON / model.num_layers)
+    seen = hit & (weights > max_change / model.num_layers)
     if not seen.any():
         return np.zeros((0, 2)), 0.0
     centre = model.centre.detach().cpu().numpy()

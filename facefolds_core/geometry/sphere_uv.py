@@ -15,10 +15,10 @@ All functions take numpy arrays or torch tensors and return the same kind.
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
-import torch
 
 Window = tuple[float, float, float, float]
 FULL_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
@@ -26,7 +26,9 @@ FULL_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 
 
 def _library(x: Any) -> Any:
-    return torch if isinstance(x, torch.Tensor) else np
+    """torch for its tensors, numpy for all else. Nobody has a tensor who has not imported torch: readers need none."""
+    torch = sys.modules.get("torch")
+    return torch if torch is not None and isinstance(x, torch.Tensor) else np
 
 
 def directions_to_uv(directions: Any) -> Any:

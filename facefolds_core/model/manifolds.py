@@ -16,11 +16,6 @@ from facefolds_core.model.layers import LinearStack
 CHUNK = {"cpu": 1 << 15, "cuda": 1 << 21}
 """Points that the field is evaluated at together without gradient: on a CPU the activations then stay in its cache."""
 
-INPUT_SCALE = 6.0
-"""The MLP sees (x - c) in units of a sixth of the outermost radius: without it, SiLU layers of He's size are too smooth
-to follow a face. Fitted to a head for the same time, the median error was 1.2e-3 units at scale 1, 0.8e-3 at 3 and
-0.5e-3 at 6. A model keeps the scale that it was trained with in its model.json."""
-
 
 class Manifolds(Protocol):
     """What a model of the surfaces must offer; the rest of the model asks nothing else of it."""
@@ -80,7 +75,7 @@ class MlpManifolds(nn.Module):
         hidden_layers: int,
         width: int,
         samples: int,
-        input_scale: float = INPUT_SCALE,
+        input_scale: float = 6.0,
         output_scale: float = 1.0,
     ) -> None:
         super().__init__()

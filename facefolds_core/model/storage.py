@@ -14,7 +14,7 @@ from torch import Tensor
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.model.grids import GridTextures
-from facefolds_core.model.manifolds import INPUT_SCALE, MlpManifolds
+from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.textures import MlpTextures
@@ -39,7 +39,7 @@ class ModelSpec(BaseModel):
         num_frames: K.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
         input_scale, output_scale: of `MlpManifolds`.
-        others: as in TrainParams.
+        others: as in `MlpParams`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -60,7 +60,7 @@ class ModelSpec(BaseModel):
     uv_frequencies: int
     level_frequencies: int
     view_frequencies: int
-    input_scale: float = INPUT_SCALE
+    input_scale: float = 6.0
     output_scale: float = 1.0
     fingerprint: str = ""
 

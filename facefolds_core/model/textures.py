@@ -12,9 +12,6 @@ from torch.nn.functional import embedding, relu
 from facefolds_core.model.encoding import encoded_size, positional_encoding
 from facefolds_core.model.layers import LinearStack
 
-INITIAL_ALPHA_LOGIT = -1.5
-"""Bias of the opacity: sigmoid(-1.5) = 0.18, so that all 12 layers are seen (and learn) at the start."""
-
 
 @dataclass(frozen=True)
 class Shaded:
@@ -92,9 +89,14 @@ class MlpTextures(nn.Module):
                 nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
                 nn.init.zeros_(layer.bias)
             nn.init.normal_(self.base.weight, std=0.5 / width**0.5)
-            self.base.bias.copy_(torch.tensor([0.0, 0.0, 0.0, INITIAL_ALPHA_LOGIT]))
+            self.base.bias.copy_(torch.tensor([0.0, 0.0, 0.0, -1.5]))
             nn.init.zeros_(self.view.weight)
             nn.init.zeros_(self.view.bias)
+
+    def start_alpha(self, logit: float) -> None:
+        """Set the bias of the opacity, of all layers and frames: before training only."""
+        with torch.no_grad():
+            self.base.bias[3] = logit
 
     @property
     def num_frames(self) -> int:

@@ -23,26 +23,13 @@ from facefolds_core.asset.effects import EffectsPicture, Map
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.captures.scene import Scene
 from facefolds_core.packaging.views import spread
+from facefolds_core.params import ViewEffectParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering.effects import bilinear, to_eye
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture, sample_texture
 
-FRAMES = 3
-ROWS = 240_000
-"""Pixels in the fit, over all cameras and frames."""
-COVERED = 0.9
-"""Opacity from which a pixel is the asset's."""
-LEAST_WEIGHT = 0.01
-GREATEST_RESIDUAL = 0.3
-"""Residuals are clipped to it: what is beyond is wrong geometry or the room."""
-RIDGES = (1.0, 3.0, 10.0, 30.0)
-VALIDATION = 5
-"""Every so many-th training camera is left out to choose the ridge."""
-LEAST_GAIN = 0.2
-"""dB on those cameras below which no effects ship."""
-DOWNSCALES = (8, 12, 16, 24, 32)
-"""Texels of the textures a texel of the maps, along each side: the first whose file is small enough."""
+_USUAL = ViewEffectParams()
 
 Array = NDArray[np.float32]
 
@@ -74,39 +61,44 @@ class Pixels:
     photos: dict[int, Array]
 
 
-def fit_effects(content: LevelContent, scene: Scene, allowed_bytes: float) -> EffectsPicture | None:
+def fit_effects(
+    content: LevelContent, scene: Scene, allowed_bytes: float, params: ViewEffectParams = _USUAL
+) -> EffectsPicture | None:
     """The view effects of a level, or None where they would not help on cameras that the fit did not see.
 
     Args:
         allowed_bytes: of the PNG; the resolution is chosen by it.
     """
     cameras = scene.indices("train")
-    if len(cameras) < VALIDATION:
+    if len(cameras) < params.validation_every:
         return None
-    frames = spread(content.frames, FRAMES)
+    frames = spread(content.frames, params.frames)
     textures = {frame: content.frame(frame) for frame in frames}
-    rays = max(1, ROWS // (len(cameras) * len(frames)))
+    rays = max(1, params.pixels // (len(cameras) * len(frames)))
     views = _views(content, scene, cameras, frames, rays)
-    for downscale in DOWNSCALES:
+    for downscale in params.downscales:
         sizes = [(-(-layer.crop[3] // downscale), -(-layer.crop[2] // downscale)) for layer in content.layers]
-        parts = [_equations(view, textures, sizes) for view in views if view.photos]
-        picture = _solved(parts, sizes)
+        parts = [_equations(view, textures, sizes, params) for view in views if view.photos]
+        picture = _solved(parts, sizes, params)
         if picture is None or len(picture.png()) <= allowed_bytes:
             return picture
     return None
 
 
-def _solved(parts: Sequence[Equations], sizes: Sequence[tuple[int, int]]) -> EffectsPicture | None:
-    left_out = list(range(VALIDATION // 2, len(parts), VALIDATION))
+def _solved(
+    parts: Sequence[Equations], sizes: Sequence[tuple[int, int]], params: ViewEffectParams
+) -> EffectsPicture | None:
+    every, clip = params.validation_every, params.max_residual
+    left_out = list(range(every // 2, len(parts), every))
     seen = Equations.joined([part for i, part in enumerate(parts) if i not in left_out])
     unseen = Equations.joined([parts[i] for i in left_out])
     if not len(seen.residual) or not len(unseen.residual):
         return None
-    gains = {ridge: _gain(unseen, _ridge(seen, ridge)) for ridge in RIDGES}
+    gains = {ridge: _gain(unseen, _ridge(seen, ridge, clip)) for ridge in params.ridges}
     best = max(gains, key=lambda ridge: gains[ridge])
-    if gains[best] < LEAST_GAIN:
+    if gains[best] < params.min_gain:
         return None
-    return EffectsPicture.of(_maps(_ridge(Equations.joined(parts), best), sizes))
+    return EffectsPicture.of(_maps(_ridge(Equations.joined(parts), best, clip), sizes))
 
 
 def _gain(equations: Equations, solution: Array) -> float:
@@ -115,10 +107,10 @@ def _gain(equations: Equations, solution: Array) -> float:
     return float(10 * np.log10((equations.residual**2).mean() / (after**2).mean()))
 
 
-def _ridge(equations: Equations, ridge: float) -> Array:
+def _ridge(equations: Equations, ridge: float, clip: float) -> Array:
     """(3 U, 3): argmin |A x - b|^2 + ridge |x|^2, by conjugate gradients with Jacobi's preconditioner."""
     matrix = equations.matrix
-    clipped = np.clip(equations.residual, -GREATEST_RESIDUAL, GREATEST_RESIDUAL)
+    clipped = np.clip(equations.residual, -clip, clip)
     diagonal = np.asarray(matrix.multiply(matrix).sum(0)).ravel() + ridge
     shape = (matrix.shape[1],) * 2
     normal = LinearOperator(shape, matvec=lambda x: matrix.T @ (matrix @ x) + ridge * x, dtype=np.float32)
@@ -157,7 +149,9 @@ def _photo(image: NDArray[np.uint8], pixels: NDArray[np.intp]) -> Array:
     return np.asarray(image.reshape(-1, 3)[pixels] / 255, np.float32)
 
 
-def _equations(view: Pixels, textures: dict[int, list[Texture]], sizes: Sequence[tuple[int, int]]) -> Equations:
+def _equations(
+    view: Pixels, textures: dict[int, list[Texture]], sizes: Sequence[tuple[int, int]], params: ViewEffectParams
+) -> Equations:
     """The rows of one camera, all its frames."""
     starts = np.cumsum([0, *(h * w for h, w in sizes)])
     hit = view.hits.hit[0]
@@ -172,13 +166,13 @@ def _equations(view: Pixels, textures: dict[int, list[Texture]], sizes: Sequence
             w = through[rays] * rgba[:, 3]
             rgb[rays] += w[:, None] * rgba[:, :3]
             through[rays] *= 1 - rgba[:, 3]
-            use = w > LEAST_WEIGHT
+            use = w > params.min_weight
             rows.append(np.repeat(rays[use], 4))
             columns.append((starts[i] + texels[use]).ravel())
             values.append((w[use, None] * weights[use]).ravel())
         shape = (len(hit), int(starts[-1]))
         triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        kept = np.flatnonzero(1 - through > COVERED)
+        kept = np.flatnonzero(1 - through > params.min_opacity)
         weights_matrix = sparse.csr_matrix(triplets, shape, dtype=np.float32)[kept]
         along = [sparse.diags(view.eye[kept, k]) @ weights_matrix for k in range(3)]
         parts.append(Equations(sparse.hstack(along).tocsr(), (photo - rgb)[kept]))

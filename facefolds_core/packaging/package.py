@@ -34,14 +34,13 @@ from facefolds_core.asset.writer import (
     AssetSource,
     LevelContent,
     check_inputs,
-    file_sha256,
     manifest_of,
     write_level,
 )
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export.between import at_frame_rate
-from facefolds_core.files import atomic_folder
+from facefolds_core.files import atomic_folder, file_sha256
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
@@ -49,14 +48,9 @@ from facefolds_core.packaging.effects import fit_effects
 from facefolds_core.packaging.levels import Decimate, coarse_content, level_params
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
-from facefolds_core.packaging.views import FRAMES, ViewMeter, spread, training_cameras
-from facefolds_core.params import CompressParams, VideoCodec
+from facefolds_core.packaging.views import ViewMeter, spread, training_cameras
+from facefolds_core.params import CompressParams, CrfSearchParams, VideoCodec
 from facefolds_core.rendering.reference import AssetCaster, composite
-
-EFFECTS_SHARE = 0.1
-SEARCH_FRAMES = 30
-"""A search for a quality encodes at most so many frames, from the first on."""
-JPEG_QUALITY = 92
 
 
 @dataclass(frozen=True)
@@ -85,10 +79,13 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
     cameras = training_cameras(scene)
-    with atomic_folder(folder) as temporary, at_frame_rate(export.textures, factor, temporary) as textures:
+    with (
+        atomic_folder(folder) as temporary,
+        at_frame_rate(export.textures, factor, temporary, params.between) as textures,
+    ):
         layers = crop_layers(export.meshes, export.windows, textures, frames * factor)
         full = LevelContent(layers, textures, frames * factor, source.fps * factor, scene.audio)
-        meter = make_meter(full, cameras)
+        meter = make_meter(full, cameras, params)
         levels = []
         for coarse in params.levels:
             content = coarse_content(full, export.windows, coarse, export.decimate)
@@ -96,19 +93,21 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
         level = _level(temporary, FULL, full, params, meter, cameras)
         if params.view_effects:
             photographed = replace(full, textures=export.textures, frames=frames)
-            level = _with_effects(temporary, level, fit_effects(photographed, scene, EFFECTS_SHARE * level.bytes))
-        photos = _photos(temporary, scene, params.photos, factor)
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos)
+            allowed = params.effects.share * level.bytes
+            level = _with_effects(temporary, level, fit_effects(photographed, scene, allowed, params.effects))
+        photos = _photos(temporary, scene, params, factor)
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos, params.jpeg_quality)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
-def make_meter(content: LevelContent, cameras: Sequence[Camera]) -> ViewMeter | None:
+def make_meter(content: LevelContent, cameras: Sequence[Camera], params: CompressParams) -> ViewMeter | None:
     """The yardstick of the content's own textures and meshes; None without cameras."""
     if not cameras:
         return None
-    frames = {*spread(content.frames, FRAMES), *spread(min(content.frames, SEARCH_FRAMES), FRAMES)}
+    wanted = params.meter.frames
+    frames = {*spread(content.frames, wanted), *spread(min(content.frames, params.search.frames), wanted)}
     meshes = [layer.mesh for layer in content.layers]
-    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames})
+    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames}, params.meter)
 
 
 def _level(
@@ -124,7 +123,8 @@ def _level(
     video = params.video
     crfs = None
     if meter is not None and video.target_psnr is not None and not video.lossless:
-        crfs = {codec: _crf(content, CODECS[codec], video, meter, video.target_psnr) for codec in video.codec}
+        search, target = params.search, video.target_psnr
+        crfs = {codec: _crf(content, CODECS[codec], video, meter, target, search) for codec in video.codec}
     level = write_level(folder, name, content, params, crfs)
     if meter is None:
         return level
@@ -148,21 +148,30 @@ def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) ->
     return level.model_copy(update=update)
 
 
-def _crf(content: LevelContent, codec: Codec, video: VideoCodec, meter: ViewMeter, target: float) -> int:
+def _crf(
+    content: LevelContent,
+    codec: Codec,
+    video: VideoCodec,
+    meter: ViewMeter,
+    target: float,
+    search: CrfSearchParams,
+) -> int:
     layout = content.layout
     with TemporaryDirectory() as scratch:
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:
-            content.encode(path, codec, video, crf, min(content.frames, SEARCH_FRAMES))
+            content.encode(path, codec, video, crf, min(content.frames, search.frames))
             pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
             wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
             return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
 
-        return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf
+        return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf, search).crf
 
 
-def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo]) -> Manifest:
+def _with_extras(
+    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
+) -> Manifest:
     """Add sound, a poster and photos."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
@@ -171,7 +180,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
         update["audio"] = StoredFile(**_stored(path))
     cameras = training_cameras(scene)
     if cameras:
-        update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras))
+        update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras), jpeg_quality)
     return manifest.model_copy(update=update)
 
 
@@ -180,27 +189,27 @@ def _frontal(cameras: Sequence[Camera]) -> Camera:
     return max(cameras, key=lambda camera: camera.centre[0] / np.linalg.norm(camera.centre))
 
 
-def _poster(path: Path, level: Level, camera: Camera) -> Poster:
+def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Poster:
     shown = read_level(path.parent, level)
     rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
     pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(pixels).save(path, quality=JPEG_QUALITY)
+    Image.fromarray(pixels).save(path, quality=jpeg_quality)
     return Poster(**_stored(path), width=camera.width, height=camera.height)
 
 
-def _photos(folder: Path, scene: Scene, wanted: int, factor: int) -> list[Photo]:
+def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:
     """Photos of held-out cameras, each with its own frame, spread over the sequence.
 
     Args:
         factor: frames of the asset a frame of the scene.
     """
-    if wanted == 0:
+    if params.photos == 0:
         return []
     store, found = scene.open_frames(), []
     keys = [key for key in store if key[0] in scene.indices("holdout")]
-    for index, key in enumerate(keys[i] for i in spread(len(keys), wanted)) if keys else ():
+    for index, key in enumerate(keys[i] for i in spread(len(keys), params.photos)) if keys else ():
         path = folder / f"photo_{index:02d}.jpg"
-        Image.fromarray(store.image(*key)).save(path, quality=JPEG_QUALITY)
+        Image.fromarray(store.image(*key)).save(path, quality=params.jpeg_quality)
         camera = scene.cameras[key[0]]
         found.append(
             Photo(

@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.params import MeterParams
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture, composite
 
 Image = NDArray[np.float32]
 
-CAMERAS = 6
-FRAMES = 3
-RAYS_A_CAMERA = 16_000
 MAX_PSNR = 100.0
+"""Of equal pictures, dB."""
+
+_USUAL = MeterParams()
 
 
 def spread(count: int, wanted: int) -> list[int]:
@@ -39,8 +40,9 @@ class ViewMeter:
 
     Args:
         meshes: of the reference, outermost first.
-        cameras: of which CAMERAS evenly spaced ones are used.
+        cameras: of which some, evenly spaced, are used.
         references: frame -> N textures of the reference.
+        params: how many cameras and rays.
         seed: of the choice of rays among those that hit anything.
     """
 
@@ -49,16 +51,17 @@ class ViewMeter:
         meshes: Sequence[TexturedMesh],
         cameras: Sequence[Camera],
         references: Mapping[int, Sequence[Texture]],
+        params: MeterParams = _USUAL,
         seed: int = 0,
     ) -> None:
-        self._cameras = [cameras[i] for i in spread(len(cameras), CAMERAS)]
+        self._cameras = [cameras[i] for i in spread(len(cameras), params.cameras)]
         rng = np.random.default_rng(seed)
         self._pixels: list[NDArray[np.intp]] = []
         hits = []
         for camera in self._cameras:
             cast = cast_layers(camera, meshes)
             seen = np.flatnonzero(cast.hit.any(2))
-            chosen = np.sort(rng.choice(seen, min(RAYS_A_CAMERA, len(seen)), replace=False))
+            chosen = np.sort(rng.choice(seen, min(params.rays_per_camera, len(seen)), replace=False))
             self._pixels.append(chosen)
             hits.append(_subset(cast, chosen))
         self._hits = _joined(hits)

@@ -69,12 +69,12 @@ def gather(folders: SubjectFolders) -> Subject:
     return Subject(facts, asset, scene, measure(scene, asset, pairs, params.background) if pairs else None)
 
 
-def chosen_pairs(scene: Scene, wanted: int) -> list[tuple[int, int]]:
+def chosen_pairs(scene: Scene, wanted: int, most_pixels: int = MOST_PIXELS) -> list[tuple[int, int]]:
     """(camera, frame) of the held-out pictures that are shown: `wanted` frames a camera, fewer if they are large."""
     photos = scene.open_frames()
     frames = spread(scene.num_frames, wanted)
     pairs = [(index, k) for index in scene.indices("holdout") for k in frames if (index, k) in photos]
-    most = max(1, min(MOST_VIEWS, MOST_PIXELS // (scene.width * scene.height)))
+    most = max(1, min(MOST_VIEWS, most_pixels // (scene.width * scene.height)))
     return [pairs[i] for i in spread(len(pairs), most)] if pairs else []
 
 

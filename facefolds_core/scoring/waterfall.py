@@ -13,11 +13,11 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.sheets import full_meshes
 from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, read_sheets, read_surfaces
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st

@@ -88,7 +88,7 @@ def read_runs(path: Path) -> list[Run]:
         UserError: if it is missing or not such a table.
     """
     _check_suffix(path)
-    remedy = "`python -m stages.collect` writes one"
+    remedy = "`facefolds collect` writes one"
     try:
         if path.suffix == ".csv":
             texts = pa_csv.ConvertOptions(

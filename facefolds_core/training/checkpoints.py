@@ -47,7 +47,8 @@ class TrainingState:
 def fingerprint(params: TrainParams, scene: Scene) -> str:
     """16 hex digits that name a configuration and the scene it is trained on.
 
-    Device and checkpoint interval are left out: they do not change what is computed. Of the frame store, its size and
+    A digest of the section's dump and of the scene. The preset's name, the device and the checkpoint interval are left
+    out: they do not change what is computed. Of the frame store, its size and
     64 evenly spread blocks of 4 KiB are read.
     """
     digest = hashlib.sha256()

@@ -16,7 +16,8 @@ from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model, save_model
-from facefolds_core.params import TrainParams
+from facefolds_core.model.textures import MlpTextures
+from facefolds_core.params import MlpParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import (
     CHECKPOINT,
@@ -34,11 +35,8 @@ from facefolds_core.training.start import Start, find_start, fit_outline
 LOG_POINTS = 500
 """Lines in the log of a whole training, at least; never more than 100 iterations apart."""
 
-START_ITERATIONS = 600
-"""Of the regression onto the tracked mesh (`manifold_start: surface`)."""
 
-
-def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
+def learning_rates(params: MlpParams, iteration: int) -> dict[str, float]:
     """lr_0 decay^(iteration / interval): the paper's decay "of 0.05 and 0.20 per 200 000 iterations" as factors."""
     time_constant = iteration / params.decay_interval
     return {
@@ -47,8 +45,8 @@ def learning_rates(params: TrainParams, iteration: int) -> dict[str, float]:
     }
 
 
-def model_spec(params: TrainParams, start: Start, num_frames: int, mark: str) -> ModelSpec:
-    shared = set(ModelSpec.model_fields) & set(TrainParams.model_fields)
+def model_spec(params: MlpParams, start: Start, num_frames: int, mark: str) -> ModelSpec:
+    shared = set(ModelSpec.model_fields) & set(MlpParams.model_fields)
     return ModelSpec(
         centre=SPHERE_CENTRE,
         levels=start.levels,
@@ -59,11 +57,13 @@ def model_spec(params: TrainParams, start: Start, num_frames: int, mark: str) ->
     )
 
 
-def new_state(params: TrainParams, spec: ModelSpec, device: torch.device) -> TrainingState:
+def new_state(params: MlpParams, spec: ModelSpec, device: torch.device) -> TrainingState:
     """Model, optimiser and ray generator before the first step; the same on every device for a seed."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(params.seed)
         model = build_model(spec).to(device)
+    if isinstance(model.textures, MlpTextures):
+        model.textures.start_alpha(params.initial_alpha_logit)
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
@@ -73,7 +73,7 @@ def new_state(params: TrainParams, spec: ModelSpec, device: torch.device) -> Tra
     return TrainingState(model, optimiser, torch.Generator().manual_seed(params.seed))
 
 
-def train_step(state: TrainingState, sampler: RaySampler, params: TrainParams) -> Losses:
+def train_step(state: TrainingState, sampler: RaySampler, params: MlpParams) -> Losses:
     """One Adam step.
 
     Raises:
@@ -125,7 +125,7 @@ class TrainingRun:
     checkpoints: Path
 
 
-def begin(scene: Scene, params: TrainParams, checkpoints: Path) -> TrainingRun:
+def begin(scene: Scene, params: MlpParams, checkpoints: Path) -> TrainingRun:
     """A training before its first step, or at its last checkpoint if there is one.
 
     Args:
@@ -135,7 +135,7 @@ def begin(scene: Scene, params: TrainParams, checkpoints: Path) -> TrainingRun:
         UserError: if the checkpoint found is damaged.
     """
     device = pick_device(params.device)
-    start = find_start(scene, params.layers, params.level_halfwidth)
+    start = find_start(scene, params)
     mark = fingerprint(params, scene)
     spec = model_spec(params, start, scene.num_frames, mark)
     state = new_state(params, spec, device)
@@ -151,7 +151,7 @@ def begin(scene: Scene, params: TrainParams, checkpoints: Path) -> TrainingRun:
 class _Progress:
     """Log (dvclive) and progress bar: averages over the iterations since the last line."""
 
-    def __init__(self, params: TrainParams, folder: Path, iteration: int) -> None:
+    def __init__(self, params: MlpParams, folder: Path, iteration: int) -> None:
         self.params = params
         self.every = max(1, min(100, params.iterations // LOG_POINTS))
         _trim_log(folder, iteration)
@@ -201,7 +201,7 @@ def _trim_log(folder: Path, iteration: int) -> None:
         path.write_text(header + "".join(r for r in rows if int(r.split("\t")[column]) <= iteration), encoding="utf-8")
 
 
-def train(scene: Scene, params: TrainParams, model_folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
+def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
     """Train on `scene`, write the model folder whole, and remove the checkpoint.
 
     A run that was interrupted continues from its last checkpoint, to the same result (bit for bit on a CPU with the
@@ -226,16 +226,16 @@ def train(scene: Scene, params: TrainParams, model_folder: Path, checkpoints: Pa
     return report
 
 
-def _move_to_mesh(state: TrainingState, params: TrainParams, start: Start) -> None:
+def _move_to_mesh(state: TrainingState, params: MlpParams, start: Start) -> None:
     manifolds = state.model.manifolds
     if params.manifold_start == "surface" and start.outline is not None and isinstance(manifolds, MlpManifolds):
         began = time.perf_counter()
-        error = fit_outline(manifolds, start.outline, START_ITERATIONS, state.generator)
+        error = fit_outline(manifolds, start.outline, params.start, state.generator)
         state.seconds += time.perf_counter() - began
         print(f"train: manifolds start at the tracked mesh, mean error {error:.4f} units")
 
 
-def _finish(run: TrainingRun, params: TrainParams, log: Path) -> float:
+def _finish(run: TrainingRun, params: MlpParams, log: Path) -> float:
     """All remaining iterations; returns the PSNR of the last log interval."""
     state = run.state
     progress = _Progress(params, log, state.iteration)

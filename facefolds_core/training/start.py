@@ -14,14 +14,9 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.model.manifolds import MlpManifolds
+from facefolds_core.params import MlpParams, MlpStartParams
 
 Array = NDArray[np.float64]
-
-MARGIN = 0.05
-"""The search ball reaches this far beyond the outermost level's farthest point, units."""
-
-FILL = 0.8
-"""Without a tracked mesh: the subject is taken to fill this fraction of the narrower half field of view."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +47,15 @@ class Start:
     outline: Outline | None
 
 
-def find_start(scene: Scene, layers: int, halfwidth: float) -> Start:
-    """Levels within +-`halfwidth` of the face surface, and the ball in which crossings are searched.
+def find_start(scene: Scene, params: MlpParams) -> Start:
+    """Levels within +-`level_halfwidth` of the face surface, and the ball in which crossings are searched.
 
     With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of the scene's centre
     (x > 0: the face, not the sides of the head), and the ball encloses all outermost vertices. Without, see
-    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `MARGIN` beyond
-    the outermost layer if that lay `halfwidth` outside the surface's farthest point.
+    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `start.margin`
+    beyond the outermost layer if that lay halfwidth outside the surface's farthest point.
     """
+    layers, halfwidth = params.layers, params.level_halfwidth
     surface = scene.load_surface()
     outline = None
     if surface is not None:
@@ -67,9 +63,9 @@ def find_start(scene: Scene, layers: int, halfwidth: float) -> Start:
         face = SPHERE_CENTRE[0] + outline.radii * outline.directions[:, 0] > 0
         r0, farthest = float(np.median(outline.radii[face if face.any() else slice(None)])), float(outline.radii.max())
     else:
-        r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")])
+        r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")], params.start.fill)
     offsets = np.linspace(halfwidth, -halfwidth, layers) if layers > 1 else np.zeros(1)
-    return Start(tuple((r0 + offsets).tolist()), farthest + halfwidth + MARGIN, outline)
+    return Start(tuple((r0 + offsets).tolist()), farthest + halfwidth + params.start.margin, outline)
 
 
 def find_outline(vertices: Array) -> Outline:
@@ -87,12 +83,12 @@ def find_outline(vertices: Array) -> Outline:
     return Outline(directions[keep], radii[keep])
 
 
-def fitted_radius(cameras: list[Camera]) -> tuple[float, float]:
+def fitted_radius(cameras: list[Camera], fill: float) -> tuple[float, float]:
     """Start radius where there is no tracked mesh.
 
-    The subject is a ball at the origin that fills 0.8 of the narrower half field of view of the median camera: radius
-    rho = 0.8 median(D sin(half angle)), D the camera's distance. Over the front half of that ball cos(angle to +x) is
-    uniform in [0, 1], so the median of |p - c|^2 = rho^2 + b^2 + 2 b rho cos is at cos = 1/2 (b = |c|).
+    The subject is a ball at the origin that fills `fill` of the narrower half field of view of the median camera:
+    radius rho = fill median(D sin(half angle)), D the camera's distance. Over the front half of that ball cos(angle to
+    +x) is uniform in [0, 1], so the median of |p - c|^2 = rho^2 + b^2 + 2 b rho cos is at cos = 1/2 (b = |c|).
 
     Returns:
         r0 = sqrt(rho^2 + b^2 + b rho), and b + rho, the ball's farthest point from c.
@@ -100,13 +96,11 @@ def fitted_radius(cameras: list[Camera]) -> tuple[float, float]:
     tangents = [min(0.5 * c.width / c.K[0, 0], 0.5 * c.height / c.K[1, 1]) for c in cameras]
     distances = [np.linalg.norm(c.centre) for c in cameras]
     reach = [d * math.sin(math.atan(t)) for d, t in zip(distances, tangents, strict=True)]
-    rho, b = FILL * float(np.median(reach)), float(np.linalg.norm(SPHERE_CENTRE))
+    rho, b = fill * float(np.median(reach)), float(np.linalg.norm(SPHERE_CENTRE))
     return math.sqrt(rho**2 + b**2 + b * rho), rho + b
 
 
-def fit_outline(
-    manifolds: MlpManifolds, outline: Outline, iterations: int, generator: torch.Generator, points: int = 4096
-) -> float:
+def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParams, generator: torch.Generator) -> float:
     """Regress G(x) = |x - c| + r0 - rho(n), rho the outline's radius in direction n: the middle level on the surface.
 
     Three quarters of the points lie in directions of the outline's vertices; the others at random over the hemisphere
@@ -117,6 +111,7 @@ def fit_outline(
     Returns:
         the mean absolute error of the last tenth of the iterations, units.
     """
+    iterations, points = params.iterations, params.points
     device = manifolds.centre.device
     tree = cKDTree(outline.directions)
     nearest_count = min(3, len(outline.radii))

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, merged
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
 from tests.assets import SOURCE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
@@ -60,6 +59,5 @@ def packaged(folder: Path, scene: Scene, section: dict[str, Any]) -> None:
         return [cap_mesh(radius_of(i), side) for i in range(LAYERS)]
 
     export = Export(caps(12), [WINDOW] * LAYERS, textures, caps)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("facefolds_core.packaging.package.EFFECTS_SHARE", 10.0)
-        package(folder, export, scene, SOURCE, CompressParams.model_validate(section))
+    values = merged({"effects": {"share": 10.0}}, section)
+    package(folder, export, scene, SOURCE, CompressParams.model_validate(values))

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.asset import read_asset, write_asset
+from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.captures.frames import write_frames
+from facefolds_core.asset.writer import write_asset
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import CENTRE, SOURCE, WINDOW, cap_crops, cap_mesh, cap_textures, make_asset, write_store

@@ -15,11 +15,11 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import Grids, write_grids, write_surfaces
 from facefolds_core.files import write_text
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CompressParams, DecimateParams, MeshCodec

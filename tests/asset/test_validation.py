@@ -17,8 +17,8 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.manifest import Manifest, write_manifest
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.asset.writer import file_sha256
 from facefolds_core.errors import UserError
+from facefolds_core.files import file_sha256
 from tests.assets import cap_mesh, make_asset
 
 FILES = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"]
@@ -242,7 +242,11 @@ def test_damaged_video_with_a_matching_checksum_is_no_traceback(asset: Path) -> 
 def run_command(folder: Path) -> subprocess.CompletedProcess[str]:
     root = Path(__file__).parents[2]
     return subprocess.run(
-        [sys.executable, "-m", "stages.validate", str(folder)], cwd=root, capture_output=True, text=True, check=False
+        [sys.executable, "-m", "facefolds_core", "validate", str(folder)],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from bench.profile_step import SECTIONS, gemm_peak, report, take_apart
-from bench.runs import check_train_params
+from facefolds_core.params import train_params
 from facefolds_core.training import loop
 from tests.scenes import OPAQUE, make_scene
 
@@ -19,7 +19,7 @@ TINY = {
 
 def test_multiply_adds_of_a_step(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, OPAQUE, size=20, surface_radius=0.33)
-    params = check_train_params(TINY)
+    params = train_params(TINY)
     step = take_apart(loop.begin(scene, params, tmp_path), params, time.process_time)
     field = 3 * 8 + 8 * 8 + 8
     assert step.products["search"] == 64 * 16 * field

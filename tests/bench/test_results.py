@@ -8,16 +8,17 @@ import pytest
 from bench import speed_accuracy
 from bench.common import find_scenes, keep, numbers
 from bench.results import Conditions, Measurement, Results, describe
-from bench.runs import Job, check_train_params
+from bench.runs import Job
 from bench.speed_accuracy import measure, next_iterations
 from facefolds_core.errors import UserError
+from facefolds_core.params import train_params
 
 CONDITIONS = Conditions(commit="aaa", clock="wall", threads=2, machine="one", frames=3)
 
 
 def job(tmp_path: Path, preset: str, **conditions: object) -> Job:
     own = CONDITIONS.model_copy(update=conditions)
-    return Job("actor", tmp_path, check_train_params({"preset": preset}), "", own, tmp_path / "scratch")
+    return Job("actor", tmp_path, train_params({"preset": preset}), "", own, tmp_path / "scratch")
 
 
 def test_a_measurement_replaces_the_same_one_only(tmp_path: Path) -> None:

@@ -9,9 +9,10 @@ from bench import robustness
 from bench.common import keep
 from bench.results import Conditions, Results, Scores
 from bench.robustness import BASE, Variant, all_variants, disturbed_scene, measure, overrides, tables
-from bench.runs import Job, check_train_params
+from bench.runs import Job
 from facefolds_core.captures.scene import SPHERE_CENTRE, read_scene
 from facefolds_core.errors import UserError
+from facefolds_core.params import train_params
 from tests.scenes import OPAQUE, make_scene
 
 CENTRE = np.array(SPHERE_CENTRE)
@@ -19,7 +20,7 @@ CENTRE = np.array(SPHERE_CENTRE)
 
 def job(scene: Path, preset: str, variant: str, scratch: Path) -> Job:
     conditions = Conditions(commit="aaa", clock="wall", threads=2, machine="one", frames=3)
-    return Job("actor", scene, check_train_params({"preset": preset}), variant, conditions, scratch)
+    return Job("actor", scene, train_params({"preset": preset}), variant, conditions, scratch)
 
 
 def test_a_shifted_scene_shows_the_same_from_elsewhere(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ import pytest
 from bench import runs
 from bench.clock import Clock
 from bench.results import Conditions, Measurement
-from bench.runs import Job, check_train_params, measure_on_the_way, measure_whole, score
+from bench.runs import Job, measure_on_the_way, measure_whole, score
 from facefolds_core.captures.scene import Scene
 from facefolds_core.model import load_model
-from facefolds_core.params import TrainParams
+from facefolds_core.params import TrainParams, train_params
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.training.loop import train, train_step
 from facefolds_core.training.report import TrainingReport
@@ -35,7 +35,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def job(scene: Scene, scratch: Path, values: dict[str, object]) -> Job:
     conditions = Conditions(commit="aaa", clock="wall", threads=1, machine="one", frames=2)
-    return Job("spheres", scene.folder, check_train_params(values), "", conditions, scratch)
+    return Job("spheres", scene.folder, train_params(values), "", conditions, scratch)
 
 
 class Steps:
@@ -69,7 +69,7 @@ def test_the_scores_are_those_of_the_model_that_training_makes(
     Steps(monkeypatch)
     made: list[Measurement] = []
     measure_on_the_way(job(scene, tmp_path, TINY), [80], made.append)
-    train(scene, check_train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
+    train(scene, train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
     assert made[0].iterations == TINY["iterations"]
     assert made[0].scores == score(scene, load_model(tmp_path / "model"), 2, BLIND)
 
@@ -105,12 +105,12 @@ def test_an_explicit_run_is_scored_at_its_end(scene: Scene, tmp_path: Path, monk
     # Which trainer makes the model is of no concern here, and this one needs no compiled code.
     def trainer(scene: Scene, params: TrainParams, model: Path, log: Path) -> TrainingReport:
         assert params.preset == "fast"
-        return train(scene, check_train_params(TINY), model, tmp_path / "checkpoints", log)
+        return train(scene, train_params(TINY), model, tmp_path / "checkpoints", log)
 
     monkeypatch.setattr(runs, "train_explicit", trainer)
     made: list[Measurement] = []
     measure_whole(job(scene, tmp_path, {"preset": "fast"}), 10, made.append)
-    train(scene, check_train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
+    train(scene, train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
     assert made[0].iterations == TINY["iterations"] and made[0].budget == 10
     assert made[0].scores == score(scene, load_model(tmp_path / "model"), 2, BLIND)
 
@@ -118,7 +118,7 @@ def test_an_explicit_run_is_scored_at_its_end(scene: Scene, tmp_path: Path, monk
 def test_without_masks_the_whole_frame_is_scored(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=20, surface_radius=0.33)
     (scene.folder / "masks.arrow").unlink()
-    train(scene, check_train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
+    train(scene, train_params(TINY), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
     assert score(scene, load_model(tmp_path / "model"), 1, BLIND).region == "frame"
 
 

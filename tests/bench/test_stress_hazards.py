@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bench import stress_hazards as hazards
-from bench.runs import check_train_params
 from bench.stress_film import Film, Shots, keep_frames, read_shots, training, write_shots
 from bench.stress_hazards import HAZARDS, Hazard
 from facefolds_core.captures.scene import SPHERE_CENTRE
+from facefolds_core.params import train_params
 from tests.scenes import OPAQUE, make_scene
 
 
@@ -112,10 +112,10 @@ def test_a_wrong_radius_is_the_mesh_alone(shots: Shots) -> None:
 
 def test_rates_and_spacing_multiply_the_usual_values() -> None:
     rows = {hazard.key: hazard for hazard in HAZARDS}
-    fast, paper = (check_train_params({"preset": name}) for name in ("fast", "paper"))
-    assert rows["rate-high"].train(fast, 3) == {"lr_volume": pytest.approx(3 * fast.lr_volume)}
+    fast, paper = (train_params({"preset": name}) for name in ("fast", "paper"))
+    assert rows["rate-high"].train(fast, 3) == {"volume": {"learning_rate": pytest.approx(0.9)}}
     assert rows["rate-low"].train(paper, 0.1) == {"lr_manifold": pytest.approx(0.1 * 7e-4)}
-    assert rows["spacing"].train(fast, 2) == {"level_halfwidth": pytest.approx(0.012)}
+    assert rows["spacing"].train(fast, 2) == {"geometry": {"halfwidth": pytest.approx(0.012)}}
     assert rows["gloss"].train(fast, 2) == {}
 
 

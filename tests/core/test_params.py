@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config import read_stage, read_subject, read_train
 from facefolds_core.errors import UserError
-from facefolds_core.params import CompressParams, TextureParams, TrainParams
+from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
 from facefolds_core.params_file import load_params, write_configs
-from facefolds_core.presets import PRESETS
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
 
@@ -29,9 +28,16 @@ def test_the_projects_own_file_is_valid(project_root: Path) -> None:
 def test_a_preset_fills_what_is_not_given(tmp_path: Path) -> None:
     params = load_params(params_file(tmp_path, MINIMAL + "train: {preset: paper, iterations: 7}\n"))
     train = params.stage("train", "a")
-    assert isinstance(train, TrainParams)
+    assert isinstance(train, MlpParams)
     assert train.iterations == 7
-    assert train.rays == PRESETS["paper"]["rays"]
+    assert train.rays == 32768
+
+
+@pytest.mark.parametrize("number", ["1e-3", "1E-3", "+1e-3", ".1e-2", "10_0e-5", "0.001"])
+def test_numbers_are_read_as_dvc_writes_them(tmp_path: Path, number: str) -> None:
+    text = MINIMAL + f"bake: {{hold: {number}}}\ncompress: {{levels: []}}\n"
+    bake = load_params(params_file(tmp_path, text)).stage("bake", "a")
+    assert isinstance(bake, BakeParams) and bake.hold == 0.001
 
 
 def test_a_subject_overrides_one_nested_key(tmp_path: Path) -> None:
@@ -47,7 +53,7 @@ def test_configs_round_trip(tmp_path: Path) -> None:
     params = load_params(params_file(tmp_path, MINIMAL + "texture: {resolution: 77}\n"))
     write_configs(params, "a", tmp_path)
     assert read_stage(TextureParams, tmp_path) == TextureParams(resolution=77)
-    assert read_stage(TrainParams, tmp_path) == params.stage("train", "a")
+    assert read_train(tmp_path) == params.stage("train", "a")
     assert read_subject(tmp_path) == params.subject("a")
 
 
@@ -70,6 +76,11 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
+        (MINIMAL + "train: {lambda_veil: 0}\n", "losses.opacity"),
+        ("subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {volume: {}}\n", "to the subjects"),
+        (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
+        (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),
+        (MINIMAL + "capture: {fps: 1.0e+300}\n", "capture.fps"),
         (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
         (MINIMAL + "texture: {size: 3}\n", "texture.size"),

@@ -18,9 +18,9 @@ from PIL import Image
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.cli.render import pick_level
 from facefolds_core.engines.godot import write_godot
 from facefolds_core.geometry.cameras import Camera
-from stages.render import pick_level
 from tests.engines import blender, godot
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
 

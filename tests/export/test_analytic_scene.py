@@ -12,7 +12,6 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.export.bake import Baker, baked_rows, gather_rays
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.decimation import decimate_layers
@@ -21,6 +20,7 @@ from facefolds_core.export.sampling import sample_grids, write_textures
 from facefolds_core.export.sheets import full_meshes, grid_sheets
 from facefolds_core.export.textures import resample_store
 from facefolds_core.export.window import visible_window
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams, ReconstructParams

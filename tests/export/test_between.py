@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.export.between import at_frame_rate, between_rows, crowd, dense_flow, motions, sources
+from facefolds_core.frame_store import FrameStore
 from tests.assets import write_store
 
 SIZE = 64

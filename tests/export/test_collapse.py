@@ -17,6 +17,7 @@ from facefolds_core.export.sheets import directions, grid_sheets, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.params import RefitParams
 from facefolds_core.rendering.intersection import EmbreeMesh
 from tests.ellipsoids import Ellipsoids
 
@@ -56,7 +57,7 @@ def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
 def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
     towards = directions(sheets)
     faces = coarse_faces()
-    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, towards)
+    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, towards, RefitParams())
     for layer in range(sheets.num_layers):
         before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
         assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both
@@ -171,7 +172,7 @@ def test_a_layer_that_shows_nowhere_keeps_its_faces(sheets: Sheets) -> None:
 
 def test_contributions_are_compositing_weights_with_a_floor() -> None:
     opacity = np.array([51, 255, 255], np.uint8)[:, None, None]
-    assert contribution(opacity)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
+    assert contribution(opacity, 0.05)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
 
 
 def test_a_ladder_is_what_each_number_of_vertices_gives_alone(sheets: Sheets) -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.export.bake_kernel import PARTS, render
 from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.hold_kernel import add_weights, steady
+from facefolds_core.frame_store import FrameStore, write_frames
 
 
 def kept(y: np.ndarray, price: float) -> np.ndarray:

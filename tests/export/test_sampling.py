@@ -10,9 +10,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from facefolds_core.captures.frames import FrameStore
 from facefolds_core.errors import UserError
 from facefolds_core.export.sampling import grid_normals, row_strides, sample_grids, texture_rows, write_textures
+from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, texel_uv
 from tests.ellipsoids import Ellipsoids
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.captures.frames import FrameStore, write_frames
 from facefolds_core.errors import UserError
 from facefolds_core.export.textures import resample, resample_store
+from facefolds_core.frame_store import FrameStore, write_frames
 
 
 def constant(size: int, rgba: tuple[int, int, int, int]) -> np.ndarray:

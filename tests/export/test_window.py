@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from facefolds_core.export.window import EPSILON, removed_weight, visible_window
+from facefolds_core.export.window import removed_weight, visible_window
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
+from facefolds_core.params import AutoWindowParams
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import look_at_origin
 
@@ -15,9 +16,9 @@ RIG = [look_at_origin(f"cam{i}", azimuth, 10 * (-1) ** i, 120) for i, azimuth in
 @pytest.mark.parametrize("patch", [0.3, 0.6])
 def test_no_ray_loses_more_than_the_bound(patch: float) -> None:
     model = Ellipsoids(patch=patch)
-    window = visible_window(model, RIG, rays_per_camera=900)
+    window = visible_window(model, RIG, AutoWindowParams(rays_per_camera=900))
     # Every pixel, not only the lattice that the window was made from.
-    assert max(removed_weight(model, camera, 1, 1, window).max() for camera in RIG) <= EPSILON
+    assert max(removed_weight(model, camera, 1, 1, window).max() for camera in RIG) <= AutoWindowParams().max_change
 
 
 def test_the_window_fits_the_scene() -> None:

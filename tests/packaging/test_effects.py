@@ -10,8 +10,8 @@ import numpy as np
 from facefolds_core.asset.cropping import CroppedLayer
 from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.writer import LevelContent
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import read_scene
+from facefolds_core.frame_store import write_frames
 from facefolds_core.packaging.effects import fit_effects
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.raster import cast_layers

@@ -41,7 +41,7 @@ def test_it_ends_with_scores_and_pictures(project: TinyProject) -> None:
 
 
 def test_the_asset_is_valid(project: TinyProject) -> None:
-    status, output = project.run("python", "-m", "stages.validate", "data/actor/asset")
+    status, output = project.run("python", "-m", "facefolds_core", "validate", "data/actor/asset")
     assert status == 0, output
 
 

@@ -75,7 +75,7 @@ def grid(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
         assert time.monotonic() < end
         time.sleep(2)
     project.run("dvc", "queue", "stop", "--kill")
-    project.run("python", "-m", "stages.collect", "--out", "sweep.parquet")
+    project.run("python", "-m", "facefolds_core", "collect", "--out", "sweep.parquet")
     return read_runs(root / "sweep.parquet"), project.stages_run()
 
 

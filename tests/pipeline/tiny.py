@@ -14,24 +14,25 @@ subjects:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
+    train: {iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
   stabilised:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     normalize: {stabilize: true}
-    train: {iterations: 10}
+    train: {iterations: 10, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
   killed:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {iterations: 400, checkpoint_seconds: 0.2}
+    train: {iterations: 400, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
   fast:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     train: {preset: fast, layers: 3, iterations: 130}
 capture: {cameras: 8, frames: 2, height: 48, width: 32}
-train: {preset: quick, iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+train: {preset: quick}
 sample: {resolution: 64}
 reconstruct: {}
 decimate: {resolution: 12}

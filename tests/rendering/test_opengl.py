@@ -13,12 +13,12 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
+from facefolds_core.cli.render import parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from stages.render import parse_colour, parse_size, shrink
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
 
@@ -130,7 +130,7 @@ def test_colours() -> None:
 
 
 def run(project_root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "stages.render", *arguments]
+    command = [sys.executable, "-m", "facefolds_core", "render", *arguments]
     return subprocess.run(command, cwd=project_root, capture_output=True, text=True, check=False)
 
 

@@ -11,11 +11,11 @@ import typer
 from typer.testing import CliRunner
 
 from facefolds_core.asset import read_asset
+from facefolds_core.cli.report import command, evaluated_subjects
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting.build import make_report
-from stages.report import evaluated_subjects, report
 from tests.assets import make_asset
 from tests.reporting.tiny import FRAMES, LAYERS, make_subject
 
@@ -124,7 +124,7 @@ def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None
 
 def test_the_command_says_where_the_page_lies(copy: SubjectFolders) -> None:
     app = typer.Typer()
-    app.command()(report)
+    app.command()(command)
     done = CliRunner().invoke(app, ["--data", str(copy.root.parent)])
     assert done.exit_code == 0
     assert str(copy.root / "report.html") in done.output

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.files import write_json, write_text
-from facefolds_core.params import STAGE_SECTIONS, Section
+from facefolds_core.params import section_of
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import metrics_json, write_per_image
@@ -47,8 +47,7 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     for i, stage in enumerate(("train", "compress")):
         write_json(folders.timing(stage), {"stage": stage, "seconds": 10.0 + i})
     for name in ("train", "evaluate"):
-        section: type[Section] = STAGE_SECTIONS[name]
-        write_json(folders.config / f"{name}.json", section().model_dump(mode="json"))
+        write_json(folders.config / f"{name}.json", section_of(name, {}).model_dump(mode="json"))
     steps = [
         {"name": name, "psnr": 25.0 - i, "triangles": 0, "mesh_bytes": 0, "texture_bytes": i}
         for i, name in enumerate(STEPS)

@@ -12,8 +12,8 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
+from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.storage import ModelSpec, build_model

@@ -1,4 +1,4 @@
-"""`stages.recommend` and `stages.collect` as commands: what they print and what they refuse."""
+"""`facefolds recommend` and `facefolds collect` as commands: what they print and what they refuse."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import typer
 from click.testing import Result
 from typer.testing import CliRunner
 
+from facefolds_core.cli.collect import command as collect
+from facefolds_core.cli.recommend import command as choose
 from facefolds_core.params import DecimateParams
 from facefolds_core.params_file import load_params
 from facefolds_core.sweeps.table import Run, read_runs, write_runs
-from stages.collect import collect
-from stages.recommend import choose
 from tests.sweeps.test_experiments import SHOWN
 
 

@@ -9,22 +9,26 @@ import pytest
 import torch
 import trimesh
 
-from facefolds_core.captures.frames import write_frames
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.params import TrainParams
+from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.training.explicit import fit, loop
-from facefolds_core.training.explicit.loop import plan, train_explicit
+from facefolds_core.training.explicit.loop import train_explicit
+from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.volume import fit as volume_fit
 from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
+GEOMETRY, MESH = ExplicitParams().geometry, ExplicitParams().mesh
 
-def _params(**values: object) -> TrainParams:
-    return TrainParams.model_validate({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values})
+
+def _params(**values: object) -> ExplicitParams:
+    params = train_params({"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values})
+    assert isinstance(params, ExplicitParams)
+    return params
 
 
 def _held_out_psnr(scene: Scene, folder: Path) -> float:
@@ -94,14 +98,14 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
 def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.31)
     mesh[:, 30:] = np.nan
-    volume[:, :10] = 0.3 + 2 * fit.MESH_REACH
+    volume[:, :10] = 0.3 + 2 * MESH.reach
     volume[20, 20] = np.nan
-    radii, kept = fit.blend(mesh, volume)
+    radii, kept = fit.blend(mesh, volume, MESH.reach)
     np.testing.assert_allclose(radii[:, :10], volume[:, :10])
     np.testing.assert_allclose(radii[:, 30:], 0.31)
     assert radii[20, 20] == 0.3
-    deep = np.where(np.arange(41) == 20, 0.3 - 2 * fit.MESH_REACH, volume)
-    np.testing.assert_array_equal(fit.blend(mesh, deep)[0][5, 20], 0.3)  # a hole of the volume
+    deep = np.where(np.arange(41) == 20, 0.3 - 2 * MESH.reach, volume)
+    np.testing.assert_array_equal(fit.blend(mesh, deep, MESH.reach)[0][5, 20], 0.3)  # a hole of the volume
     assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
 
 
@@ -110,16 +114,16 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
     seen = Profile(
         radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
     )
-    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, voxel=0.01), 0.006)
-    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
-    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, 0.006, voxel=0.01), fit.WIDEST)
+    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.01), 0.006)
+    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, GEOMETRY, voxel=0.01), GEOMETRY.max_halfwidth)
 
 
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
     chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
-    levels = plan(chosen, 400)
+    levels = plan(chosen, _params(iterations=400))
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
 
@@ -150,16 +154,18 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
 ) -> None:
     """Thin hair does that: the search for crossings needs a radius to step along."""
     monkeypatch.setattr(loop, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
-    monkeypatch.setattr(volume_fit, "LEVELS", ((32, 30),))
-    train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
+    few = {"levels": [{"resolution": 32, "iterations": 30}]}
+    train_explicit(trained[0], _params(iterations=40, volume=few), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
-    assert fit.LEAST_RADIUS <= model.manifolds.radii().min().item() < fit.LEAST_RADIUS + 0.05
+    assert GEOMETRY.min_radius <= model.manifolds.radii().min().item() < GEOMETRY.min_radius + 0.05
 
 
 def test_wide_layers_keep_their_distance_from_the_centre() -> None:
     halfwidth = np.array([0.006, 0.03, 0.2])
-    assert (fit.least_middle(halfwidth) - max(fit.ROUNDS) * halfwidth >= fit.LEAST_RADIUS - 1e-12).all()
+    assert (
+        fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= GEOMETRY.min_radius - 1e-12
+    ).all()
 
 
 def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
@@ -183,14 +189,14 @@ def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: 
 
 
 @pytest.mark.parametrize("grey", [0, 90])
-def test_pictures_without_a_subject_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, grey: int) -> None:
-    monkeypatch.setattr(volume_fit, "LEVELS", ((24, 20),))
+def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> None:
     scene = make_scene(tmp_path / "scene", size=24)
     image = np.full((24, 24, 3), grey, np.uint8)
     pairs = [(i, k) for i in range(len(scene.cameras)) for k in range(scene.num_frames)]
     write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
+    few = {"levels": [{"resolution": 24, "iterations": 20}]}
     with pytest.raises(UserError, match="no subject was found"):
-        train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
+        train_explicit(scene, _params(volume=few), tmp_path / "model", tmp_path / "log")
 
 
 def test_a_tracked_mesh_of_another_size_is_left_out_and_said(

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import torch
 
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume import kernel, room_kernel, room_reference
 from facefolds_core.training.volume.room import Room
 
-RADIUS, STEP, SAMPLES = 0.45, 0.15, 60
+RADIUS, STEP, FARTHEST, SAMPLES = 0.45, 0.15, 20.0, 60
+PARAMS = ExplicitParams()
 
 
 def _problem(rays: int = 120) -> dict[str, np.ndarray]:
@@ -33,12 +35,13 @@ def _problem(rays: int = 120) -> dict[str, np.ndarray]:
 
 def test_looking_and_its_gradient_match_autograd() -> None:
     p = _problem()
-    rgb, through = room_kernel.look(p["origins"], p["directions"], p["jitter"], p["grid"], RADIUS, STEP)
+    rgb, through = room_kernel.look(p["origins"], p["directions"], p["jitter"], p["grid"], RADIUS, STEP, FARTHEST)
     gradient = np.zeros((kernel.PARTS, *p["grid"].shape), np.float32)
     room_kernel.splat(
         *(p[k] for k in ("origins", "directions", "jitter", "grid")),
         RADIUS,
         STEP,
+        FARTHEST,
         SAMPLES,
         p["beyond"],
         p["slope"],
@@ -46,7 +49,9 @@ def test_looking_and_its_gradient_match_autograd() -> None:
     )
     t = {name: torch.from_numpy(value).double() for name, value in p.items()}
     t["grid"].requires_grad_()
-    colour, left = room_reference.look(t["origins"], t["directions"], t["jitter"], t["grid"], RADIUS, STEP, SAMPLES)
+    colour, left = room_reference.look(
+        t["origins"], t["directions"], t["jitter"], t["grid"], RADIUS, STEP, FARTHEST, SAMPLES
+    )
     ((colour + left[:, None] * t["beyond"]) * t["slope"]).sum().backward()
     assert 0.05 < float(left.detach().median()) < 0.95
     np.testing.assert_allclose(rgb, colour.detach().numpy(), atol=5e-3)
@@ -77,19 +82,46 @@ def _wall(rays: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_a_near_wall_is_explained_with_its_parallax() -> None:
-    room = Room(np.full(3, 0.5, np.float32), 1.0, RADIUS, 33)
+    room = Room(np.full(3, 0.5, np.float32), 1.0, RADIUS, PARAMS.room, PARAMS.environment)
+    room.refine(33)
     rng = np.random.default_rng(0)
     errors = []
     for i in range(120):
         origins, directions, colours = _wall(2000, i)
         seen = room.look(origins, directions, rng.random(2000, np.float32))
-        room.step(seen, seen.colours - colours, 1.0, 0.3)
+        room.step(seen, seen.colours - colours, 1.0, 0.3, 0.03)
         errors.append(float(((seen.colours - colours) ** 2).mean()))
     origins, directions, colours = _wall(2000, 999)
     error = float(((room.look_up(origins, directions) - colours) ** 2).mean())
     # The far sphere alone cannot hold it: its one picture is looked at from everywhere.
     assert error < 0.25 * errors[0]
-    finer = Room(np.full(3, 0.5, np.float32), 1.0, RADIUS, 33)
-    finer.grid, finer.environment = room.grid, room.environment
-    finer.refine(49)
-    assert float(((finer.look_up(origins, directions) - colours) ** 2).mean()) == pytest.approx(error, rel=0.3)
+    room.refine(49)
+    assert float(((room.look_up(origins, directions) - colours) ** 2).mean()) == pytest.approx(error, rel=0.3)
+
+
+def test_without_an_outer_zone_the_far_sphere_alone_is_behind() -> None:
+    room = Room(np.full(3, 0.5, np.float32), 1.0, RADIUS, PARAMS.room, PARAMS.environment)
+    origins, directions, colours = _wall(500, 0)
+    seen = room.look(origins, directions, np.zeros(500, np.float32))
+    expected, _, _ = room.environment.look_up(origins, directions)
+    np.testing.assert_array_equal(seen.colours, expected)
+    room.step(seen, seen.colours - colours, 1.0, 0.3, 0.03)
+    assert not np.array_equal(room.look_up(origins, directions), expected)
+
+
+def test_what_no_ray_reached_takes_its_neighbours_colours() -> None:
+    room = Room(np.full(3, 0.2, np.float32), 1.0, RADIUS, PARAMS.room, PARAMS.environment)
+    room.refine(17)
+    room.grid[0, ..., 0] = 3.0
+    room.grid[0, ..., 1:] = 0.2
+    # A face left behind the head: bright where every ray is blocked.
+    origins = np.tile(np.array([1, 0, 0], np.float32), (4000, 1))
+    rng = np.random.default_rng(0)
+    directions = np.stack([np.full(4000, -1.0), *rng.uniform(-0.8, 0.8, (2, 4000))], 1).astype(np.float32)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    blocked = directions[:, 0] < -0.93
+    room.grid[0, :5, 6:11, 6:11, 1:] = 1.0
+    straight = (origins[:1], np.array([[-1, 0, 0]], np.float32))
+    assert room.look_up(*straight).mean() > 0.8
+    room.forget_unseen(origins, directions, np.where(blocked, 0.0, 1.0).astype(np.float32))
+    assert room.look_up(*straight).mean() < 0.5

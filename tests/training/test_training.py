@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
-from facefolds_core.params import TrainParams
+from facefolds_core.params import MlpParams, train_params
 from facefolds_core.training import loop
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
 from facefolds_core.training.losses import batch_losses
@@ -38,8 +38,14 @@ TINY = {
 }
 
 
-def params(**values: object) -> TrainParams:
-    return TrainParams.model_validate({**TINY, **values})
+def params(**values: object) -> MlpParams:
+    return mlp({**TINY, **values})
+
+
+def mlp(values: dict[str, object]) -> MlpParams:
+    section = train_params(values)
+    assert isinstance(section, MlpParams)
+    return section
 
 
 @pytest.fixture(scope="module")
@@ -47,13 +53,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     return make_scene(tmp_path_factory.mktemp("scene"), OPAQUE, size=24, surface_radius=0.33)
 
 
-def run(scene: Scene, settings: TrainParams, folder: Path) -> dict[str, torch.Tensor]:
+def run(scene: Scene, settings: MlpParams, folder: Path) -> dict[str, torch.Tensor]:
     loop.train(scene, settings, folder / "model", folder / "checkpoints", folder / "log")
     return load_file(folder / "model" / "model.safetensors")
 
 
-def state_for(scene: Scene, settings: TrainParams, start: Start | None = None) -> tuple[loop.TrainingState, RaySampler]:
-    start = start or find_start(scene, settings.layers, settings.level_halfwidth)
+def state_for(scene: Scene, settings: MlpParams, start: Start | None = None) -> tuple[loop.TrainingState, RaySampler]:
+    start = start or find_start(scene, settings)
     state = loop.new_state(settings, loop.model_spec(settings, start, scene.num_frames, ""), CPU)
     return state, RaySampler(scene, state.model.centre, start.radius, CPU)
 
@@ -101,7 +107,7 @@ def test_loss_is_the_weighted_sum_of_its_parts(scene: Scene) -> None:
 
 
 def test_learning_rates_decay_exponentially() -> None:
-    settings = TrainParams.model_validate({"preset": "paper"})
+    settings = mlp({"preset": "paper"})
     rates = loop.learning_rates(settings, 400_000)
     assert rates == pytest.approx({"manifold": 7e-4 * 0.05**2, "texture": 1e-3 * 0.2**2})
 
@@ -126,7 +132,7 @@ def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
 def test_the_first_steps_of_the_papers_preset_keep_the_surfaces(tmp_path: Path) -> None:
     # With an output scale of 1 they do not: three steps move them all out of the search ball, and nothing comes back.
     scene = make_scene(tmp_path, OPAQUE, size=48, surface_radius=0.33)
-    settings = TrainParams.model_validate({"preset": "paper", "rays": 256, "search_samples": 64})
+    settings = mlp({"preset": "paper", "rays": 256, "search_samples": 64})
     state, sampler = state_for(scene, settings)
     for _ in range(5):
         loop.train_step(state, sampler, settings)
@@ -143,8 +149,7 @@ class Killed(BaseException):
 def test_an_interrupted_run_ends_at_the_same_result(
     scene: Scene, tmp_path: Path, log_lost: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    settings = params(manifold_start="surface", checkpoint_seconds=1e-9)
-    monkeypatch.setattr(loop, "START_ITERATIONS", 5)
+    settings = params(manifold_start="surface", checkpoint_seconds=1e-9, start={"iterations": 5})
     whole = run(scene, settings, tmp_path / "whole")
     step = loop.train_step
 
@@ -258,6 +263,15 @@ def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_pat
     marks = {fingerprint(params(), scene), fingerprint(params(seed=1), scene), fingerprint(params(), other)}
     assert len(marks) == 3
     assert fingerprint(params(device="cpu", checkpoint_seconds=5.0), scene) == fingerprint(params(), scene)
+
+
+@pytest.mark.parametrize(
+    "values", [{"volume": {"reach": 0.4}}, {"losses": {"late_opacity": 0.2}}, {"geometry": {"rounds": [2.0]}}]
+)
+def test_the_fingerprint_of_the_explicit_model_has_its_nested_keys(scene: Scene, values: dict[str, object]) -> None:
+    usual = train_params({"preset": "fast"})
+    assert fingerprint(train_params({"preset": "fast", **values}), scene) != fingerprint(usual, scene)
+    assert fingerprint(train_params({"preset": "fast", "device": "cpu"}), scene) == fingerprint(usual, scene)
 
 
 def test_missing_training_image(tmp_path: Path) -> None:

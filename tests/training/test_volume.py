@@ -14,7 +14,8 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
-from facefolds_core.training.explicit.fit import MESH_WRONG, share_off
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.fit import share_off
 from facefolds_core.training.volume import fit, kernel, outline, reference
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
@@ -23,6 +24,8 @@ from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.subject import subject_of
 from tests.scenes import OPAQUE, make_scene
 
+PARAMS = ExplicitParams()
+START, LEAST = PARAMS.start, PARAMS.start.subject_opacity
 LOWER = np.array([-0.4, -0.3, -0.35])
 VOXEL = 0.05
 
@@ -88,14 +91,21 @@ def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -
     grid[..., 0] = (inside / 0.01 * 10).clip(-kernel.LIMIT, kernel.LIMIT)
     grid[..., 1] = 1
     return Volume(
-        grid, np.full(3, -0.45), 0.01, Room(np.zeros(3, np.float32), 1.0, 0.45, 4), 0, 30.0, CameraFit.alike(1)
+        grid,
+        np.full(3, -0.45),
+        0.01,
+        PARAMS.volume.step,
+        Room(np.zeros(3, np.float32), 1.0, 0.45, PARAMS.room, PARAMS.environment),
+        0,
+        30.0,
+        CameraFit.alike(1, PARAMS.cameras),
     )
 
 
 def test_profile_of_a_ball() -> None:
     centre = np.array([-0.1, 0.0, 0.0])
     directions = outline.window_directions((-0.6, 0.6, -0.6, 0.6), 9, 9)
-    seen = outline.profile(_ball(0.3), centre, directions)
+    seen = outline.profile(_ball(0.3), centre, directions, LEAST)
     b = directions @ centre
     expected = -b + np.sqrt(b**2 - 0.1**2 + 0.3**2)
     np.testing.assert_allclose(seen.radius, expected, atol=0.01)
@@ -105,7 +115,9 @@ def test_profile_of_a_ball() -> None:
 
 
 def test_profile_beside_the_ball_is_clear() -> None:
-    seen = outline.profile(_ball(0.1, (0.25, 0, 0)), np.zeros(3), outline.window_directions((0.9, 1, -1, 1), 3, 3))
+    seen = outline.profile(
+        _ball(0.1, (0.25, 0, 0)), np.zeros(3), outline.window_directions((0.9, 1, -1, 1), 3, 3), LEAST
+    )
     assert np.isnan(seen.radius).all()
     np.testing.assert_allclose(seen.opacity, 0, atol=1e-3)
 
@@ -114,22 +126,24 @@ def test_what_floats_is_removed() -> None:
     ball, crumb = _ball(0.25), _ball(0.05, (0.38, 0.0, 0.0))
     both = replace(ball, grid=np.where(crumb.grid[..., :1] > ball.grid[..., :1], crumb.grid, ball.grid))
     outward = np.array([[1.0, 0.0, 0.0]])
-    assert outline.profile(both, np.zeros(3), outward).radius[0] == pytest.approx(0.43, abs=0.01)
-    cleaned = subject_of(both)
-    assert outline.profile(cleaned, np.zeros(3), outward).radius[0] == pytest.approx(0.25, abs=0.01)
+    assert outline.profile(both, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.43, abs=0.01)
+    cleaned = subject_of(both, PARAMS)
+    assert outline.profile(cleaned, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.25, abs=0.01)
 
 
 def test_points_behind_the_centre_are_lost() -> None:
     ball = _ball(0.2)
     n = np.random.default_rng(0).normal(size=(4000, 3))
     points = 0.2 * n / np.linalg.norm(n, axis=1, keepdims=True)
-    assert outline.lost_share(ball, np.array([-0.35, 0.0, 0.0]), points[points[:, 0] > 0]) == pytest.approx(0, abs=0.01)
-    assert outline.lost_share(ball, np.zeros(3), points) > 0.5
+    assert outline.lost_share(ball, np.array([-0.35, 0.0, 0.0]), points[points[:, 0] > 0], START) == pytest.approx(
+        0, abs=0.01
+    )
+    assert outline.lost_share(ball, np.zeros(3), points, START) > 0.5
 
 
 def test_environment_learns_what_it_is_shown() -> None:
     rng = np.random.default_rng(0)
-    environment = Environment(np.full(3, 0.5, np.float32), 1.0)
+    environment = Environment(np.full(3, 0.5, np.float32), 1.0, PARAMS.environment)
     n = rng.normal(size=(2000, 3)).astype(np.float32)
     directions = n / np.linalg.norm(n, axis=1, keepdims=True)
     origins = 0.3 * directions[::-1]
@@ -143,9 +157,9 @@ def test_environment_learns_what_it_is_shown() -> None:
 
 def test_a_sphere_is_found_from_images_alone(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, size=64)
-    volume = subject_of(fit.fit_volume(scene, 0, 0.3, tqdm(disable=True)))
+    volume = subject_of(fit.fit_volume(scene, PARAMS, tqdm(disable=True)), PARAMS)
     centre = np.array(SPHERE_CENTRE)
-    seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9))
+    seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
     # Voxels are 0.008 wide here.
     assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=0.008)
 
@@ -154,7 +168,7 @@ def test_cameras_that_look_elsewhere_are_refused(tmp_path: Path) -> None:
     scene = make_scene(tmp_path, size=16)
     away = [replace(c, w2c=c.w2c * np.array([[1], [-1], [-1]])) for c in scene.cameras]
     with pytest.raises(UserError, match="one place"):
-        fit.bounding_box(away)
+        fit.bounding_box(away, PARAMS.volume)
 
 
 @pytest.mark.parametrize(("scale", "wrong"), [(1.0, False), (1.2, True), (0.8, True)])
@@ -162,6 +176,6 @@ def test_a_tracked_mesh_of_another_size_is_found_out(scale: float, wrong: bool) 
     centre = np.array([-0.1, 0.0, 0.0])
     ball = trimesh.creation.icosphere(4, 0.3)
     vertices = centre + scale * (np.asarray(ball.vertices)[None] - centre)
-    share = share_off(_ball(0.3), centre, vertices, ball.faces)
-    assert (share > MESH_WRONG) == wrong
+    share = share_off(_ball(0.3), centre, vertices, ball.faces, PARAMS.mesh, START)
+    assert (share > PARAMS.mesh.max_share_off) == wrong
     assert share > 0.95 or share < 0.05

@@ -1,4 +1,4 @@
-"""`python -m stages.view`: which asset it takes, and what it says when it cannot."""
+"""`facefolds view`: which asset it takes, and what it says when it cannot."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from facefolds_core.cli.view import latest_asset
 from facefolds_core.errors import UserError
-from stages.view import check_player, latest_asset
+from facefolds_core.player import find_player
 from tests.assets import make_asset
 
 
@@ -34,12 +35,12 @@ def test_without_any_asset_it_says_how_to_make_one(tmp_path: Path) -> None:
 
 def test_a_player_that_is_not_built(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="make view"):
-        check_player(tmp_path)
+        find_player((tmp_path,))
 
 
 def test_it_serves_until_it_is_interrupted(tmp_path: Path, player_folder: Path, project_root: Path) -> None:
     make_asset(tmp_path / "some" / "asset", layers=1, frames=1, resolution=32)
-    command = [sys.executable, "-m", "stages.view", "--data", str(tmp_path), "--no-browser"]
+    command = [sys.executable, "-m", "facefolds_core", "view", "--data", str(tmp_path), "--no-browser"]
     # A shell's background jobs ignore SIGINT, and their children inherit that.
     restore = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with subprocess.Popen(command, cwd=project_root, stdout=subprocess.PIPE, text=True, preexec_fn=restore) as process:

@@ -46,7 +46,13 @@ export class FacefoldsPlayer extends HTMLElement {
     this.shadowRoot.innerHTML = TEMPLATE;
     this.overlays = new Overlays(this);
     this.shadowRoot.querySelector('[data-do="again"]').addEventListener("click", () => this.#start());
-    if (!this.hasAttribute("src")) return this.overlays.fail(new PlayerError("No asset was named", { kind: "missing", remedy: "Give the player the attribute src: the address of an asset's folder." }));
+    if (!this.hasAttribute("src"))
+      return this.overlays.fail(
+        new PlayerError("No asset was named", {
+          kind: "missing",
+          remedy: "Give the player the attribute src: the address of an asset's folder.",
+        }),
+      );
     try {
       this.#player = new Player(this.shadowRoot.querySelector("canvas"));
     } catch (error) {
@@ -160,7 +166,8 @@ export class FacefoldsPlayer extends HTMLElement {
   /** @param {string} colour "#rrggbb" or "transparent" */
   set background(colour) {
     const hex = /^#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$/i.exec(colour);
-    if (!hex && colour !== "transparent") throw new TypeError(`a background is "#rrggbb" or "transparent", not "${colour}"`);
+    if (!hex && colour !== "transparent")
+      throw new TypeError(`a background is "#rrggbb" or "transparent", not "${colour}"`);
     this.#settings.background = colour;
     this.shadowRoot.querySelector(".stage").style.background = hex ? colour : "none";
     this.#player?.set("background", hex ? [...hex.slice(1).map((part) => parseInt(part, 16) / 255), 1] : [0, 0, 0, 0]);

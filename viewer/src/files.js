@@ -41,7 +41,7 @@ export class Files {
     const data = new Uint8Array(entry.bytes);
     let filled = 0;
     try {
-      for (const reader = response.body.getReader(); ; ) {
+      for (const reader = response.body.getReader(); ;) {
         const { done, value } = await reader.read();
         if (done) break;
         if (filled + value.length <= data.length) data.set(value, filled);
@@ -52,7 +52,8 @@ export class Files {
       if (this.abort.signal.aborted) throw cause;
       throw unreachable(this.address(entry.name), cause);
     }
-    const found = filled === data.length ? await changed(data.buffer, entry.sha256) : `${filled} bytes instead of ${data.length}`;
+    const found =
+      filled === data.length ? await changed(data.buffer, entry.sha256) : `${filled} bytes instead of ${data.length}`;
     if (found) {
       const file = this.address(entry.name);
       throw new PlayerError(`The file ${entry.name} is damaged: ${found}`, { file, remedy: AGAIN });

@@ -55,7 +55,11 @@ async function loadEffects(entry, files) {
     image = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   } catch (cause) {
     const file = files.address(entry.file.name);
-    throw new PlayerError(`The picture ${entry.file.name} is damaged`, { file, cause, remedy: "Copy or make the asset again." });
+    throw new PlayerError(`The picture ${entry.file.name} is damaged`, {
+      file,
+      cause,
+      remedy: "Copy or make the asset again.",
+    });
   }
   const texture = new THREE.Texture(image);
   texture.colorSpace = THREE.NoColorSpace;
@@ -70,7 +74,8 @@ async function loadEffects(entry, files) {
 export function gpuBytes(level) {
   let bytes = 0;
   for (const geometry of level.geometries) {
-    for (const attribute of [geometry.index, ...Object.values(geometry.attributes)]) bytes += attribute.array.byteLength;
+    for (const attribute of [geometry.index, ...Object.values(geometry.attributes)])
+      bytes += attribute.array.byteLength;
   }
   bytes += 4 * level.info.texture.width * level.info.texture.height;
   if (level.effects) bytes += 4 * level.effects.image.width * level.effects.image.height;

@@ -55,7 +55,11 @@ export function parseManifest(text, file) {
 }
 
 function damaged(file, found, cause) {
-  return new PlayerError(`The asset's manifest is damaged: ${found}`, { file, cause, remedy: "Copy or make the asset again." });
+  return new PlayerError(`The asset's manifest is damaged: ${found}`, {
+    file,
+    cause,
+    remedy: "Copy or make the asset again.",
+  });
 }
 
 function readManifest(value) {

@@ -51,12 +51,17 @@ export class Player extends EventTarget {
     this.manifest = parseManifest(text, this.files.address("manifest.json"));
     this.#say("progress");
     const { levels, audio } = this.manifest;
-    const fitting = levels.filter(({ texture }) => Math.max(texture.width, texture.height) <= this.renderer.maxTextureSize);
+    const fitting = levels.filter(
+      ({ texture }) => Math.max(texture.width, texture.height) <= this.renderer.maxTextureSize,
+    );
     if (!fitting.length) {
-      throw new PlayerError(`The textures are larger than this machine's ${this.renderer.maxTextureSize} pixels a side`, {
-        kind: "unsupported",
-        remedy: "Export the asset with a coarser level of detail.",
-      });
+      throw new PlayerError(
+        `The textures are larger than this machine's ${this.renderer.maxTextureSize} pixels a side`,
+        {
+          kind: "unsupported",
+          remedy: "Export the asset with a coarser level of detail.",
+        },
+      );
     }
     this.choices = fitting.map(({ name }) => name);
     const { frames, fps } = fitting.at(-1).texture;
@@ -173,7 +178,12 @@ export class Player extends EventTarget {
 
   /** @param {"spread" | "wireframe" | "effects" | "background"} name */
   set(name, value) {
-    const setters = { spread: "setSpread", wireframe: "setWireframe", effects: "setEffects", background: "setBackground" };
+    const setters = {
+      spread: "setSpread",
+      wireframe: "setWireframe",
+      effects: "setEffects",
+      background: "setBackground",
+    };
     this.renderer[setters[name]](value);
     this.#changed();
   }

@@ -81,7 +81,9 @@ export class LayerRenderer {
     if (level.effects) {
       const [ex, ey, ew, eh] = info.effectsRect;
       colour.effects = { value: level.effects };
-      colour.planes = { value: level.info.effects.planes.map(([px, py]) => new THREE.Vector4(px + ex, py + ey, ew, eh)) };
+      colour.planes = {
+        value: level.info.effects.planes.map(([px, py]) => new THREE.Vector4(px + ex, py + ey, ew, eh)),
+      };
       colour.effectsScale = { value: level.info.effects.scale };
     }
     const slice = [(index + 0.05) / count, (index + 0.95) / count];
@@ -135,7 +137,8 @@ export class LayerRenderer {
     this.layers.forEach((layer, i) => {
       layer.shared.shift.value.set(step * (middle - i), 0, 0);
       layer.meshes.forEach((mesh, pass) => (mesh.visible = layer.visible && (pass < 2 || this.wireframe)));
-      if (layer.colour.effectsScale) layer.colour.effectsScale.value = this.effectsOn ? this.level.info.effects.scale : 0;
+      if (layer.colour.effectsScale)
+        layer.colour.effectsScale.value = this.effectsOn ? this.level.info.effects.scale : 0;
     });
   }
 

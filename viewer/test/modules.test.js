@@ -25,7 +25,11 @@ test("a point lands on the pixel that K and w2c say", () => {
 
 test("near and far planes go to the ends of the depth range", () => {
   const projection = projectionOf({ K: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], width: 1, height: 1 }, 1, 1, 0.5, 4); // prettier-ignore
-  for (const [z, depth] of [[-0.5, -1], [-4, 1]]) { // prettier-ignore
+  for (const [z, depth] of [
+    [-0.5, -1],
+    [-4, 1],
+  ]) {
+    // prettier-ignore
     const clip = new Vector4(0, 0, z, 1).applyMatrix4(projection);
     near(clip.z / clip.w, depth);
   }

@@ -12,11 +12,9 @@ from scipy import ndimage
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
-from facefolds_core.training.volume.fit import SEEN, Volume, seen_share
+from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
+from facefolds_core.training.volume.fit import Volume, seen_share
 from facefolds_core.training.volume.outline import (
-    SURE,
-    TIE,
-    WINDOW_LIMIT,
     Profile,
     choose_centre,
     profile,
@@ -25,44 +23,6 @@ from facefolds_core.training.volume.outline import (
 )
 
 Array = NDArray[np.float64]
-
-WINDOW_MARGIN = 0.04
-"""The window reaches this far in u and v beyond what holds the subject: the volume is coarse."""
-
-NODES = 384
-"""Nodes along the longer side of the radius maps."""
-
-MESH_NODES = 128
-"""Directions a side of the hemisphere in which the tracked mesh is compared with the volume."""
-
-PIXELS_PER_TEXEL = 1.5
-"""Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
-cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
-
-MESH_REACH = 0.03
-"""Where the volume lies outside the tracked mesh by more, units, it is believed: a mesh knows no hair and no clothes.
-Where it lies deeper it never is: it has holes at dark eyes, open mouths and where few cameras look."""
-
-MESH_OFF, MESH_WRONG = 0.02, 0.5
-"""A tracked mesh that lies farther than the first, units, from the volume in more than this share of the directions in
-which both have a surface is wrong as a whole (its scale, its place) and is left out. `actor` and `mugsy` have 0.03 and
-0.04; enlarged by 5, 10 and 20 % the actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.70."""
-
-MESH_TRUST = 0.004
-"""Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as
-much, units."""
-
-LEAST_RADIUS = 0.08
-"""No layer's middle comes nearer to c, units: the search for crossings takes strides of less than half of that."""
-
-WIDEST = 0.015
-"""No layers lie farther from their middle than this, units."""
-
-ROUNDS = (2.5, 1.6, 1.0)
-"""Halfwidths of the rounds of geometry, in halfwidths of the model: each moves the layers to the opacity found."""
-
-MESH_OPACITY = 0.9
-"""Opacity at the start where only the tracked mesh says that there is something."""
 
 
 @dataclass(frozen=True)
@@ -97,21 +57,21 @@ class Fit:
     volume_psnr: float
 
 
-def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
+def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
 
     Args:
         volume: of the scene's middle frame, without what floats beside the subject.
-        halfwidth: least half of the space between the outermost and the innermost layer, units.
     """
+    start, geometry = params.start, params.geometry
     cameras = [scene.cameras[i] for i in scene.indices("train")]
-    centre, losses = choose_centre(volume, visible_points(volume, cameras))
-    surface, notes = _trusted_surface(scene, volume, centre)
+    centre, losses = choose_centre(volume, visible_points(volume, cameras), start)
+    surface, notes = _trusted_surface(scene, volume, centre, params)
     vertices = None if surface is None else surface[0].astype(np.float64)
-    window = fit_window(volume, centre, vertices)
-    rows, columns = _nodes(window)
+    window = fit_window(volume, centre, vertices, start)
+    rows, columns = _nodes(window, geometry.nodes)
     directions = window_directions(window, rows, columns)
-    seen = profile(volume, centre, directions)
+    seen = profile(volume, centre, directions, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
         known = seen.radius
@@ -119,16 +79,18 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         source = "the volume, where half of its opacity is reached from outside"
     else:
         mesh = mesh_radii(vertices, surface[1], centre, directions)
-        unseen = seen_share(cameras, (centre + mesh[..., None] * directions).reshape(-1, 3)).reshape(mesh.shape) < SEEN
+        points = (centre + mesh[..., None] * directions).reshape(-1, 3)
+        unseen = seen_share(cameras, points).reshape(mesh.shape) < params.volume.min_view_share
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
-        known, kept = blend(mesh, seen.radius)
-        trust = MESH_TRUST * kept
-        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH_OPACITY), opacity)
-        source = f"the tracked mesh, mean over frames, but where the volume lies over {MESH_REACH} outside it"
-    middle = extrapolate(known).clip(LEAST_RADIUS)
-    widths = spread(seen, middle, halfwidth, volume.voxel)
-    middle = np.maximum(middle, least_middle(widths))
-    texels = texel_count(scene, window, float(np.quantile(middle[opacity >= SURE], 0.9)))
+        known, kept = blend(mesh, seen.radius, params.mesh.reach)
+        trust = params.mesh.trust * kept
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
+        source = f"the tracked mesh, mean over frames, but where the volume lies over {params.mesh.reach} outside it"
+    middle = extrapolate(known).clip(geometry.min_radius)
+    widths = spread(seen, middle, geometry, volume.voxel)
+    middle = np.maximum(middle, least_middle(widths, geometry))
+    radius = float(np.quantile(middle[opacity >= start.subject_opacity], 0.9))
+    texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         centre=centre,
         window=window,
@@ -138,69 +100,84 @@ def fit_scene(scene: Scene, volume: Volume, halfwidth: float) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(
-            f"centre: of the candidates whose hemispheres lose least of the visible surface, within {TIE:.0%}, the one "
-            f"farthest back (it loses {losses[round(float(centre[0]), 2)]:.1%})",
-            f"window: directions in which the volume is at least {SURE:.0%} opaque (and the tracked mesh, where there "
-            f"is one), and {WINDOW_MARGIN} on each side",
-            f"middle radius: {source}",
-            f"halfwidth: {halfwidth}, more where the volume is blurred or far from the middle, at most {WIDEST}",
-            f"texels: {PIXELS_PER_TEXEL:g} pixels each, seen head on from the median training camera",
-            *notes,
-        ),
+        reasons=(*_reasons(params, losses[float(centre[0])], source), *notes),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
 
 
+def _reasons(params: ExplicitParams, lost: float, source: str) -> tuple[str, ...]:
+    """One line a choice."""
+    start, geometry = params.start, params.geometry
+    return (
+        "centre: of the candidates whose hemispheres lose least of the visible surface, within "
+        f"{start.centre_tie:.0%}, the one farthest back (it loses {lost:.1%})",
+        f"window: directions in which the volume is at least {start.subject_opacity:.0%} opaque (and the tracked mesh, "
+        f"where there is one), and {start.window_margin} on each side",
+        f"middle radius: {source}",
+        f"halfwidth: {geometry.halfwidth}, more where the volume is blurred or far from the middle, at most "
+        f"{geometry.max_halfwidth}",
+        f"texels: {params.textures.pixels_per_texel:g} pixels each, seen head on from the median training camera",
+    )
+
+
 def _trusted_surface(
-    scene: Scene, volume: Volume, centre: Array
+    scene: Scene, volume: Volume, centre: Array, params: ExplicitParams
 ) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[str, ...]]:
     """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
     surface = scene.load_surface()
     if surface is None:
         return None, ()
-    share = share_off(volume, centre, surface[0].astype(np.float64), surface[1])
-    if share <= MESH_WRONG:
+    vertices = surface[0].astype(np.float64)
+    share = share_off(volume, centre, vertices, surface[1], params.mesh, params.start)
+    if share <= params.mesh.max_share_off:
         return surface, ()
     return None, (
-        f"the tracked mesh is left out: in {share:.0%} of the directions it lies over {MESH_OFF} units from what "
-        "the images show (is its scale or its place wrong?)",
+        f"the tracked mesh is left out: in {share:.0%} of the directions it lies over {params.mesh.max_distance} units "
+        "from what the images show (is its scale or its place wrong?)",
     )
 
 
-def share_off(volume: Volume, centre: Array, vertices: Array, faces: NDArray[np.int32]) -> float:
+def share_off(
+    volume: Volume, centre: Array, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
+) -> float:
     """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
-    over MESH_OFF apart; 0 where there are none."""
-    directions = window_directions(FULL_WINDOW, MESH_NODES, MESH_NODES)
-    seen, mesh = profile(volume, centre, directions), mesh_radii(vertices, faces, centre, directions)
-    apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= SURE)]
-    return float((apart > MESH_OFF).mean()) if len(apart) else 0.0
+    over `max_distance` apart; 0 where there are none."""
+    directions = window_directions(FULL_WINDOW, params.nodes, params.nodes)
+    least = start.subject_opacity
+    seen, mesh = profile(volume, centre, directions, least), mesh_radii(vertices, faces, centre, directions)
+    apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
+    return float((apart > params.max_distance).mean()) if len(apart) else 0.0
 
 
-def fit_window(volume: Volume, centre: Array, vertices: Array | None) -> Window:
+def fit_window(volume: Volume, centre: Array, vertices: Array | None, params: StartParams) -> Window:
     """Box around the directions that hold the subject: the volume's, and those of mesh vertices (K, V, 3) before c."""
     uv = np.linspace(-1, 1, 192)
-    solid = profile(volume, centre, window_directions(FULL_WINDOW, len(uv), len(uv))).opacity >= SURE
+    directions, least = window_directions(FULL_WINDOW, len(uv), len(uv)), params.subject_opacity
+    solid = profile(volume, centre, directions, least).opacity >= least
     held = [np.stack(np.meshgrid(uv[::-1], uv, indexing="ij"), -1)[solid]]
     if vertices is not None:
         offset = vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3) - centre
         offset = offset[offset[:, 0] > 0]
         held.append(directions_to_uv(offset / np.linalg.norm(offset, axis=1, keepdims=True)))
     points = np.concatenate(held)
-    low = np.maximum(points.min(0) - WINDOW_MARGIN, -WINDOW_LIMIT)
-    high = np.minimum(points.max(0) + WINDOW_MARGIN, WINDOW_LIMIT)
+    margin, limit = params.window_margin, params.window_limit
+    low, high = np.maximum(points.min(0) - margin, -limit), np.minimum(points.max(0) + margin, limit)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def blend(mesh: Array, volume: Array) -> tuple[Array, Array]:
+def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
     """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
+
+    Args:
+        mesh, volume: radii, units, NaN where there is none.
+        reach: where the volume lies outside the mesh by more, units, it is believed.
 
     Returns:
         radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
     """
-    close = np.isfinite(mesh) & ~(volume - mesh > MESH_REACH)
+    close = np.isfinite(mesh) & ~(volume - mesh > reach)
     # Ten nodes inside the border the mesh rules alone.
     kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
     kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
@@ -210,25 +187,26 @@ def blend(mesh: Array, volume: Array) -> tuple[Array, Array]:
     ), kept
 
 
-def spread(seen: Profile, middle: Array, halfwidth: float, voxel: float) -> Array:
+def spread(seen: Profile, middle: Array, params: GeometryParams, voxel: float) -> Array:
     """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
     surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
     thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
+    halfwidth = params.halfwidth
     wide: Array = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
-        halfwidth, max(halfwidth, WIDEST)
+        halfwidth, max(halfwidth, params.max_halfwidth)
     )
     return wide
 
 
-def least_middle(halfwidth: Array) -> Array:
-    """The smallest middle radius with which no layer of any round comes nearer to c than LEAST_RADIUS."""
-    return LEAST_RADIUS + max(ROUNDS) * halfwidth
+def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
+    """The smallest middle radius with which no layer of any round comes nearer to c than `min_radius`."""
+    return params.min_radius + max(params.rounds) * halfwidth
 
 
-def _nodes(window: Window) -> tuple[int, int]:
+def _nodes(window: Window, longest: int) -> tuple[int, int]:
     height, width = window[1] - window[0], window[3] - window[2]
-    scale = NODES / max(height, width)
+    scale = longest / max(height, width)
     return max(8, round(scale * height)), max(8, round(scale * width))
 
 
@@ -264,11 +242,11 @@ def extrapolate(radii: Array) -> Array:
     return filled
 
 
-def texel_count(scene: Scene, window: Window, radius: float) -> tuple[int, int]:
-    """(H, W), multiples of 16: a texel at `radius` from c is PIXELS_PER_TEXEL pixels of the median training camera."""
+def texel_count(scene: Scene, window: Window, radius: float, pixels_per_texel: float) -> tuple[int, int]:
+    """(H, W), multiples of 16: a texel at `radius` from c is so many pixels of the median training camera."""
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
-    texel = PIXELS_PER_TEXEL * pixel
+    texel = pixels_per_texel * pixel
     height = (window[1] - window[0]) * math.pi / 2 * radius / texel
     width = (window[3] - window[2]) * math.pi / 2 * radius / texel
     return max(32, 16 * round(height / 16)), max(32, 16 * round(width / 16))

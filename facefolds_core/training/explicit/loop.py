@@ -4,7 +4,7 @@ crossings. Under two minutes, so that an interrupted run simply starts again."""
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -20,103 +20,24 @@ from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, save_model
-from facefolds_core.params import TrainParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
-from facefolds_core.training.explicit.fit import ROUNDS, Fit, fit_scene, least_middle, recentre
+from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
-from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.plan import Level, plan
+from facefolds_core.training.explicit.state import LossWeights, TextureState
 from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
+from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import open_log
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
-from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
-from facefolds_core.training.volume.subject import subject_of
-
-RAYS_PER_TEXEL = 2.5
-"""Of one frame, in one step."""
-
-ROUND_ITERATIONS = 60
-"""Of each round of geometry, at a quarter of the final texels a side."""
-
-LEAST_ITERATIONS = ROUND_ITERATIONS * len(ROUNDS) + 3
-"""That are run even if fewer are asked for: all rounds, and a few with the final geometry."""
-
-HALF_SHARE = 0.4
-"""Of the remaining iterations, at half of the final texels a side; the others are at full resolution."""
-
-RATE_LAYERS, RATE_ALPHA, RATE_FRAME = 0.3, 15.0, 0.5
-"""Learning rates of the layers' own colours, of the logits of alpha, and of the frames' parts, against the colours'."""
-
-KEEP_FRAMES = 0.999
-"""The frames' parts shrink by this factor each step towards what is shared."""
-
-SMOOTH_EVERY = 3
-"""Steps between smoothings of opacity over neighbouring texels, at half and full resolution."""
-
-BACKGROUND_RATE = 0.5
-FAINT = 0.002
-"""Layers with less alpha are skipped once the textures are at half resolution."""
-
-LATE_VEIL = 0.1
-"""Once it is decided what the background explains, the price of opacity falls to this part, and rays that are nearly
-opaque are pressed to be so."""
-
-BLUR = 6.0
-"""Smoothing of the layers' motion between rounds of geometry, nodes of the radius maps."""
-
-EPSILON = 1 / 255
-"""A layer whose alpha is nowhere larger is dropped: no pixel changes by more than this."""
-
-LEAST = 1 / 1020
-"""Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several, some
-RAYS_PER_TEXEL a texel; all of them over the frames) are made transparent. A ray reads four a layer: its colour changes
-by no more than N / 255, and that only if all of them are just below."""
-
-BESIDE = 0.1
-"""Directions in which the volume is less opaque lie beside the subject: what was painted there is room."""
-
-DIVERGED = 9.0
-"""A mean squared error this many times the best of its level is a divergence."""
-
-ATTEMPTS = 4
+from facefolds_core.training.volume.fit import Volume, iterations
+from facefolds_core.training.volume.search import find_subject
 
 
-@dataclass(frozen=True)
-class Level:
-    """One stretch of training.
-
-    Attributes:
-        texels: (H, W).
-        iterations: steps.
-        stride: of the pixels that are traced.
-        geometry: halfwidths of the layers, in those of the fit.
-        last: the learning rates fall to a tenth along it.
-    """
-
-    texels: tuple[int, int]
-    iterations: int
-    stride: int
-    geometry: float
-    last: bool
-
-
-def plan(fit: Fit, iterations: int) -> list[Level]:
-    """Rounds of geometry, quarter, half and full resolution."""
-
-    def size(divisor: int) -> tuple[int, int]:
-        return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
-
-    levels = [Level(size(4), ROUND_ITERATIONS, 8, scale, False) for scale in ROUNDS]
-    rest = max(iterations, LEAST_ITERATIONS) - ROUND_ITERATIONS * len(levels)
-    half = round(HALF_SHARE * rest)
-    levels.append(Level(size(2), half, 1, ROUNDS[-1], False))
-    levels.append(Level(fit.texels, rest - half, 1, ROUNDS[-1], True))
-    return levels
-
-
-def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: Path) -> TrainingReport:
+def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log: Path) -> TrainingReport:
     """Train on `scene` and write the model folder whole.
 
     Raises:
@@ -127,16 +48,18 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
     device = pick_device(params.device)
     began = time.perf_counter()
     with open_log(log) as live:
-        bar = progress(total=iterations() + params.iterations, desc="train", unit="it")
-        volume = subject_of(fit_volume(scene, params.seed, params.lr_volume, bar))
+        bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
+        volume, found = find_subject(scene, params, bar)
         cameras = choose_cameras(scene, volume.cameras)
-        for note in cameras.notes:
+        for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        fit = fit_scene(cameras.scene, volume, params.level_halfwidth)
-        for note in fit.notes:
+        fit = fit_scene(cameras.scene, volume, params)
+        warnings = warnings_of(scene, fit, params.warnings)
+        for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
         trainer = _Trainer(cameras, params, fit, volume, device)
-        levels = plan(fit, params.iterations)
+        trainer.events = [*found, *trainer.events, *warnings]
+        levels = plan(fit, params)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
@@ -148,13 +71,13 @@ def train_explicit(scene: Scene, params: TrainParams, model_folder: Path, log: P
         save_model(model, spec, temporary)
         write_json(temporary / "training.json", asdict(report))
         write_json(temporary / "fit.json", trainer.summary(spec))
-        draw_fit(temporary / "fit.png", fit, spec.num_layers)
+        draw_fit(temporary / "fit.png", fit, spec.num_layers, params.start.subject_opacity)
     return report
 
 
 class _Trainer:
     def __init__(
-        self, cameras: CameraChoice, params: TrainParams, fit: Fit, volume: Volume, device: torch.device
+        self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: torch.device
     ) -> None:
         self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
         self.scene = cameras.scene
@@ -168,7 +91,7 @@ class _Trainer:
         self.stride = 0
         self.state: TextureState | None = None
         self.iteration = self.rays = 0
-        self.rate = params.lr_texture
+        self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
 
@@ -181,7 +104,7 @@ class _Trainer:
         self._prepare(level)
         assert self.state is not None and self.views is not None
         saved = self.state.snapshot()
-        for _ in range(ATTEMPTS):
+        for _ in range(self.params.divergence.attempts):
             if self._attempt(level, number, live, bar):
                 return
             self.state.restore(saved)
@@ -192,7 +115,7 @@ class _Trainer:
             "training diverged",
             place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {self.rate:.3g}",
             expected="an error that falls",
-            remedy="lower train.lr_texture; if that does not help, check the capture's calibration",
+            remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
         )
 
     def _prepare(self, level: Level) -> None:
@@ -206,10 +129,10 @@ class _Trainer:
             self.stride = level.stride
         assert self.views is not None
         if self.state is None:
-            background = first_background(self.scene, self.images, self.volume)
+            background = first_background(self.scene, self.images, self.volume, self.params.background)
             start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
             shape = (self.params.layers, self.scene.num_frames)
-            self.state = TextureState(level.texels, *shape, start, background, self.device)
+            self.state = TextureState(level.texels, *shape, start, background, self.params, self.device)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:
@@ -226,17 +149,23 @@ class _Trainer:
             alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
         )
         radii = self.manifolds().radii().detach().double().numpy()
-        moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), BLUR)).float()
+        moved = (
+            self.middle
+            + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)).float()
+        )
         start = torch.from_numpy(self.fit.middle).float()
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
         moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
-        self.middle = torch.maximum(moved, torch.from_numpy(least_middle(self.fit.halfwidth)).float())
+        self.middle = torch.maximum(
+            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
+        )
 
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
         assert self.state is not None and self.views is not None
         count, stride = len(self.views.pixel), self._stride()
-        coarse = number < len(ROUNDS)
+        coarse = number < len(self.params.geometry.rounds)
+        weights = self._weights(coarse)
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -247,18 +176,14 @@ class _Trainer:
                 rays,
                 self.images.frame(frame),
                 frame,
-                self.params.lambda_veil * (1.0 if coarse else LATE_VEIL),
-                0.0 if coarse else self.params.lambda_solid,
-                BACKGROUND_RATE,
-                0.0 if coarse else FAINT,
+                weights,
                 rates,
-                KEEP_FRAMES,
             )
-            if not coarse and i % SMOOTH_EVERY == 0:
+            if not coarse and i % self.params.textures.smooth_every == 0:
                 self.state.smooth_alpha(frame)
             recent = error if i == 0 else 0.9 * recent + 0.1 * error
             best = min(best, recent)
-            if not np.isfinite(error) or recent > DIVERGED * best + 1e-4:
+            if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
                 return False
             self.iteration += 1
             self.rays += len(rays)
@@ -271,14 +196,23 @@ class _Trainer:
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True
 
+    def _weights(self, coarse: bool) -> LossWeights:
+        """Once the rounds have decided what the background explains, opacity is cheap, and half opacity dear."""
+        losses = self.params.losses
+        if coarse:
+            return LossWeights(losses.opacity, 0.0, 0.0)
+        return LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, self.params.textures.min_alpha)
+
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""
         assert self.state is not None and self.views is not None
-        return max(1, int(len(self.views.pixel) / (RAYS_PER_TEXEL * self.state.shape[0] * self.state.shape[1])))
+        texels = self.state.shape[0] * self.state.shape[1]
+        return max(1, int(len(self.views.pixel) / (self.params.textures.rays_per_texel * texels)))
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         rate = self.rate * (1 - 0.9 * progress)
-        rates = rate * np.array([1, RATE_LAYERS, RATE_ALPHA, RATE_FRAME, RATE_FRAME * RATE_ALPHA])
+        to = self.params.textures
+        rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
     def result(self, mark: str) -> tuple[RadianceManifolds, ExplicitSpec]:
@@ -287,14 +221,16 @@ class _Trainer:
         state, n = self.state, self.params.layers
         state.forget_moments()
         assert self.views is not None
-        hidden = (state.contributions(self.views, self._stride()) < LEAST) | state.beside(BESIDE)
+        least = self.params.pruning.texel_opacity
+        hidden = state.contributions(self.views, self._stride()) < least
+        hidden |= state.beside(self.params.start.beside_opacity)
         state.hide(hidden)
         self.events.append(
-            f"{float(hidden.float().mean()):.0%} of all texels cleared: they add less than {LEAST:.5f} to any ray, "
+            f"{float(hidden.float().mean()):.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
             "or lie beside the subject"
         )
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
-        kept = [i for i in range(n) if float(peak[i]) >= EPSILON] or [n // 2]
+        kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
         self.events += [

@@ -9,17 +9,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from facefolds_core.training.explicit.fit import Fit
-from facefolds_core.training.volume.outline import SURE
 
 
-def draw_fit(path: Path, fit: Fit, layers: int) -> None:
-    """Maps over the window as seen from the front, and what each centre would lose of the visible surface."""
+def draw_fit(path: Path, fit: Fit, layers: int, subject_opacity: float) -> None:
+    """Maps over the window as seen from the front, and what each centre would lose of the visible surface.
+
+    Args:
+        subject_opacity: from which on a direction is taken to hold the subject.
+    """
     with matplotlib.rc_context({"font.size": 9}):
         figure = Figure(figsize=(14, 3.6), layout="constrained")
         axes = figure.subplots(1, 5)
         u0, u1, v0, v1 = fit.window
         extent = (v0, v1, u0, u1)
-        hidden = np.ma.masked_where(fit.opacity < SURE, fit.middle)
+        hidden = np.ma.masked_where(fit.opacity < subject_opacity, fit.middle)
         axes[0].imshow(fit.rgb.clip(0, 1), extent=extent)
         axes[0].set_title("colour at the start")
         axes[1].imshow(fit.opacity, extent=extent, vmin=0, vmax=1, cmap="gray")

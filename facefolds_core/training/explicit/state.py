@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.views import Views
 
-LEAST_OPACITY, MOST_OPACITY = 0.02, 0.9
-"""Of all layers together at the start. Their weights are equal: one alpha for all would favour the outer ones, and the
-rounds of geometry would drift outwards."""
-
 UNSEEN_LOGIT = -9.0
-"""Of texels that no training ray has met: transparent."""
+"""Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
+
+
+@dataclass(frozen=True)
+class LossWeights:
+    """Of one step, beside the squared error, a ray; T is its transmittance.
+
+    Attributes:
+        opacity: weight of the opacity regulariser 1 - T.
+        binarisation: weight of the binarisation loss t (1 - t), t = min(T, 1/2).
+        min_alpha: layers with less are skipped.
+    """
+
+    opacity: float
+    binarisation: float
+    min_alpha: float
 
 
 class TextureState:
@@ -29,6 +43,7 @@ class TextureState:
         start: [rows, columns, 4] colour and opacity of all layers together at the start, over the window with its
             borders at the first and last rows and columns.
         background: [C, pixels, 3] float32.
+        params: of the training.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
     """
 
@@ -39,10 +54,11 @@ class TextureState:
         frames: int,
         start: Tensor,
         background: Tensor,
+        params: ExplicitParams,
         device: torch.device,
     ) -> None:
         m = shape[0] * shape[1]
-        self.device = device
+        self.device, self.params = device, params
         self.shape = shape
         self.colour = torch.zeros(3, m, 3, device=device)
         self.layers = torch.zeros(3, m, layers, 4, device=device)
@@ -66,7 +82,7 @@ class TextureState:
         self.layers[..., 3] = 0
         self.layers[1:, ..., :3] = 0
         n = self.layers.shape[2]
-        weight = self._start()[:, 3:].clamp(LEAST_OPACITY, MOST_OPACITY) / n
+        weight = self._start()[:, 3:].clamp(self.params.start.min_opacity, self.params.start.max_opacity) / n
         alpha = weight / (1 - weight * torch.arange(n, device=self.device))
         self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
@@ -108,14 +124,11 @@ class TextureState:
         rays: NDArray[np.int64],
         images: NDArray[np.uint8],
         frame: int,
-        veil: float,
-        solid: float,
-        background_rate: float,
-        faint: float,
+        weights: LossWeights,
         rates: NDArray[np.float32],
-        keep: float,
     ) -> float:
         """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
+        background_rate, keep = self.params.background.rate, self.params.textures.frame_decay
         texture = self.activated(frame)
         self.steps[frame] += 1
         total, own = int(self.steps.sum()), int(self.steps[frame])
@@ -131,10 +144,10 @@ class TextureState:
                 self.background.numpy(),
                 texture.numpy().reshape(h, w, n, 4),
                 self.gradient.numpy().reshape(-1, h, w, n, 4),
-                veil,
-                solid,
+                weights.opacity,
+                weights.binarisation,
                 background_rate,
-                faint,
+                weights.min_alpha,
             )
             adam_kernel.adam_step(
                 self.colour.numpy(),
@@ -148,9 +161,7 @@ class TextureState:
                 correct,
             )
         else:
-            squares = self._reference_step(
-                views, rays, images, frame, texture, veil, solid, background_rate, rates, keep, correct
-            )
+            squares = self._reference_step(views, rays, images, frame, texture, weights, rates, correct)
         return float(squares) / (3 * len(rays))
 
     def _reference_step(
@@ -160,11 +171,8 @@ class TextureState:
         images: NDArray[np.uint8],
         frame: int,
         texture: Tensor,
-        veil: float,
-        solid: float,
-        background_rate: float,
+        weights: LossWeights,
         rates: NDArray[np.float32],
-        keep: float,
         correct: NDArray[np.float32],
     ) -> float:
         """`step` in plain torch."""
@@ -177,7 +185,13 @@ class TextureState:
         )
         n = texture.shape[1]
         gradient, moved, squares = reference.shade(
-            codes, target, self.background[at], texture.view(*self.shape, n, 4), veil, solid, background_rate
+            codes,
+            target,
+            self.background[at],
+            texture.view(*self.shape, n, 4),
+            weights.opacity,
+            weights.binarisation,
+            self.params.background.rate,
         )
         self.background[at] = moved
         reference.adam_step(
@@ -188,7 +202,7 @@ class TextureState:
             texture,
             gradient.view(-1, n, 4),
             torch.from_numpy(rates).to(self.device),
-            keep,
+            self.params.textures.frame_decay,
             torch.from_numpy(correct).to(self.device),
         )
         return float(squares)

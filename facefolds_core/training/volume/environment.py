@@ -10,16 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.params import EnvironmentParams
+
 Array = NDArray[np.float32]
 
-ROWS = 24
-"""Texels from pole to pole; twice as many around."""
-
-RADIUS = 2.5
-"""Of the sphere around the scene's origin, in distances of the farthest camera from it."""
-
-RATE = 0.02
 BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
+"""Adam's, as in `kernel`."""
 
 
 class Environment:
@@ -28,27 +24,30 @@ class Environment:
     Args:
         colour: (3,) to start with.
         reach: distance of the farthest camera from the origin, units.
+        params: its size and rate.
     """
 
-    def __init__(self, colour: Array, reach: float) -> None:
-        self.radius = RADIUS * reach
-        self.values = np.tile(colour.astype(np.float32), (ROWS * 2 * ROWS, 1))
+    def __init__(self, colour: Array, reach: float, params: EnvironmentParams) -> None:
+        self.params = params
+        self.radius = params.radius * reach
+        self.values = np.tile(colour.astype(np.float32), (params.rows * 2 * params.rows, 1))
         self._moments = np.zeros((2, *self.values.shape), np.float64)
         self._steps = 0
 
     def look_up(self, origins: Array, directions: Array) -> tuple[Array, NDArray[np.intp], Array]:
         """Colours (R, 3) of rays from inside the sphere; their texels (R, 4) and weights (R, 4)."""
+        rows = self.params.rows
         along = (origins * directions).sum(1)
         inside = (origins * origins).sum(1) - self.radius**2
         exit_point = origins + (np.sqrt(along * along - inside) - along)[:, None] * directions
         x, y, z = (exit_point / np.linalg.norm(exit_point, axis=1, keepdims=True)).T
-        row = (np.arccos(z.clip(-1, 1)) / math.pi * ROWS - 0.5).clip(0, ROWS - 1)
+        row = (np.arccos(z.clip(-1, 1)) / math.pi * rows - 0.5).clip(0, rows - 1)
         # The seam lies at +x, behind the cameras.
-        column = ((np.arctan2(y, -x) / math.pi + 1) * ROWS - 0.5).clip(0, 2 * ROWS - 1)
-        i, j = np.minimum(row.astype(np.intp), ROWS - 2), np.minimum(column.astype(np.intp), 2 * ROWS - 2)
+        column = ((np.arctan2(y, -x) / math.pi + 1) * rows - 0.5).clip(0, 2 * rows - 1)
+        i, j = np.minimum(row.astype(np.intp), rows - 2), np.minimum(column.astype(np.intp), 2 * rows - 2)
         a, b = (row - i).astype(np.float32), (column - j).astype(np.float32)
-        first = i * 2 * ROWS + j
-        taps = np.stack([first, first + 1, first + 2 * ROWS, first + 2 * ROWS + 1], 1)
+        first = i * 2 * rows + j
+        taps = np.stack([first, first + 1, first + 2 * rows, first + 2 * rows + 1], 1)
         weights = np.stack([(1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b], 1)
         return (self.values[taps] * weights[..., None]).sum(1), taps, weights
 
@@ -63,5 +62,5 @@ class Environment:
         first += (1 - BETA1) * (gradient - first)
         second += (1 - BETA2) * (gradient**2 - second)
         move = first / (1 - BETA1**self._steps) / (np.sqrt(second / (1 - BETA2**self._steps)) + EPSILON)
-        self.values = np.where(gradient != 0, self.values - scale * RATE * move, self.values)
+        self.values = np.where(gradient != 0, self.values - scale * self.params.learning_rate * move, self.values)
         self.values = self.values.clip(0, 1).astype(np.float32)

@@ -12,25 +12,11 @@ from scipy import ndimage
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv, uv_to_directions
+from facefolds_core.params import StartParams
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.fit import Volume
 
 Array = NDArray[np.float64]
-
-CENTRES = tuple(-0.05 * k for k in range(2, 9))
-"""Candidates for the sphere centre: (x, 0, 0) with these x, units. The paper's is -0.25."""
-
-TIE = 0.02
-"""Of the centres whose loss is within this of the least, the one farthest back wins: directions fan out less."""
-
-WINDOW_LIMIT = 0.9
-"""No window reaches beyond |u|, |v| = 0.9: at the poles and behind c a radius map has no meaning."""
-
-MAP_NODES = 96
-"""A side of the coarse radius map over the hemisphere by which centres are compared."""
-
-SURE = 0.5
-"""Opacity from which on a direction, or a pixel, is taken to hold the subject."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +24,7 @@ class Profile:
     """The volume along directions from a centre.
 
     Attributes:
-        radius: (...) where half of the opacity is reached from outside; NaN where there is less than SURE of it, units.
+        radius: (...) where half of the opacity is reached from outside; NaN where there is too little of it, units.
         outer, inner: (...) where a tenth and nine tenths of it are reached, units.
         opacity: (...) along the whole direction, float32.
         rgb: (..., 3) colour, composited from outside and divided by the opacity, float32.
@@ -51,8 +37,12 @@ class Profile:
     rgb: NDArray[np.float32]
 
 
-def profile(volume: Volume, centre: Array, directions: Array) -> Profile:
-    """Integrate the volume from outside towards `centre` along unit directions (..., 3)."""
+def profile(volume: Volume, centre: Array, directions: Array, least: float) -> Profile:
+    """Integrate the volume from outside towards `centre` along unit directions (..., 3).
+
+    Args:
+        least: opacity of a direction from which on it has radii.
+    """
     size = np.array(volume.grid.shape[:3]) - 1
     ends = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     corners = volume.lower + volume.voxel * ends * size
@@ -61,7 +51,7 @@ def profile(volume: Volume, centre: Array, directions: Array) -> Profile:
     opacity, rgb, radii = kernel.profile(
         volume.grid, volume.lower, volume.voxel, centre, flat, farthest, 0.5 * volume.voxel, np.array([0.5, 0.1, 0.9])
     )
-    radii = np.where(opacity[:, None] >= SURE, radii, np.nan).astype(np.float64)
+    radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
     rgb /= np.maximum(opacity, kernel.CLEAR)[:, None]
     shape = directions.shape[:-1]
     middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
@@ -91,7 +81,7 @@ def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int =
     return np.concatenate(points)
 
 
-def lost_share(volume: Volume, centre: Array, points: Array) -> float:
+def lost_share(volume: Volume, centre: Array, points: Array, params: StartParams) -> float:
     """Share of visible points that no sheet over the hemisphere of `centre` can hold.
 
     They lie behind it or at its rim, or beneath or above the outermost surface in their direction by more than two
@@ -100,18 +90,19 @@ def lost_share(volume: Volume, centre: Array, points: Array) -> float:
     offset = points - centre
     radius = np.linalg.norm(offset, axis=1)
     uv = directions_to_uv(offset / radius[:, None])
-    front = (offset[:, 0] > 0) & (np.abs(uv) <= WINDOW_LIMIT).all(1)
-    radii = profile(volume, centre, window_directions(FULL_WINDOW, MAP_NODES, MAP_NODES)).radius
+    front = (offset[:, 0] > 0) & (np.abs(uv) <= params.window_limit).all(1)
+    nodes = params.centre_nodes
+    radii = profile(volume, centre, window_directions(FULL_WINDOW, nodes, nodes), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
     low = ndimage.minimum_filter(np.where(np.isnan(radii), np.inf, radii), 3)
-    i = np.rint((1 - uv[:, 0]) / 2 * (MAP_NODES - 1)).astype(int).clip(0, MAP_NODES - 1)
-    j = np.rint((uv[:, 1] + 1) / 2 * (MAP_NODES - 1)).astype(int).clip(0, MAP_NODES - 1)
+    i = np.rint((1 - uv[:, 0]) / 2 * (nodes - 1)).astype(int).clip(0, nodes - 1)
+    j = np.rint((uv[:, 1] + 1) / 2 * (nodes - 1)).astype(int).clip(0, nodes - 1)
     margin = 2 * volume.voxel
     held = front & (radius <= high[i, j] + margin) & (radius >= low[i, j] - margin)
     return float(1 - held.mean())
 
 
-def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[float, float]]:
+def choose_centre(volume: Volume, points: Array, params: StartParams) -> tuple[Array, dict[float, float]]:
     """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x.
 
     Raises:
@@ -126,7 +117,7 @@ def choose_centre(volume: Volume, points: Array) -> tuple[Array, dict[float, flo
             remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
             "calibration, or take other frames",
         )
-    losses = {round(x, 2): lost_share(volume, np.array([x, 0.0, 0.0]), points) for x in CENTRES}
+    losses = {x: lost_share(volume, np.array([x, 0.0, 0.0]), points, params) for x in params.centres}
     least = min(losses.values())
-    best = min(x for x, loss in losses.items() if loss <= least + TIE)
+    best = min(x for x, loss in losses.items() if loss <= least + params.centre_tie)
     return np.array([best, 0.0, 0.0]), losses

@@ -15,9 +15,6 @@ import numpy as np
 
 from facefolds_core.training.volume.kernel import CLEAR, FASTMATH, OPAQUE, _sample, _softplus
 
-FARTHEST = 20.0
-"""What lies farther from the centre, in radii of the ball, is left to the far sphere."""
-
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
 def _start(o, d, radius):  # type: ignore[no-untyped-def]
@@ -48,7 +45,7 @@ def _contracted(o, d, s, radius, voxel, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
-def look(origins, directions, jitter, grid, radius, step):  # type: ignore[no-untyped-def]
+def look(origins, directions, jitter, grid, radius, step, farthest):  # type: ignore[no-untyped-def]
     """(R, 3) rays -> rgb over black (R, 3), transmittance (R,). See `splat` for the arguments."""
     count = origins.shape[0]
     rgb = np.zeros((count, 3), np.float32)
@@ -60,7 +57,7 @@ def look(origins, directions, jitter, grid, radius, step):  # type: ignore[no-un
         t = np.float32(1.0)
         s = _start(o, d, radius)
         stride, n = _stride(o, d, s, radius, step)
-        while n < FARTHEST and t >= OPAQUE:
+        while n < farthest and t >= OPAQUE:
             _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
             _sample(grid, at[0], at[1], at[2], value)
             a = np.float32(1 - math.exp(-_softplus(value[0]) * step / voxel))
@@ -81,6 +78,7 @@ def splat(  # type: ignore[no-untyped-def]
     grid,  # (M, M, M, 4) float32: raw density, rgb, over [-2, 2]^3 in contracted radii
     radius,  # of the ball, units
     step,  # between samples, contracted radii
+    farthest,  # where rays end, radii of the ball
     samples,  # at most so many on a ray
     beyond,  # (R, 3) float32: colours behind the grid
     slope,  # (R, 3) float32: of the loss in the colour of each ray
@@ -102,7 +100,7 @@ def splat(  # type: ignore[no-untyped-def]
             m = 0
             s = _start(o, d, radius)
             stride, n = _stride(o, d, s, radius, step)
-            while n < FARTHEST and m < samples and t >= OPAQUE:
+            while n < farthest and m < samples and t >= OPAQUE:
                 _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
                 s += stride
                 stride, n = _stride(o, d, s, radius, step)

@@ -7,7 +7,6 @@ from torch import Tensor
 
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.training.volume.reference import sample
-from facefolds_core.training.volume.room_kernel import FARTHEST
 
 
 def contract(points: Tensor) -> Tensor:
@@ -24,6 +23,7 @@ def look(
     grid: Tensor,  # [M, M, M, 4]
     radius: float,
     step: float,
+    farthest: float,
     samples: int,
 ) -> tuple[Tensor, Tensor]:
     """As `room_kernel.look`, differentiable in the grid: rgb over black [R, 3], transmittance [R]."""
@@ -40,8 +40,8 @@ def look(
         stride = step * radius * n.square() / (cosine.square() + across * (2 * n - 1).square()).sqrt()
         point = (origins + (s + jitter * stride)[:, None] * directions) / radius
         rgba.append(sample(grid, contract(point), torch.full((3,), -2.0, dtype=grid.dtype), voxel))
-        alive.append(n < FARTHEST)
-        s = torch.where(n < FARTHEST, s + stride, s)
+        alive.append(n < farthest)
+        s = torch.where(n < farthest, s + stride, s)
     values, near = torch.stack(rgba, 1), torch.stack(alive, 1)
     alpha = 1 - torch.exp(-torch.nn.functional.softplus(values[..., 0]) * step / voxel)
     weights, through = compositing_weights(torch.where(near, alpha, 0.0))

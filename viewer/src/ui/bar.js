@@ -69,7 +69,8 @@ export function connectBar(element) {
     sound.innerHTML = player.sound?.muted ? ICONS.mute : ICONS.sound;
     sound.setAttribute("aria-pressed", String(player.sound ? !player.sound.muted : false));
     const still = element.frames < 2;
-    for (const control of [play, find('[data-do="back"]'), find('[data-do="next"]'), scrubber]) control.disabled = still;
+    for (const control of [play, find('[data-do="back"]'), find('[data-do="next"]'), scrubber])
+      control.disabled = still;
   };
   player.addEventListener("frame", showFrame);
   player.addEventListener("ready", () => {

@@ -36,7 +36,9 @@ export class Comparison {
     if (this.index !== index) return;
     const { photos } = this.player.manifest;
     this.select.replaceChildren(
-      ...photos.map(({ camera, frame }, i) => new Option(`Camera ${camera}, frame ${frame + 1}`, i, false, i === index)),
+      ...photos.map(
+        ({ camera, frame }, i) => new Option(`Camera ${camera}, frame ${frame + 1}`, i, false, i === index),
+      ),
     );
     this.element.pause();
     this.player.view.setExact(photo);

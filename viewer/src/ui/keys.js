@@ -46,7 +46,8 @@ export function connectKeys(element) {
 /** Controls that use the key themselves. */
 function needsKeys(target, key) {
   if (target.matches("select, input[type=color]")) return key !== "Escape";
-  if (target.matches("input[type=range]")) return key.startsWith("Arrow") || ["Home", "End", "PageUp", "PageDown"].includes(key);
+  if (target.matches("input[type=range]"))
+    return key.startsWith("Arrow") || ["Home", "End", "PageUp", "PageDown"].includes(key);
   if (target.matches("button, input, summary")) return key === " " || key === "Enter";
   return false;
 }

@@ -19,7 +19,8 @@ export function connectPanel(element) {
   panel.querySelector(".layers").addEventListener("click", ({ target }) => {
     const { layers } = element;
     if (target.dataset.layer === "all") element.layers = layers.map(() => !layers.every(Boolean));
-    else if (target.dataset.layer) element.layers = layers.map((on, i) => (i === Number(target.dataset.layer) ? !on : on));
+    else if (target.dataset.layer)
+      element.layers = layers.map((on, i) => (i === Number(target.dataset.layer) ? !on : on));
   });
 
   const showLevel = () => {

@@ -82,7 +82,7 @@ export class ElementFrames {
     this.shown = -1;
     this.video.currentTime = Math.min((k + 0.5) / this.fps, this.video.duration);
     await seeked;
-    for (const end = performance.now() + PRESENTED; this.shown !== k && performance.now() < end; ) {
+    for (const end = performance.now() + PRESENTED; this.shown !== k && performance.now() < end;) {
       await new Promise((resolve) => setTimeout(resolve, 5));
     }
     this.shown = k;

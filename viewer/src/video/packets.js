@@ -16,7 +16,11 @@ export async function takeApart(buffer) {
     for await (const packet of new EncodedPacketSink(track).packets()) coded.push(packet);
     const shown = coded.map((packet) => packet.timestamp).sort((a, b) => a - b);
     const number = new Map(shown.map((time, frame) => [time, frame]));
-    const packets = coded.map(({ timestamp, type, data }) => ({ frame: number.get(timestamp), key: type === "key", data }));
+    const packets = coded.map(({ timestamp, type, data }) => ({
+      frame: number.get(timestamp),
+      key: type === "key",
+      data,
+    }));
     return { config, packets };
   } finally {
     input.dispose?.();

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.captures.frames import FrameStore, Image, write_frames
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import FrameStore, Image, write_frames
 
 SHAPE = (5, 4, 3)
 

@@ -1,4 +1,4 @@
-"""Check an asset and say what is wrong with it: `python -m stages.validate data/<subject>/asset`."""
+"""Check an asset and say what is wrong with it: `facefolds validate data/<subject>/asset`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from facefolds_core.asset.validation import summary, validate_asset
 from facefolds_core.errors import report_user_errors
 
 
-def validate(
+def command(
     asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
 ) -> None:
     """Check an asset's manifest, checksums, meshes and every frame of its video; exit status 1 if anything is wrong."""
@@ -24,9 +24,3 @@ def validate(
                 typer.echo(f"  {problem}", err=True)
             raise typer.Exit(1)
         typer.echo(f"{asset}: sound. {summary(parse_manifest(asset / MANIFEST_NAME))}")
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(validate)
-    app()

@@ -11,7 +11,7 @@ SYSTEM_LIBRARIES = {
     "libOpenGL.so.0": ("pymeshlab", "libopengl0", "libglvnd-opengl"),
 }
 OPTIONAL_LIBRARIES = {
-    "libEGL.so.1": ("`python -m stages.render`", "libegl1 libgl1-mesa-dri", "mesa-libEGL mesa-dri-drivers"),
+    "libEGL.so.1": ("`facefolds render`", "libegl1 libgl1-mesa-dri", "mesa-libEGL mesa-dri-drivers"),
 }
 
 
@@ -28,7 +28,7 @@ def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRAR
     return lines
 
 
-def main() -> None:
+def command() -> None:
     missing = missing_libraries()
     if missing:
         text = "\n  ".join(missing)
@@ -38,7 +38,3 @@ def main() -> None:
         print("doctor: not needed by the pipeline, but missing:\n  " + "\n  ".join(optional))
     else:
         print("doctor: all system libraries are here")
-
-
-if __name__ == "__main__":
-    main()

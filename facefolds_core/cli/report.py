@@ -1,4 +1,4 @@
-"""Make a page that tells all about a subject: `python -m stages.report data/<subject>` (docs/report.md)."""
+"""Make a page that tells all about a subject: `facefolds report data/<subject>` (docs/report.md)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def evaluated_subjects(data: Path) -> list[Path]:
     return found
 
 
-def report(
+def command(
     subjects: Annotated[
         list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
     ] = None,
@@ -40,9 +40,3 @@ def report(
             path = make_report(SubjectFolders(folder))
             seconds = time.perf_counter() - start
             typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(report)
-    app()

@@ -1,4 +1,4 @@
-"""Pick a configuration from a sweep: `python -m stages.recommend --max-bytes 1e6 [--write]`."""
+"""Pick a configuration from a sweep: `facefolds recommend --max-bytes 1e6 [--write]`."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from facefolds_core.sweeps.table import Run, read_runs
 SHOWN = ("psnr_subject", "psnr", "triangles", "bytes", "gpu_bytes", "video_bits_per_second")
 
 
-def choose(
-    table: Annotated[Path, typer.Argument(help="Written by `python -m stages.collect`: Parquet or CSV.")] = Path(
+def command(
+    table: Annotated[Path, typer.Argument(help="Written by `facefolds collect`: Parquet or CSV.")] = Path(
         "sweep.parquet"
     ),
     subject: Annotated[str, typer.Option(help="Name of the subject; needed where the table has several.")] = "",
@@ -61,9 +61,3 @@ def of_subject(runs: list[Run], subject: str, table: Path) -> list[Run]:
             remedy="name one of these, or collect the sweep again",
         )
     return [run for run in runs if run.subject == (subject or names[0])]
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(choose)
-    app()

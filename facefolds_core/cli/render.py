@@ -1,4 +1,4 @@
-"""Make stills and films of an asset: `python -m stages.render data/<subject>/asset --out face.png`."""
+"""Make stills and films of an asset: `facefolds render data/<subject>/asset --out face.png`."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
     return np.asarray(np.rint(np.clip(means, 0, 1) * 255), np.uint8)
 
 
-def render(
+def command(
     asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
     out: Annotated[Path, typer.Option(help="File to write: .png for a still, .mp4 for a film.")],
     kind: Annotated[
@@ -151,9 +151,3 @@ def write_film(path: Path, pictures: Iterator[NDArray[np.uint8]], size: tuple[in
     planar = (np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)]) for y, cb, cr in planes)
     codec = CODECS["h264"]
     encode_video(path, planar, size, rate, codec, codec.options(FILM, FILM.crf))
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(render)
-    app()

@@ -1,4 +1,4 @@
-"""Collect the experiments of `dvc exp run` into one table: `python -m stages.collect --out sweep.parquet`."""
+"""Collect the experiments of `dvc exp run` into one table: `facefolds collect --out sweep.parquet`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shown_experiments() -> object:
     return json.loads(done.stdout)
 
 
-def collect(
+def command(
     out: Annotated[Path, typer.Option(help="Table to write: .parquet or .csv.")] = Path("sweep.parquet"),
     shown: Annotated[
         Path | None, typer.Option("--from", help="Output of `dvc exp show --json`, kept earlier or elsewhere.")
@@ -50,9 +50,3 @@ def collect(
             typer.echo(
                 f"  failed: {run.experiment}, {run.subject} ({params}); `dvc queue logs {run.experiment}` says why"
             )
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(collect)
-    app()

@@ -1,4 +1,4 @@
-"""Write an asset for Godot 3: `python -m stages.godot_export data/<subject>/asset OUT`; see docs/engines.md."""
+"""Write an asset for Godot 3: `facefolds export-godot data/<subject>/asset OUT`; see docs/engines.md."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 from facefolds_core.asset import read_asset
+from facefolds_core.cli.render import pick_level
 from facefolds_core.engines.godot import write_godot
 from facefolds_core.errors import report_user_errors
-from stages.render import pick_level
 
 
-def godot_export(
+def command(
     asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
     out: Annotated[Path, typer.Argument(help="Folder to write; the add-on loads it. An earlier export is replaced.")],
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
@@ -24,9 +24,3 @@ def godot_export(
         chosen = pick_level(found, level)
         size = write_godot(out, chosen, found.manifest.subject)
         typer.echo(f"godot_export: {out}: {chosen.num_layers} layers, {chosen.num_frames} frames, {size / 1e6:.1f} MB")
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(godot_export)
-    app()

@@ -1,4 +1,4 @@
-"""Play an asset in a browser: `python -m stages.view data/<subject>/asset`."""
+"""Play an asset in a browser: `facefolds view data/<subject>/asset`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ import typer
 
 from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.player import find_player
 from facefolds_core.serving import serving
-
-PLAYER = Path(__file__).resolve().parents[1] / "viewer" / "dist"
 
 
 def latest_asset(data: Path) -> Path:
@@ -32,23 +31,12 @@ def latest_asset(data: Path) -> Path:
     return found[-1].parent
 
 
-def check_player(folder: Path) -> Path:
-    """Refuse a player that has not been built.
-
-    Raises:
-        UserError: naming the command that builds it.
-    """
-    if not (folder / "index.html").is_file():
-        raise UserError("the web player has not been built", file=folder, remedy="run `make view`, which builds it")
-    return folder
-
-
 def has_screen() -> bool:
     """Whether a browser could open a window here."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def view(
+def command(
     asset: Annotated[
         Path | None, typer.Argument(help="Folder of the asset. Left out: the one under --data that was made last.")
     ] = None,
@@ -60,7 +48,7 @@ def view(
     with report_user_errors("view"):
         folder = (asset or latest_asset(data)).resolve()
         parse_manifest(folder / MANIFEST_NAME)
-        with serving(check_player(PLAYER), {"asset": folder}, port) as address:
+        with serving(find_player(), {"asset": folder}, port) as address:
             typer.echo(f"view: {folder}\nview: {address}  (Ctrl+C ends)")
             if browser and has_screen():
                 webbrowser.open(address)
@@ -68,9 +56,3 @@ def view(
                 threading.Event().wait()
             except KeyboardInterrupt:
                 typer.echo("view: ended")
-
-
-if __name__ == "__main__":
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command()(view)
-    app()

@@ -1,0 +1,112 @@
+"""The sections of params.yaml and their keys: the only place that knows them, their units and their defaults.
+
+`params_file.load_params` reads the file. Nothing below `stages/` reads a raw dictionary of parameters, and no function
+below takes a number that somebody might tune from anywhere but a section (tests/core/test_constants.py).
+"""
+
+from facefolds_core.params.base import Section, merged, nested, value_at
+from facefolds_core.params.capture import CaptureParams, NormalizeParams
+from facefolds_core.params.compress import (
+    BetweenParams,
+    CodecName,
+    CompressParams,
+    CrfSearchParams,
+    GlbParams,
+    LevelParams,
+    MeshCodec,
+    MeterParams,
+    VideoCodec,
+    ViewEffectParams,
+)
+from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.explicit import (
+    BackgroundParams,
+    DivergenceParams,
+    ExplicitParams,
+    GridTextureParams,
+    LossParams,
+    PruningParams,
+)
+from facefolds_core.params.export import (
+    AutoWindowParams,
+    BakeParams,
+    CollapseParams,
+    DecimateParams,
+    ReconstructParams,
+    RefitParams,
+    SampleParams,
+    TextureParams,
+)
+from facefolds_core.params.mlp import MlpParams, MlpStartParams
+from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
+from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
+from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
+from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
+from facefolds_core.params.volume import (
+    CameraParams,
+    EnvironmentParams,
+    RoomParams,
+    SubjectParams,
+    VolumeLevel,
+    VolumeParams,
+    WarningParams,
+)
+
+__all__ = [
+    "PRESETS",
+    "SECTIONS",
+    "STAGE_SECTIONS",
+    "AutoWindowParams",
+    "BackgroundParams",
+    "BakeParams",
+    "BetweenParams",
+    "CameraParams",
+    "CaptureParams",
+    "CodecName",
+    "CollapseParams",
+    "CompressParams",
+    "CrfSearchParams",
+    "DecimateParams",
+    "DivergenceParams",
+    "EnvironmentParams",
+    "EvaluateParams",
+    "ExplicitParams",
+    "FrameRange",
+    "GeometryParams",
+    "GlbParams",
+    "GridTextureParams",
+    "HoldoutEvery",
+    "LevelParams",
+    "LossParams",
+    "MeshCodec",
+    "MeshParams",
+    "MeterParams",
+    "MlpParams",
+    "MlpStartParams",
+    "NormalizeParams",
+    "Overrides",
+    "Preset",
+    "PruningParams",
+    "ReconstructParams",
+    "RefitParams",
+    "RoomParams",
+    "SampleParams",
+    "Section",
+    "StartParams",
+    "Subject",
+    "SubjectParams",
+    "TextureParams",
+    "TrainParams",
+    "TrainSection",
+    "VideoCodec",
+    "ViewEffectParams",
+    "VolumeLevel",
+    "VolumeParams",
+    "WarningParams",
+    "merged",
+    "nested",
+    "section_of",
+    "train_params",
+    "user_error",
+    "value_at",
+]

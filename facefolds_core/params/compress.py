@@ -1,0 +1,236 @@
+"""`compress`: the asset that ships."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, field_validator
+
+from facefolds_core.params.base import Count, Many, Natural, Pixels, Section, Share, TextureSide
+
+CodecName = Literal["h264", "vp9", "av1"]
+ConstantRateFactor = Annotated[int, Field(ge=0, le=51)]
+Decibels = Annotated[float, Field(ge=0, le=100)]
+
+
+def _one_or_several(value: Any) -> Any:
+    return (value,) if isinstance(value, str) else value
+
+
+class MeshCodec(Section):
+    """Draco."""
+
+    max_error_pixels: Pixels | None = None
+    """Instead of numbers of bits: the fewest with which, in every training camera, no vertex moves by more than so many
+    pixels, and no texture coordinate by more than so many texels."""
+
+    quantization_bits: Annotated[int, Field(ge=0, le=24)] = 0
+    """Of positions; 0 stores all floats exactly (the paper's setting)."""
+
+    texture_coordinate_bits: Annotated[int, Field(ge=1, le=24)] = 12
+    """Of texture coordinates, where positions are quantised."""
+
+    compression_level: Annotated[int, Field(ge=0, le=10)] = 0
+    """0 (fastest, the paper's, keeps the order of vertices) to 10."""
+
+    max_bits: Annotated[int, Field(ge=1, le=24)] = 20
+    """Of positions and texture coordinates that `max_error_pixels` may take: beyond, floats are no finer."""
+
+
+class VideoCodec(Section):
+    """Texture video."""
+
+    codec: Annotated[Many[CodecName], BeforeValidator(_one_or_several)] = ("h264",)
+    """"h264", "vp9" or "av1", or a list of them: one file each with the same pictures, the first one first."""
+
+    crf: ConstantRateFactor = 18
+    """Constant rate factor on x264's scale (smaller is better and larger); other codecs take the factor of about the
+    same quality on theirs."""
+
+    target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = None
+    """Instead of crf, the quality of rendered training views, dB against those of the textures before the codec; the
+    coarsest factor that reaches it is searched."""
+
+    lossless: bool = False
+    """No loss beyond 8 bits and 4:2:0. In H.264 that is a profile which few hardware decoders know."""
+
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
+        "slow"
+    )
+    """Of libx264: slower ones make smaller files."""
+
+    keyframe_interval: Count = 30
+    """Frames between key frames: fewer make smaller files, more make scrubbing faster."""
+
+    @field_validator("codec")
+    @classmethod
+    def _each_once(cls, value: tuple[CodecName, ...]) -> tuple[CodecName, ...]:
+        if not value or len(set(value)) != len(value):
+            raise ValueError("each codec once, at least one")
+        return value
+
+
+class CrfSearchParams(Section):
+    """The search for `video.target_psnr`: few encodings (packaging/rate.py)."""
+
+    frames: Count = 30
+    """An attempt encodes at most so many frames, from the first on."""
+
+    max_encodes: Count = 6
+    """Attempts; as many again where the target is out of reach."""
+
+    tolerance: Decibels = 0.15
+    """dB above the target at which the search ends early."""
+
+    spared: Decibels = 0.2
+    """dB given up where the target is out of reach: bits without end would buy nothing."""
+
+    slope: Annotated[float, Field(gt=0, le=100)] = 0.4
+    """dB that one step of the factor costs, roughly, of any encoder: for the second attempt."""
+
+
+class MeterParams(Section):
+    """The yardstick of packaging: rendered training views (packaging/views.py)."""
+
+    cameras: Count = 6
+    """Training cameras, evenly spread."""
+
+    frames: Count = 3
+    """Evenly spread."""
+
+    rays_per_camera: Count = 16_000
+    """Of those that hit anything, drawn once."""
+
+
+class ViewEffectParams(Section):
+    """The fit of the view effects (packaging/effects.py)."""
+
+    share: Annotated[float, Field(gt=0, le=100)] = 0.1
+    """Bytes of the effects, of the full level's, at most."""
+
+    frames: Count = 3
+    """That are fitted to, evenly spread."""
+
+    pixels: Count = 240_000
+    """In the fit, over all cameras and frames."""
+
+    min_opacity: Share = 0.9
+    """From which a pixel is the asset's: beside it the photo shows the room."""
+
+    min_weight: Share = 0.01
+    """Compositing weight of a layer below which a pixel says nothing about it."""
+
+    max_residual: Share = 0.3
+    """Residuals are clipped to it: what is beyond is wrong geometry or the room."""
+
+    ridges: Annotated[Many[Annotated[float, Field(ge=0, le=1e9)]], Field(min_length=1, max_length=100)] = (
+        *(1.0, 3.0),
+        *(10.0, 30.0),
+    )
+    """Strengths of the ridge that are tried; the one that is best on the cameras left out is taken."""
+
+    validation_every: Annotated[int, Field(ge=2, le=100_000)] = 5
+    """Every so many-th training camera is left out to choose the ridge."""
+
+    min_gain: Decibels = 0.2
+    """dB on those cameras below which no effects ship."""
+
+    downscales: Annotated[Many[Annotated[int, Field(ge=1, le=4096)]], Field(min_length=1, max_length=100)] = (
+        *(8, 12, 16),
+        *(24, 32),
+    )
+    """Texels of the textures a texel of the maps, along each side: the first whose file is small enough."""
+
+
+class BetweenParams(Section):
+    """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""
+
+    min_side: Annotated[int, Field(ge=16, le=4096)] = 16
+    """Texels a side below which no motion is looked for: frames are mixed."""
+
+    fixed_point_steps: Count = 6
+    """To find which texel is at a place at a time."""
+
+    min_crowd: Annotated[float, Field(gt=0, le=1)] = 0.001
+    """Weight of a frame whose texels are stretched over a gap, at least."""
+
+    behind: Share = 0.5
+    """Grey behind the composite whose motion is measured: an outline must not look like the edge of something black."""
+
+
+class GlbParams(Section):
+    """The GLB beside the asset: one frame as binary glTF."""
+
+    frame: Natural = 0
+    """Index of the capture's frame whose textures it shows."""
+
+    draco: bool = False
+    """Keep the meshes compressed (KHR_draco_mesh_compression, which not every program reads)."""
+
+
+class LevelParams(Section):
+    """A coarser level of detail, derived from the full one."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=64)]
+    """Lower case letters, digits, - and _; not "full"."""
+
+    mesh_resolution: Annotated[int, Field(ge=4, le=2048)]
+    """At most so many vertices squared a layer, as R^m."""
+
+    texture_resolution: TextureSide
+    """Texels a side of a whole layer, as R^t."""
+
+    crf: ConstantRateFactor
+    """Of its videos, on x264's scale."""
+
+    max_error_pixels: Pixels | None = None
+    """As in `mesh`; null takes the full level's setting."""
+
+
+class CompressParams(Section):
+    """Meshes, videos, levels of detail and what else ships with them."""
+
+    mesh: MeshCodec = MeshCodec()
+    """How meshes are compressed."""
+
+    video: VideoCodec = VideoCodec()
+    """How textures are compressed."""
+
+    levels: Many[LevelParams] = ()
+    """Coarser levels of detail, the coarsest first; the full one is always there."""
+
+    photos: Natural = 0
+    """Photos of held-out cameras that ship with the asset, to compare with: at most so many."""
+
+    frame_rate_factor: Annotated[int, Field(ge=1, le=3)] = 1
+    """The asset plays at 1, 2 or 3 times the capture's frames a second; what lies between the capture's frames follows
+    the motion (export/between.py)."""
+
+    glb: GlbParams = GlbParams()
+    """One frame for programs that read glTF."""
+
+    view_effects: bool = False
+    """Fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of the full level at
+    most. It needs an asset that stands before the room, not one that has it painted on."""
+
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
+    """Of poster and photos, on JPEG's scale."""
+
+    search: CrfSearchParams = CrfSearchParams()
+    """For `video.target_psnr`."""
+
+    meter: MeterParams = MeterParams()
+    """What quality is measured on."""
+
+    effects: ViewEffectParams = ViewEffectParams()
+    """For `view_effects`."""
+
+    between: BetweenParams = BetweenParams()
+    """For `frame_rate_factor`."""
+
+    @field_validator("levels")
+    @classmethod
+    def _names_differ(cls, value: tuple[LevelParams, ...]) -> tuple[LevelParams, ...]:
+        if len({"full", *(level.name for level in value)}) != len(value) + 1:
+            raise ValueError("two levels of one name (`full` is always there)")
+        return value

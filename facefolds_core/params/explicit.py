@@ -1,0 +1,175 @@
+"""`train` of the model `explicit`: radius maps and texel grids (docs/method.md). The preset `fast` are its defaults."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from facefolds_core.params.base import Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
+from facefolds_core.params.volume import (
+    CameraParams,
+    EnvironmentParams,
+    RoomParams,
+    SubjectParams,
+    VolumeParams,
+    WarningParams,
+)
+
+
+class GridTextureParams(Section):
+    """The texel grids: how fine, and how they are trained. Rates are Adam's."""
+
+    pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 1.5
+    """Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
+    cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
+
+    rays_per_texel: Factor = 2.5
+    """Of one frame, in one step: each texel is met, few rays twice."""
+
+    learning_rate: Rate = 0.02
+    """Of the colours shared by layers and frames; it falls to a tenth along the last level. The other rates are factors
+    on it."""
+
+    layer_rate: Rate = 0.3
+    """Learning rate of the layers' own colours, against `learning_rate`: they are small changes."""
+
+    alpha_rate: Rate = 15.0
+    """Learning rate of the logits of alpha, against `learning_rate`: logits move over eighteen units, colours over
+    one."""
+
+    frame_rate: Rate = 0.5
+    """Learning rate of the frames' parts, against those of what is shared."""
+
+    frame_decay: Annotated[float, Field(gt=0, le=1)] = 0.999
+    """The frames' parts shrink by this factor each step towards what is shared: what every frame shows belongs
+    there."""
+
+    half_share: Annotated[float, Field(gt=0, lt=1)] = 0.4
+    """Of the iterations after the rounds of geometry, at half of the final texels a side; the others are at full
+    resolution."""
+
+    smooth_every: Count = 3
+    """Steps between smoothings of opacity over neighbouring texels, at half and full resolution: left alone, opacity
+    becomes grain that shows each camera its own picture."""
+
+    min_alpha: Share = 0.002
+    """Layers with less alpha are skipped once the textures are at half resolution: speed, half a code of a pixel."""
+
+
+class LossParams(Section):
+    """Prices beside the squared error, a ray."""
+
+    opacity: Weight = 0.003
+    """Weight of the opacity regulariser 1 - T, T a ray's transmittance, so that what the background explains stays
+    clear."""
+
+    late_opacity: Weight = 0.1
+    """Once the rounds of geometry have decided what the background explains, `opacity` falls to this part of itself,
+    and `binarisation` begins."""
+
+    binarisation: Weight = 0.003
+    """Weight of the binarisation loss t (1 - t), t = min(T, 1/2): rays that are nearly opaque are pressed to be so; a
+    face is solid."""
+
+
+class BackgroundParams(Section):
+    """Each camera's static background, learnt without masks."""
+
+    stride: Count = 4
+    """For the first guess the volume is looked at on every so-manieth pixel: it is coarser than pixels."""
+
+    max_opacity: Share = 0.05
+    """Pixels through which the volume is less opaque show the background itself."""
+
+    frames: Count = 5
+    """Frames whose mean is taken, at most: rooms stand still."""
+
+    rate: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """A pixel moves by this, times the cube of the transmittance, times its error, each time it is met."""
+
+
+class PruningParams(Section):
+    """What is left out of the trained model."""
+
+    layer_alpha: Share = 1 / 255
+    """An outer or inner layer whose alpha is nowhere larger is dropped: no pixel changes by more than this."""
+
+    texel_opacity: Share = 1 / 1020
+    """Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several,
+    some `rays_per_texel` a texel; all of them over the frames) are made transparent. A ray reads four a layer: its
+    colour changes by no more than N / 255, and that only if all of them are just below."""
+
+
+class DivergenceParams(Section):
+    """When a level of training is begun again, and how often."""
+
+    error_ratio: Annotated[float, Field(gt=1, le=1e6)] = 9.0
+    """A mean squared error this many times the best of its level is a divergence: about 10 dB."""
+
+    attempts: Annotated[int, Field(ge=1, le=100)] = 4
+    """Each at a third of the learning rate before; then training ends with a message."""
+
+
+class ExplicitParams(Section):
+    """Model `explicit`: nested radius maps with texel grids. Its defaults are the preset `fast`."""
+
+    preset: str = "fast"
+    """Its values fill the keys that are not given: `fast` for this model."""
+
+    model: Literal["explicit"] = "explicit"
+    """Follows from the preset."""
+
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """"auto" takes CUDA where there is one."""
+
+    seed: Seed = 0
+    """Of the draws of rays and frames."""
+
+    layers: Annotated[int, Field(ge=1, le=64)] = 12
+    """N, number of manifolds; the paper's."""
+
+    iterations: Count = 460
+    """Adam steps of rounds and textures together; at least the rounds (`geometry`) and three more are made, 183."""
+
+    volume: VolumeParams = VolumeParams()
+    """The starting volume."""
+
+    room: RoomParams = RoomParams()
+    subject: SubjectParams = SubjectParams()
+    environment: EnvironmentParams = EnvironmentParams()
+    warnings: WarningParams = WarningParams()
+    """What lies behind it."""
+
+    cameras: CameraParams = CameraParams()
+    """What single cameras do differently."""
+
+    start: StartParams = StartParams()
+    """What the layers take from the volume."""
+
+    mesh: MeshParams = MeshParams()
+    """How far a tracked mesh is believed."""
+
+    geometry: GeometryParams = GeometryParams()
+    """The radius maps."""
+
+    textures: GridTextureParams = GridTextureParams()
+    """The texel grids."""
+
+    losses: LossParams = LossParams()
+    """Prices beside the squared error."""
+
+    background: BackgroundParams = BackgroundParams()
+    """Of each camera."""
+
+    pruning: PruningParams = PruningParams()
+    """What is left out in the end."""
+
+    divergence: DivergenceParams = DivergenceParams()
+    """When training starts again."""
+
+    @property
+    def least_iterations(self) -> int:
+        """That are run even if fewer are asked for: all rounds, and a few with the final geometry."""
+        return self.geometry.round_iterations * len(self.geometry.rounds) + 3

@@ -1,0 +1,130 @@
+"""All sections by their names, and raw values checked against them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from facefolds_core.errors import UserError
+from facefolds_core.params.base import Section
+from facefolds_core.params.capture import CaptureParams, NormalizeParams
+from facefolds_core.params.compress import CompressParams
+from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.explicit import ExplicitParams
+from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
+from facefolds_core.params.mlp import MlpParams
+from facefolds_core.params.renamed import EXPLICIT
+from facefolds_core.params.train import TrainParams, TrainSection
+
+SECTIONS: dict[str, tuple[type[Section], ...]] = {
+    "capture": (CaptureParams,),
+    "normalize": (NormalizeParams,),
+    "train": (ExplicitParams, MlpParams),
+    "sample": (SampleParams,),
+    "reconstruct": (ReconstructParams,),
+    "decimate": (DecimateParams,),
+    "texture": (TextureParams,),
+    "bake": (BakeParams,),
+    "compress": (CompressParams,),
+    "evaluate": (EvaluateParams,),
+}
+"""Stage -> its section's class; two of `train`, told apart by `model`."""
+
+STAGE_SECTIONS = tuple(SECTIONS)
+
+_TRAIN: TypeAdapter[TrainParams] = TypeAdapter(TrainSection)
+REFERENCE = "docs/params.md"
+_SHARED = "what stands in `train` holds for all subjects, so keys of one model belong to the subjects that use it"
+
+
+def section_of(stage: str, value: Any, file: str | Path | None = None, place: str | None = None) -> Section:
+    """A raw section, checked.
+
+    Args:
+        stage: its name.
+        value: keys and values as read.
+        file, place: for the message.
+
+    Raises:
+        UserError: naming the key, what it should be, and for an unknown one the keys that there are.
+    """
+    try:
+        if stage == "train":
+            return _TRAIN.validate_python(value)
+        return SECTIONS[stage][0].model_validate(value)
+    except ValidationError as error:
+        raise user_error(error, SECTIONS[stage], file, place or stage) from None
+
+
+def train_params(value: Mapping[str, Any]) -> TrainParams:
+    """The section `train` from a preset and overrides.
+
+    Raises:
+        UserError: if a key or value is wrong.
+    """
+    section = section_of("train", dict(value))
+    assert isinstance(section, ExplicitParams | MlpParams)
+    return section
+
+
+def user_error(
+    error: ValidationError, kinds: tuple[type[BaseModel], ...], file: str | Path | None, place: str
+) -> UserError:
+    """pydantic's first complaint in our words."""
+    first = error.errors()[0]
+    names = [str(part) for part in first["loc"]]
+    kind = kinds[0]
+    if len(kinds) > 1 and names:
+        # The place within a union begins with the value that tells its members apart.
+        kind = next(k for k in kinds if k.model_fields["model"].default == names[0])
+        names = names[1:]
+    remedy = f"mend it; {REFERENCE} describes all keys"
+    expected, found = first["msg"].removeprefix("Value error, "), repr(first["input"])
+    if first["type"] == "extra_forbidden":
+        expected, remedy = _unknown_key(kind, names, remedy)
+        found = names[-1]
+    where = ".".join([place, *names])
+    return UserError("a parameter is wrong", file=file, place=where, expected=expected, found=found, remedy=remedy)
+
+
+def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[str, str]:
+    """What is expected instead of an unknown key, and what to do."""
+    *folders, key = names
+    holder = kind
+    for name in folders:
+        holder = _inner(holder, name) or holder
+    keys = ", ".join(sorted(holder.model_fields))
+    model = kind.model_fields["model"].default if "model" in kind.model_fields else None
+    owner = f" of the model `{model}`" if model else ""
+    expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
+    if kind is ExplicitParams and not folders and key in EXPLICIT:
+        return expected, f"it is called `{EXPLICIT[key]}` now: write `{_yaml(EXPLICIT[key])}`"
+    if kind is ExplicitParams and not folders and key in MlpParams.model_fields:
+        return expected, f"`{key}` is a key of the model `mlp` (presets paper, quick): remove it; {_SHARED}"
+    if kind is MlpParams and not folders and key in {**ExplicitParams.model_fields, **EXPLICIT}:
+        return expected, f"`{key}` is a key of the model `explicit` (preset fast): remove it; {_SHARED}"
+    return expected, remedy
+
+
+def _yaml(path: str) -> str:
+    """ "losses.opacity" -> "losses: {opacity: ...}"."""
+    *folders, key = path.split(".")
+    return "".join(f"{folder}: {{" for folder in folders) + f"{key}: ..." + "}" * len(folders)
+
+
+def _inner(kind: type[BaseModel], name: str) -> type[BaseModel] | None:
+    """The class of a nested section, also within lists; None if it is none, or `name` is a position in a list."""
+    field = kind.model_fields.get(name)
+    return None if field is None else _model_in(field.annotation)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if get_origin(annotation) in (tuple, Union, Annotated):
+        found = [_model_in(part) for part in get_args(annotation)]
+        return next((kind for kind in found if kind is not None), None)
+    return None

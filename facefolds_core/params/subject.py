@@ -1,0 +1,97 @@
+"""`subjects`: where a capture is, what of it to use, and overrides of the stages' sections."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from facefolds_core.params.base import Count, FrameRate, Many, Natural, Pair, Section
+
+Raw = dict[str, Any]
+"""Keys and values of a section, checked once merged with the section itself."""
+
+
+class HoldoutEvery(Section):
+    """Hold out every n-th camera of those that remain after culling, in the order of the capture."""
+
+    every: Annotated[int, Field(ge=2, le=100_000)]
+    """Counted from 1."""
+
+
+class FrameRange(Section):
+    """Which frames of a segment to use: positions in its sorted list of frames, as in Python's range."""
+
+    start: Natural = 0
+    """First position."""
+
+    stop: Count | None = None
+    """One past the last position; null means to the end."""
+
+    step: Count = 1
+    """Take every step-th frame."""
+
+
+class Overrides(Section):
+    """Stage sections that a subject may override, key by key."""
+
+    capture: Raw = Field(default_factory=dict)
+    """See `capture`."""
+
+    normalize: Raw = Field(default_factory=dict)
+    """See `normalize`."""
+
+    train: Raw = Field(default_factory=dict)
+    """See `train`."""
+
+    sample: Raw = Field(default_factory=dict)
+    """See `sample`."""
+
+    reconstruct: Raw = Field(default_factory=dict)
+    """See `reconstruct`."""
+
+    decimate: Raw = Field(default_factory=dict)
+    """See `decimate`."""
+
+    texture: Raw = Field(default_factory=dict)
+    """See `texture`."""
+
+    bake: Raw = Field(default_factory=dict)
+    """See `bake`."""
+
+    compress: Raw = Field(default_factory=dict)
+    """See `compress`."""
+
+    evaluate: Raw = Field(default_factory=dict)
+    """See `evaluate`."""
+
+
+class Subject(Overrides):
+    """One entry of `subjects`: where a capture is, what of it to use, and overrides of stage sections."""
+
+    source: Literal["actor", "multiface", "transforms"]
+    """The layout of the capture; "actor" is generated."""
+
+    path: str
+    """Folder of the capture; for "actor" the generator's package."""
+
+    segment: str | None = None
+    """Multiface segment; null takes the only one."""
+
+    frames: FrameRange | Many[str] | None = None
+    """A range of positions, or a list of frame names; null takes all."""
+
+    holdout: Many[str] | HoldoutEvery = HoldoutEvery(every=12)
+    """Camera names, or {every: n}: cameras for scoring only."""
+
+    front: str | None = None
+    """For captures without a tracked mesh, the name of a camera that faces the subject upright."""
+
+    krt_size: Pair[Count] | None = None
+    """[width, height], pixels, of the images that KRT refers to; null finds out."""
+
+    pixel_centres: Annotated[float, Field(ge=0, le=0.5, multiple_of=0.5)] | None = None
+    """Where the capture's K puts the centre of the first pixel, 0 or 0.5; null takes the source's habit."""
+
+    fps: FrameRate | None = None
+    """Frames a second; null takes the source's (30 for Multiface)."""

@@ -1,0 +1,149 @@
+"""docs/params.md: all keys of params.yaml with their types, bounds, defaults and descriptions, from the sections.
+
+python -m facefolds_core.params_page    # writes it; a test compares
+"""
+
+from __future__ import annotations
+
+import json
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from facefolds_core.params.base import Section
+from facefolds_core.params.sections import SECTIONS
+from facefolds_core.params.subject import Overrides, Subject
+from facefolds_core.params.train import PRESETS
+
+PAGE = Path("docs/params.md")
+
+HEAD = """\
+# Parameters
+
+All keys of params.yaml, made from facefolds_core/params by `python -m facefolds_core.params_page`. Every section of a
+stage can be overridden for one subject, key by key (docs/subjects.md). Unknown keys are refused, and so are strings or
+true and false where a number belongs, and numbers out of bounds. Lengths are in units of the scene: cameras are about 1
+away from the subject.
+
+For one run without a change of the file, and for sweeps, each key is set by its path; `++` adds it where params.yaml
+does not write it:
+
+```
+dvc exp run -S '++train.volume.reach=0.4'                        # of a section
+dvc exp run -S '++subjects.actor.train.losses.opacity=0.01'      # of one subject
+dvc exp run --queue -S '++train.volume.reach=0.4,0.45,0.5'       # a sweep: one experiment each
+```
+"""
+
+
+def page() -> str:
+    """The whole page, Markdown."""
+    parts = [HEAD, "## `subjects.NAME`\n", _table(Subject, "", set(Overrides.model_fields))]
+    for stage, kinds in SECTIONS.items():
+        for kind in kinds:
+            model = kind.model_fields["model"].default if len(kinds) > 1 else None
+            parts.append(f"## `{stage}`" + (f", model `{model}`" if model else "") + "\n")
+            parts.append(_words(kind.__doc__) + "\n")
+            if model:
+                parts.append(_presets(model))
+            parts += _tables(kind, stage)
+    return "\n".join(parts)
+
+
+def _tables(kind: type[Section], path: str) -> Iterator[str]:
+    """A table of a section's own keys, then one of each section in it."""
+    yield _table(kind, path, set())
+    for name, field in kind.model_fields.items():
+        inner = section_in(field.annotation)
+        if inner is not None:
+            yield f"### `{path}.{name}`{' (a list of these)' if _is_list(field.annotation) else ''}\n"
+            yield _words(inner.__doc__) + "\n"
+            yield from _tables(inner, f"{path}.{name}")
+
+
+def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
+    rows = [
+        f"| `{name}` | {_kind(field)} | {_default(field)} | {_words(field.description)} |"
+        for name, field in kind.model_fields.items()
+        if name not in hidden and (not _is_section(field.annotation) or not path)
+    ]
+    return "\n".join(["| key | values | default | meaning |", "|---|---|---|---|", *rows, ""]) if rows else ""
+
+
+def _presets(model: str) -> str:
+    lines = []
+    for name, preset in PRESETS.items():
+        if preset.model == model:
+            values = ", ".join(f"`{key}: {json.dumps(value)}`" for key, value in preset.values.items())
+            lines.append(f"- Preset `{name}`: " + (f"the defaults but {values}." if values else "the defaults."))
+    return "\n".join([*lines, ""])
+
+
+def section_in(annotation: Any) -> type[Section] | None:
+    """The section that a key holds, alone or in a list."""
+    if _is_section(annotation):
+        kind: type[Section] = annotation
+        return kind
+    if get_origin(annotation) in (tuple, Union, types.UnionType):
+        found = [section_in(part) for part in get_args(annotation)]
+        return next((kind for kind in found if kind is not None), None)
+    return None
+
+
+def _is_section(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, Section)
+
+
+def _is_list(annotation: Any) -> bool:
+    return get_origin(annotation) is tuple
+
+
+def _kind(field: FieldInfo) -> str:
+    bounds = [text for part in field.metadata if (text := _bound(part))]
+    return _type(field.annotation) + (" " + ", ".join(bounds) if bounds else "")
+
+
+def _type(annotation: Any) -> str:
+    if hasattr(annotation, "__metadata__"):
+        return _type(get_args(annotation)[0])
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return ", ".join(f"`{value}`" for value in parts)
+    if origin in (Union, types.UnionType):
+        return " or ".join(_type(part) for part in parts)
+    if origin is tuple:
+        return f"list of {_type(parts[0])}" if parts[-1] is ... else f"[{', '.join(_type(part) for part in parts)}]"
+    if origin is dict or annotation is dict:
+        return "keys and values"
+    names = {int: "integer", float: "number", str: "text", bool: "true, false", type(None): "null"}
+    return names.get(annotation) or f"{{{', '.join(annotation.model_fields)}}}"
+
+
+def _bound(part: Any) -> str:
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+    return ", ".join(f"{sign} {getattr(part, name):g}" for name, sign in signs.items() if hasattr(part, name))
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    value = field.default
+    if value is PydanticUndefined:
+        return "`{}`"
+    if isinstance(value, Section):
+        return f"`{value.model_dump_json()}`"
+    if isinstance(value, tuple):
+        value = [item.model_dump() if isinstance(item, Section) else item for item in value]
+    return f"`{json.dumps(round(value, 6) if isinstance(value, float) else value)}`"
+
+
+def _words(text: str | None) -> str:
+    return " ".join((text or "").split()).replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

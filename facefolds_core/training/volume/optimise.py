@@ -1,0 +1,183 @@
+"""The steps of the volume's fit: rays of the reduced images, Adam on the grid, and clearing what nothing speaks for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from tqdm import tqdm
+
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import VolumeLevel, VolumeParams
+from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume.room import Room
+
+Array = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """R rays: origins, directions and colours (R, 3), numbers of their cameras (R,)."""
+
+    origins: Array
+    directions: Array
+    colours: Array
+    camera: NDArray[np.int32]
+
+
+def rays_of(cameras: list[Camera], images: list[NDArray[np.uint8]], voxel: float, reduced: float) -> Rays:
+    """One ray for each pixel of the images, reduced until one covers so many voxels."""
+    pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
+    factor = max(1, round(reduced * voxel / pixel))
+    origins, directions, colours, numbers = [], [], [], []
+    for number, (camera, image) in enumerate(zip(cameras, images, strict=True)):
+        height, width = max(1, camera.height // factor), max(1, camera.width // factor)
+        x, y = np.meshgrid((np.arange(width) + 0.5) * factor, (np.arange(height) + 0.5) * factor)
+        origin, direction = camera.rays(np.stack([x, y], -1).reshape(-1, 2))
+        origins.append(np.broadcast_to(origin, direction.shape).astype(np.float32))
+        directions.append(direction.astype(np.float32))
+        part = np.ascontiguousarray(image[: height * factor, : width * factor])
+        small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
+        colours.append(small.reshape(-1, 3).astype(np.float32) / 255)
+        numbers.append(np.full(width * height, number, np.int32))
+    return Rays(np.concatenate(origins), np.concatenate(directions), np.concatenate(colours), np.concatenate(numbers))
+
+
+def _occupied(density: Array, empty_depth: float) -> NDArray[np.bool_]:
+    """Blocks that hold, or touch, a voxel that is not empty."""
+    block = kernel.BLOCK
+    blocks = tuple(n // block + 1 for n in density.shape)
+    padded = np.full([block * n for n in blocks], -kernel.LIMIT, np.float32)
+    padded[tuple(slice(n) for n in density.shape)] = ndimage.maximum_filter(density, 3)
+    split = padded.reshape(blocks[0], block, blocks[1], block, blocks[2], block)
+    occupied: NDArray[np.bool_] = split.max((1, 3, 5)) > math.log(math.expm1(empty_depth))
+    return occupied
+
+
+def _shade(
+    grid: Array,
+    occupied: NDArray[np.bool_],
+    lower: NDArray[np.float64],
+    voxel: float,
+    rays: Rays,
+    jitter: Array,
+    background: Array,
+    gradient: Array,
+    step: float,
+    opacity_weight: float,
+    binarisation_weight: float,
+) -> tuple[float, Array, Array]:
+    """`kernel.shade` with steps of so many voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
+    residual, through = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
+    samples = int(math.sqrt(3) * max(grid.shape) / step) + 2
+    squares: float = kernel.shade(
+        rays.origins,
+        rays.directions,
+        jitter,
+        rays.colours,
+        background,
+        grid,
+        occupied,
+        lower,
+        voxel,
+        step * voxel,
+        samples,
+        gradient,
+        residual,
+        through,
+        opacity_weight,
+        binarisation_weight,
+    )
+    return squares, residual, through
+
+
+def clear(
+    grid: Array,
+    lower: NDArray[np.float64],
+    voxel: float,
+    rays: Rays,
+    room: Room,
+    params: VolumeParams,
+) -> None:
+    """Empty the voxels without `min_contrast`, in place: the mean over rays, by their weights there, of how far what
+    they see in the volume is from the room behind it. What no ray reaches stays."""
+    gradient = np.zeros((kernel.PARTS, *grid.shape), np.float32)
+    background = room.look_up(rays.origins, rays.directions)
+    rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
+    contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
+    # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
+    wanted = np.zeros_like(rgb)
+    wanted[:, 0], wanted[:, 1] = (contrast**2).sum(1), 1
+    target = rgb + (1 - alpha)[:, None] * background - wanted
+    occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
+    half = np.full(len(rgb), 0.5, np.float32)
+    seen = replace(rays, colours=target)
+    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, params.step, 0.0, 0.0)
+    total = gradient.sum(0)
+    weight = ndimage.gaussian_filter(total[..., 2], 1.0)
+    evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
+    grid[(weight > 1e-6) & (evidence < params.min_contrast), 0] = -kernel.LIMIT
+
+
+def train(
+    values: Array,
+    share: Array,
+    lower: NDArray[np.float64],
+    voxel: float,
+    rays: Rays,
+    room: Room,
+    level: VolumeLevel,
+    last: bool,
+    params: VolumeParams,
+    random: np.random.Generator,
+    bar: tqdm,
+) -> float:
+    """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
+    grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
+    gradient = np.zeros((kernel.PARTS, *values.shape), np.float32)
+    count = min(params.rays, len(rays.origins))
+    recent = math.nan
+    for i in range(level.iterations):
+        if i % 25 == 0:
+            occupied = _occupied(grid[0, ..., 0], params.empty_depth)
+        chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
+        origins, directions = rays.origins[chosen], rays.directions[chosen]
+        part = Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
+        jitter = random.random(count, np.float32)
+        behind = room.look(origins, directions, jitter)
+        squares, residual, through = _shade(
+            grid[0],
+            occupied,
+            lower,
+            voxel,
+            part,
+            jitter,
+            behind.colours,
+            gradient,
+            params.step,
+            params.opacity_weight,
+            params.binarisation_weight,
+        )
+        if not math.isfinite(squares):
+            raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
+        scale = 1 - 0.9 * i / level.iterations if last else 1.0
+        bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
+        rates = scale * params.learning_rate, scale * params.colour_learning_rate
+        room.step(behind, through[:, None] * residual, scale, *rates)
+        kernel.adam_step(grid, gradient, share, *rates, bias1, bias2, params.smoothness_weight)
+        error = squares / (3 * count)
+        recent = error if i == 0 else 0.9 * recent + 0.1 * error
+        bar.update()
+        bar.set_postfix(volume=f"{max(values.shape)}^3", psnr=f"{_psnr(recent):.2f}", refresh=False)
+    values[:] = grid[0]
+    return _psnr(recent)
+
+
+def _psnr(error: float) -> float:
+    """dB, of a mean squared error that may be 0."""
+    return -10 * math.log10(max(error, 1e-12))

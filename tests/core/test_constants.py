@@ -1,0 +1,153 @@
+"""Numbers that somebody might tune stand in facefolds_core/params: no other file has them at module level."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ALL = ("*",)
+
+ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
+    "of a file format or a standard: another value would be another format": {
+        "asset/codecs.py": ("X264_FIXED", "SVT_FIXED", "VP9_LEVELS", "CODECS"),
+        "asset/colour.py": ALL,
+        "asset/cropping.py": ("ALPHA_BOUND",),
+        "asset/effects.py": ALL,
+        "asset/glb.py": ALL,
+        "asset/manifest.py": ALL,
+        "asset/packing.py": ALL,
+        "asset/validation.py": ALL,
+        "asset/video.py": ALL,
+        "asset/writer.py": ("STATIC_FPS",),
+        "captures/krt.py": ALL,
+        "captures/multiface.py": ALL,
+        "captures/scene.py": ALL,
+        "captures/transforms.py": ALL,
+        "engines/godot.py": ("FORMAT", "VERSION"),
+        "export/bake_kernel.py": ("SCALE",),
+        "export/between.py": ("GREY",),
+        "geometry/sphere_uv.py": ("FULL_WINDOW",),
+        "model/storage.py": ("SCALES_1",),
+        "scoring/report.py": ALL,
+    },
+    "how a trained model is read: stored models must look alike for ever": {
+        "model/intersection.py": ("MIN_SLOPE", "REFINEMENTS"),
+        "model/radial.py": ("MIN_SLOPE", "STEP", "MARGIN"),
+        "model/radial_kernel.py": ("_TO_UV", "SKIP", "CEILING_CELLS"),
+    },
+    "definition of a metric: another value would be another metric": {
+        "packaging/views.py": ("MAX_PSNR",),
+        "scoring/evaluation.py": ("MASK_EDGE", "MASK_MARGIN"),
+        "scoring/metrics.py": ALL,
+        "scoring/perceptual.py": ALL,
+        "reporting/measure.py": ALL,
+        "sweeps/recommend.py": ("INDIFFERENT",),
+    },
+    "compiled in: part of a kernel's machine code and its tests; a kernel with arguments instead was not measured": {
+        "export/bake_kernel.py": ("PARTS", "OPAQUE"),
+        "export/collapse_kernel.py": ("TERMS", "MOST_NEIGHBOURS"),
+        "training/explicit/adam_kernel.py": ("BETA1", "BETA2", "EPSILON"),
+        "training/explicit/shading_kernel.py": ("PARTS", "OPAQUE"),
+        "training/explicit/state.py": ("UNSEEN_LOGIT",),
+        "training/volume/environment.py": ("BETA1", "BETA2", "EPSILON"),
+        "training/volume/kernel.py": ("PARTS", "BLOCK", "CLEAR", "OPAQUE", "BETA1", "BETA2", "EPSILON", "LIMIT"),
+    },
+    "guard against a division by zero, rounding, or too little to work on": {
+        "asset/draco.py": ("DEGENERATE",),
+        "captures/sound.py": ("LATE",),
+        "export/decimation.py": ("FLAT", "CROSSING_TOLERANCE"),
+        "export/poisson.py": ("MIN_SAMPLES",),
+        "rendering/camera_paths.py": ("STEEPEST",),
+        "rendering/opengl.py": ALL,
+        "rendering/raster.py": ALL,
+    },
+    "how much is done at a time: memory and speed, never the result": {
+        "export/sampling.py": ("DIRECTIONS_AT_ONCE",),
+        "model/manifolds.py": ("CHUNK",),
+        "model/radiance.py": ("RAYS_AT_ONCE", "TEXELS_AT_ONCE"),
+        "rendering/intersection.py": ("MISS", "_PAIRS_AT_ONCE"),
+        "scoring/model_view.py": ("CROSSINGS_AT_ONCE",),
+    },
+    "how something is shown to people: pictures, pages, lines": {
+        "asset/audio.py": ("AAC_BITS_A_SECOND",),
+        "cli/render.py": ALL,
+        "engines/godot.py": ("QUALITY",),
+        "rendering/reference.py": ("BLACK",),
+        "reporting/build.py": ALL,
+        "reporting/charts.py": ALL,
+        "reporting/pictures.py": ALL,
+        "reporting/tables.py": ALL,
+        "reporting/words.py": ALL,
+        "scoring/sheets.py": ALL,
+        "training/loop.py": ("LOG_POINTS",),
+        "stages/normalize.py": ("SHOWN",),
+    },
+    "the shape of the embedded actor, its rig and its room: data, written as code": {
+        f"captures/actor/{name}.py": ALL for name in ("hair", "mesh", "motion", "render", "rig", "room", "shape")
+    },
+}
+"""Reason -> file (in facefolds_core, or from the root) -> names."""
+
+
+def numeric(node: ast.AST) -> bool:
+    """Whether an expression holds a number; indices and the arguments of types do not count."""
+    if isinstance(node, ast.Subscript):
+        return numeric(node.value)
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float) and not isinstance(node.value, bool)
+    return any(numeric(child) for child in ast.iter_child_nodes(node))
+
+
+def constants(source: str) -> Iterator[str]:
+    """Names at module level whose values hold numbers."""
+    for statement in ast.parse(source).body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value is not None:
+            targets = statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+            if numeric(statement.value):
+                yield from (n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name))
+
+
+@pytest.fixture(scope="module")
+def found(project_root: Path) -> set[tuple[str, str]]:
+    """(file, name) of all numeric constants outside of the configuration."""
+    library, stages = project_root / "facefolds_core", project_root / "stages"
+    files = {path.relative_to(library).as_posix(): path for path in library.rglob("*.py")}
+    files |= {path.relative_to(project_root).as_posix(): path for path in stages.rglob("*.py")}
+    return {
+        (name, constant)
+        for name, path in files.items()
+        if not name.startswith("params/")
+        for constant in constants(path.read_text(encoding="utf-8"))
+    }
+
+
+def test_no_hyper_parameter_stands_outside_the_configuration(found: set[tuple[str, str]]) -> None:
+    allowed = {(file, name) for files in ALLOWED.values() for file, names in files.items() for name in names}
+    new = sorted(f"{file}: {name}" for file, name in found if not {(file, name), (file, "*")} & allowed)
+    assert not new, "make these keys of a section (facefolds_core/params), or say above why they are no parameters"
+
+
+def test_the_list_names_nothing_that_is_gone(found: set[tuple[str, str]]) -> None:
+    named = [(file, name) for files in ALLOWED.values() for file, names in files.items() for name in names]
+    present = found | {(file, "*") for file, _ in found}
+    assert [entry for entry in named if entry not in present] == []
+
+
+@pytest.mark.parametrize(
+    ("source", "names"),
+    [
+        ("REACH = 0.45", ["REACH"]),
+        ("A, B = 0.3, (1, 2)", ["A", "B"]),
+        ("X: float = 1 / 255", ["X"]),
+        ("LEVELS = np.array([1.0, 2.0])", ["LEVELS"]),
+        ("Count = Annotated[int, Field(ge=1)]", []),
+        ("ROOT = Path(__file__).parents[1]", []),
+        ("FAST = True", []),
+        ("def f(x=3):\n    y = 2", []),
+    ],
+)
+def test_a_constant_is_seen_for_what_it_is(source: str, names: list[str]) -> None:
+    assert list(constants(source)) == names
