@@ -120,14 +120,18 @@ class SubjectParams(Section):
     """Standard deviation of the weight, over the distance from the common centre, by which bodies are compared, units:
     half a head."""
 
-    core: Share = 0.25
-    """What lies within this part of the ball's radius around the common centre is the subject's own."""
+    core: Length = 0.11
+    """What lies so near to the common centre is the subject's own, units."""
 
-    rim: Share = 0.75
-    """What lies beyond this part of the radius, behind and not below, is the room's: a wall goes on, a head ends."""
+    rim: Length = 0.34
+    """What lies farther from the common centre, units, behind and not below, is the room's: a wall goes on, a head
+    ends. The back of a head is 0.2 away."""
 
-    behind: Share = 0.2
-    """Points with x below this part of the radius are behind: the common centre may lie a little behind a face."""
+    front: Length = 0.13
+    """What has a larger x, units, is the subject's own, too: a room is not before the subject."""
+
+    behind: Length = 0.09
+    """Points with a smaller x, units, are behind: the common centre may lie a little behind a face."""
 
     below: Share = 0.35
     """Directions that fall by more (the sine) are below: there a subject goes on, too."""

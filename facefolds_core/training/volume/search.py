@@ -55,6 +55,6 @@ def cut_share(volume: Volume, params: ExplicitParams) -> float:
     body = without_room(volume, body, wanted)
     distance, points, reach = distances(volume), positions(volume), volume.room.radius
     edge = body & (distance > reach - 2 * volume.voxel)
-    edge &= (points[..., 0] >= wanted.behind * reach) | (points[..., 2] > 0.5 * distance)
+    edge &= (points[..., 0] >= wanted.behind) | (points[..., 2] > 0.5 * distance)
     edge &= points[..., 2] > -wanted.below * distance
     return int(np.count_nonzero(edge)) / max(1, int(np.count_nonzero(body)))

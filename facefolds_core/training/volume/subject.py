@@ -28,13 +28,12 @@ def body_at_centre(volume: Volume, near: float, body_depth: float) -> Bool:
 
 
 def without_room(volume: Volume, body: Bool, params: SubjectParams) -> Bool:
-    """The part of `body` that is nearer, through it, to what is at the common centre than to what touches the ball's
-    rim behind the centre."""
+    """The part of `body` that is nearer, through it, to what is at the common centre, or before it, than to what lies
+    far behind it."""
     distance, points = distances(volume), positions(volume)
-    reach = volume.room.radius
-    own = body & (distance < params.core * reach)
-    behind = (points[..., 0] < params.behind * reach) & (points[..., 2] > -params.below * distance)
-    room = body & (distance > params.rim * reach) & behind
+    own = body & ((distance < params.core) | (points[..., 0] > params.front))
+    behind = (points[..., 0] < params.behind) & (points[..., 2] > -params.below * distance)
+    room = body & (distance > params.rim) & behind
     if not own.any() or not room.any():
         return body
     # Both grow until they have shared the body out.
