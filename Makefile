@@ -19,6 +19,7 @@ PLAYER := viewer/dist/index.html
 .PHONY: repro test view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
+	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
 test: $(READY)
@@ -52,6 +53,7 @@ wheel: $(READY) $(PLAYER)
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 bench: $(READY)
+	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
 	$(BIN)/python -m bench.speed_accuracy
 
@@ -76,4 +78,4 @@ blender: .venv-blender/.installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ dvc.lock
+	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config dvc.lock

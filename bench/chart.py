@@ -181,7 +181,7 @@ def _order(preset: str) -> tuple[int, str]:
 
 
 def write_plot_data(measurements: Sequence[Measurement], path: Path) -> None:
-    """The points of the chart as a JSON list for `dvc plots` (dvc.yaml, `plots`)."""
+    """The points of the chart as a JSON list for `dvc plots` (bench/dvc.yaml)."""
     data = chart_data(measurements)
     best: set[int] = set()
     for subject in {m.subject for m in data}:

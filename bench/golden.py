@@ -26,8 +26,8 @@ STAGES = (
     *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
     *("decimate", "texture", "bake", "compress", "evaluate"),
 )
-UNTIMED = ("timings", "training", "config", "checkpoints")
-"""Folders that hold times, or what was asked for."""
+UNTIMED = ("timings", "training", "config", "checkpoints", "locks")
+"""Folders that hold times, processes, or what was asked for."""
 
 TINY = """\
 subjects:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +13,7 @@ from bench.chromium import chromium
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_file
+from facefolds_core.pictures import open_picture
 from facefolds_core.player import find_player
 from facefolds_core.serving import serving
 
@@ -37,7 +37,7 @@ def shot(browser: Browser, address: str, width: int, view: str) -> Image.Image:
     page.wait_for_timeout(1500)
     data = page.screenshot(timeout=PATIENCE)
     context.close()
-    return Image.open(io.BytesIO(data)).convert("RGB")
+    return open_picture(data).convert("RGB")
 
 
 def main(

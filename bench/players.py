@@ -136,8 +136,8 @@ def prepare(
     asset: Asset, few: str, subdivisions: int, splats: Sequence[int], place: Path
 ) -> tuple[list[Row], dict[str, Path]]:
     """The rows, and the folders that their pages fetch from."""
-    level, heads = pick_level(asset, few), place / "heads"
-    folders = {"default": asset.folder, "few": place / "few", "many": place / "many", "heads": heads}
+    level, heads = pick_level(asset, few), place / "site" / "heads"  # no assets: the pages' own files
+    folders = {"default": asset.folder, "few": place / "few", "many": place / "many"}
     heads.mkdir()
     counts = [write_single(folders[name], level, times) for name, times in (("few", 0), ("many", subdivisions))]
     layers, full = level.num_layers, asset.full

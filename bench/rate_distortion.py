@@ -99,7 +99,7 @@ def exported(subject: Path, work: Path, changes: dict[str, dict[str, Any]]) -> S
     for name in ("scene", "model"):
         (work / name).unlink(missing_ok=True)
         (work / name).symlink_to((subject / name).resolve())
-    shutil.copytree(subject / "config", folders.config, dirs_exist_ok=True)
+    shutil.copytree(SubjectFolders(subject).config, folders.config, dirs_exist_ok=True)
     for stage, section in changes.items():
         path = folders.config / f"{stage}.json"
         write_json(path, (read_json(path) if path.exists() else {}) | section)

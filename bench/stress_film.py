@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -11,8 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures import actor
 from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, make_rig, write_capture
-from facefolds_core.captures.actor.jit import source_digest
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
@@ -56,6 +57,14 @@ class Film:
     def key(self) -> str:
         """Names the film and the code that makes it."""
         return sha256(f"{self!r} {source_digest()}".encode()).hexdigest()[:16]
+
+
+def source_digest() -> int:
+    """CRC-32 of the sources of the actor."""
+    digest = 0
+    for path in sorted(Path(actor.__file__).parent.glob("*.py")):
+        digest = zlib.crc32(path.read_bytes(), digest)
+    return digest
 
 
 @dataclass(frozen=True)

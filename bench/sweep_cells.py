@@ -1,7 +1,7 @@
 """One cell of a sweep: the stages from the first that it changes, in folders of their own, and the scores of its asset.
 
 The stages' own functions run on folders that link to what came before. A stage's folder is named after a digest of its
-configuration, of the code that dvc.yaml says it depends on, and of the stage before it; so a stage runs once for all
+configuration, of the code that it imports, and of the stage before it; so a stage runs once for all
 cells that share it, and again when its code changes. What lies before the first changed stage is the subject's own, as
 `dvc repro` left it.
 """
@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage, read_train
@@ -33,6 +31,7 @@ from facefolds_core.scoring.evaluation import ImageScore, frame_rate_factor, sco
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from facefolds_core.scoring.report import asset_cost, averages
+from facefolds_core.source_code import digests_of_stages
 from stages.bake import bake
 from stages.compress import compress
 from stages.decimate import decimate
@@ -74,7 +73,7 @@ class Cell:
         work: folder for the stages' folders.
         overrides: stage -> keys that differ from the subject's configuration.
         first: the first stage that runs; those before it must have no overrides.
-        project: folder of dvc.yaml and the code.
+        project: folder of the code.
     """
 
     subject: Path
@@ -104,22 +103,13 @@ def plan(cell: Cell) -> dict[str, str]:
     Raises:
         UserError: if something is missing of what the cell starts from.
     """
-    code = code_of_stages(cell.project / "dvc.yaml")
+    code = digests_of_stages(cell.project, [*RUN, "evaluate"])
     digest, found = _digest_of_start(cell), {}
     for stage in [*cell.stages(), "evaluate"]:
-        parts = [digest, stage, cell.section(stage), _digest_of_files(cell.project, code[stage])]
+        parts = [digest, stage, cell.section(stage), code[stage]]
         digest = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
         found[stage] = digest
     return found
-
-
-def code_of_stages(path: Path) -> dict[str, list[str]]:
-    """Stage -> files and folders of the project's code that dvc.yaml lists for it."""
-    stages = yaml.safe_load(path.read_text(encoding="utf-8"))["stages"]
-    return {
-        name: [dep for dep in stage["do"]["deps"] if dep.startswith(("stages/", "facefolds_core/"))]
-        for name, stage in stages.items()
-    }
 
 
 def _digest_of_start(cell: Cell) -> str:

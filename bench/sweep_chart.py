@@ -164,7 +164,7 @@ def origin(rows: Sequence[Row]) -> str:
 
 
 def write_plot_data(rows: Sequence[Row], folder: Path) -> None:
-    """sweeps_<axis>.json: the points as a JSON list for `dvc plots` (dvc.yaml, `plots`)."""
+    """sweeps_<axis>.json: the points as a JSON list for `dvc plots` (bench/dvc.yaml)."""
     for axis in AXES:
         found: list[dict[str, Any]] = []
         for subject in sorted({row.subject for row in rows if not row.failure}):

@@ -1,7 +1,7 @@
 """The files through which parameters reach the stages: reading them.
 
 The stage `configure` (`params_file.write_configs`) splits params.yaml into one small file a stage,
-`data/<subject>/config/<stage>.json`, with the subject's overrides merged in. Each stage depends on its own file only,
+`data/.config/<subject>/<stage>.json`, with the subject's overrides merged in. Each stage depends on its own file only,
 so a change of one section (or of one subject's override) reruns what it must and nothing else.
 """
 
@@ -14,6 +14,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from facefolds_core.errors import UserError
 from facefolds_core.params import SECTIONS, Section, Subject, TrainParams, TrainSection
+from facefolds_core.parsing import brief, parse_json
+from facefolds_core.reading import read_text
 
 S = TypeVar("S", bound=Section)
 T = TypeVar("T")
@@ -21,12 +23,14 @@ _REMEDY = "run `dvc repro`, which writes it from params.yaml"
 
 
 def _read(adapter: TypeAdapter[T], path: Path) -> T:
+    text = read_text(path, _REMEDY, expected="JSON")
     try:
-        return adapter.validate_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=_REMEDY) from None
-    except (ValidationError, UnicodeDecodeError) as error:
-        raise UserError("garbled stage configuration", file=path, found=str(error), remedy=_REMEDY) from None
+        parse_json(text, path, _REMEDY)
+        return adapter.validate_json(text)
+    except ValidationError as error:
+        raise UserError(
+            "garbled stage configuration", file=path, found=brief(str(error), 500), remedy=_REMEDY
+        ) from None
 
 
 def read_subject(folder: Path) -> Subject:

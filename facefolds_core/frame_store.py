@@ -7,6 +7,7 @@ and need not be complete (masks exist for some images only).
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -14,8 +15,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from facefolds_core.errors import UserError
+from facefolds_core.errors import UserError, disk_error, is_disk_error
 from facefolds_core.files import atomic_file
+from facefolds_core.reading import check_regular, no_memory, remake
 
 Image = NDArray[np.uint8]
 
@@ -53,27 +55,25 @@ class FrameStore:
         height, width, channels: of every image.
 
     Raises:
-        UserError: if the file is missing or damaged.
+        UserError: if the file is missing, not a regular file, damaged, or memory ran out.
     """
 
     def __init__(self, path: str | Path) -> None:
-        remedy = "run `dvc repro` to make the normalised scene again"
+        self.path = Path(path)
+        check_regular(self.path, remake(path))
         try:
             table = pa.ipc.open_file(pa.memory_map(str(path), "r")).read_all()
             meta = {k.decode(): int(v) for k, v in (table.schema.metadata or {}).items()}
-            self.height, self.width, self.channels = meta["height"], meta["width"], meta["channels"]
-        except FileNotFoundError:
-            raise UserError("file not found", file=path, remedy=remedy) from None
-        except (pa.ArrowException, KeyError, ValueError, OSError) as error:
-            raise UserError("damaged frame store", file=path, found=str(error), remedy=remedy) from None
-        self.path = Path(path)
-        self._table = table
-        self._images: dict[tuple[int, int], Image] = {}
-        shape = (self.height, self.width, self.channels)
-        cameras, frames = table["camera"].to_pylist(), table["frame"].to_pylist()
-        for camera, frame, chunk in zip(cameras, frames, table["pixels"].chunks, strict=True):
-            view = np.frombuffer(chunk.buffers()[1], np.uint8, count=shape[0] * shape[1] * shape[2])
-            self._images[camera, frame] = view.reshape(shape)
+            shape = (meta["height"], meta["width"], meta["channels"])
+            self._images = _views(table, shape)
+        except MemoryError:  # Arrow's own too
+            raise no_memory(path) from None
+        except (pa.ArrowException, KeyError, ValueError, TypeError, OverflowError, OSError) as error:
+            if is_disk_error(error):
+                raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
+            raise UserError("damaged frame store", file=path, found=str(error), remedy=remake(path)) from None
+        self.height, self.width, self.channels = shape
+        self._table = table  # holds the mapped file
 
     def __contains__(self, key: tuple[int, int]) -> bool:
         return key in self._images
@@ -87,5 +87,37 @@ class FrameStore:
         return sorted(self._images)
 
     def image(self, camera: int, frame: int) -> Image:
-        """(height, width, channels) uint8, a view of the mapped file."""
-        return self._images[camera, frame]
+        """(height, width, channels) uint8, a view of the mapped file.
+
+        Raises:
+            UserError: if the file does not hold it.
+        """
+        found = self._images.get((camera, frame))
+        if found is None:
+            place = f"camera (or layer) {camera}, frame {frame}"
+            raise UserError(
+                "an image is missing in a frame store", file=self.path, place=place, remedy=remake(self.path)
+            )
+        return found
+
+
+def _views(table: pa.Table, shape: tuple[int, int, int]) -> dict[tuple[int, int], Image]:
+    """(camera, frame) -> the image's bytes in the mapped file.
+
+    Raises:
+        ValueError, ArrowException: if the table is not what `write_frames` writes.
+    """
+    size = shape[0] * shape[1] * shape[2]
+    if min(shape) < 1 or table.schema.types != [pa.int32(), pa.int32(), pa.binary(size)]:
+        raise ValueError(f"columns {table.schema.types} are no images of {shape}")
+    images: dict[tuple[int, int], Image] = {}
+    for batch in table.to_batches():
+        batch.validate(full=True)
+        pixels = batch.column("pixels")
+        if len(batch) != 1 or any(column.null_count for column in batch.columns) or pixels.offset:
+            raise ValueError("a batch that is not one image")
+        key = (batch.column("camera")[0].as_py(), batch.column("frame")[0].as_py())
+        if min(key) < 0 or key in images:
+            raise ValueError(f"image {key} twice, or none")
+        images[key] = np.frombuffer(pixels.buffers()[1], np.uint8, count=size).reshape(shape)
+    return images

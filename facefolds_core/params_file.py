@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
+from facefolds_core.parsing import brief, parse_yaml
+from facefolds_core.paths import check_path_text, check_subject_name
 
 
 class Params(Section):
@@ -46,17 +47,6 @@ class Params(Section):
         return section_of(stage, values, self.path, place)
 
 
-class _Loader(yaml.SafeLoader):
-    """PyYAML follows YAML 1.1, in which 1e-3 is a string; DVC writes YAML 1.2, in which it is a number."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?(?:[0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
-
-
 def _subject(name: str, entry: Any, path: Path) -> Subject:
     try:
         return Subject.model_validate(entry)
@@ -68,32 +58,30 @@ def load_params(path: str | Path = "params.yaml") -> Params:
     """Read and check params.yaml, every subject's merged sections included.
 
     Raises:
-        UserError: if the file is missing, is not YAML, or a key or value is wrong; names the line or the key.
+        UserError: if the file is missing, is not YAML (parsing.py), or a name, key or value is wrong; names the line
+            or the key.
     """
     path = Path(path)
     try:
-        value = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise UserError(
             "file not found", file=path, remedy="run the command in the project's root folder, which has params.yaml"
         ) from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        place = None if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
-        found = getattr(error, "problem", None) or str(error)
-        raise UserError(
-            "garbled YAML", file=path, place=place, expected="valid YAML", found=found, remedy="mend this line"
-        ) from None
+    except UnicodeDecodeError as error:
+        place = f"byte {error.start}"
+        raise UserError("garbled YAML", file=path, place=place, expected="UTF-8", remedy="save it as UTF-8") from None
+    value = parse_yaml(text, path, "mend it; docs/subjects.md describes the file")
     if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
         raise UserError(
             "no subjects", file=path, expected="a mapping with a `subjects` section", remedy="see docs/subjects.md"
         )
-    unknown = sorted(set(value) - {"subjects"} - set(STAGE_SECTIONS))
+    unknown = [brief(name) for name in value if name not in ("subjects", *STAGE_SECTIONS)]
     if unknown:
         raise UserError(
             "unknown sections",
             file=path,
-            place=", ".join(map(str, unknown)),
+            place=brief(", ".join(unknown), 200),
             expected=", ".join(["subjects", *STAGE_SECTIONS]),
             remedy="remove or rename them",
         )
@@ -105,15 +93,50 @@ def load_params(path: str | Path = "params.yaml") -> Params:
                 file=path,
                 place=name,
                 expected="keys and values",
-                found=repr(section),
+                found=brief(section),
                 remedy=f"write `{name}: {{key: value}}`",
             )
-    subjects = {str(name): _subject(str(name), entry, path) for name, entry in value["subjects"].items()}
+    for name in value["subjects"]:
+        check_subject_name(name, path)
+    subjects = {name: _subject(name, entry, path) for name, entry in value["subjects"].items()}
+    for name, subject in subjects.items():
+        check_path_text(subject.path, name, path)
     params = Params(subjects=subjects, sections=sections, path=str(path))
     for name in subjects:
         for stage in STAGE_SECTIONS:
             params.stage(stage, name)
     return params
+
+
+def idle_keys(params: Params) -> list[str]:
+    """Keys of sections that no subject uses, since every one overrides them: a line for each."""
+    lines = []
+    for stage, section in params.sections.items():
+        for key, value in _leaves(section, stage):
+            if all(_has(subject.model_dump(), key) for subject in params.subjects.values()):
+                others = ", ".join(f"subjects.{name}.{key}" for name in list(params.subjects)[:3])
+                more = ", ..." if len(params.subjects) > 3 else ""
+                lines.append(f"{key}: {brief(value, 30)} is used by no subject: overridden by {others}{more}")
+    return lines
+
+
+def _leaves(value: Any, name: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict) and value:
+        for key, entry in value.items():
+            yield from _leaves(entry, f"{name}.{key}")
+    elif "." in name:
+        yield name, value
+
+
+def _has(overrides: Any, name: str) -> bool:
+    """Whether "texture.resolution" is given; a value that is no mapping replaces all that is deeper."""
+    for part in name.split("."):
+        if not isinstance(overrides, dict):
+            return True
+        if part not in overrides:
+            return False
+        overrides = overrides[part]
+    return True
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:

@@ -1,41 +1,156 @@
-"""Serve the web player and assets to browsers on this machine: static files with byte ranges, on the loopback only."""
+"""Serve the web player and assets to browsers on this machine: what the player needs and nothing else (docs/viewer.md).
+
+Every page that a browser shows can send requests to 127.0.0.1. So the Host header must be this machine's name (a page
+whose own name was made to point here, DNS rebinding, sends its own), nobody else may embed what is served, and of an
+asset's folder only what its manifest names can be had.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import threading
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
+from typing import cast
 
 from aiohttp import web
 
 from facefolds_core.errors import UserError
+from facefolds_core.served_files import asset_file, player_file, send
 
 HOST = "127.0.0.1"
+NAMES = (HOST, "localhost", "[::1]")
+PATIENCE = 10.0
+"""Seconds in which a connection must have sent its first request's head."""
+IDLE = 30.0
+"""Seconds that a connection may be kept without a request."""
+MOST_CONNECTIONS = 128
+
+HEADERS = {
+    "Cache-Control": "no-cache",  # what is made anew is seen at once
+    # WebAssembly and a worker from a blob: the Draco decoder. Styles: the page's and the element's own. Blobs: videos.
+    "Content-Security-Policy": "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
+    "connect-src 'self' blob: data:; img-src 'self' blob: data:; media-src 'self' blob:; "
+    "style-src 'self' 'unsafe-inline'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; form-action 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Server": "facefolds",
+}
+
+_quiet = logging.getLogger("facefolds.serving")  # malformed requests are the client's affair, not the user's
+_quiet.addHandler(logging.NullHandler())
+_quiet.propagate = False
 
 
 def player_app(player: Path, assets: Mapping[str, Path]) -> web.Application:
-    """The player at `/`, each asset's folder at `/NAME/`. Files are revalidated: what is made anew is seen at once."""
+    """The player at `/`, each asset at `/NAME/`; GET and HEAD only. Files are revalidated."""
 
-    @web.middleware
-    async def revalidated(
-        request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-    ) -> web.StreamResponse:
-        response = await handler(request)
-        response.headers["Cache-Control"] = "no-cache"
-        return response
+    async def serve(request: web.Request) -> web.StreamResponse:
+        first, _, rest = request.path.removeprefix("/").partition("/")
+        if first in assets:
+            file = await asyncio.to_thread(asset_file, assets[first], rest)
+        else:
+            rest = request.path.removeprefix("/") or "index.html"
+            file = await asyncio.to_thread(player_file, player, rest)
+        if file is None:
+            raise web.HTTPNotFound
+        with file:
+            return await send(request, file, rest)
 
-    async def index(_: web.Request) -> web.FileResponse:
-        return web.FileResponse(player / "index.html")
+    async def describe(_: web.Request, response: web.StreamResponse) -> None:
+        response.headers.update(HEADERS)
 
-    app = web.Application(middlewares=[revalidated])
-    app.router.add_get("/", index)
-    for name, folder in assets.items():
-        app.router.add_static(f"/{name}/", folder)
-    app.router.add_static("/", player)
+    app = web.Application(middlewares=[_checked])
+    app.on_response_prepare.append(describe)
+    app.router.add_route("*", "/{path:.*}", serve)
     return app
+
+
+@web.middleware
+async def _checked(
+    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+) -> web.StreamResponse:
+    """Refuse requests that no browser sends to this server for its own pages."""
+    port = request.transport.get_extra_info("sockname")[1] if request.transport else None
+    hosts = request.headers.getall("Host", [])
+    if len(hosts) != 1 or hosts[0].lower() not in {f"{name}:{port}" for name in NAMES} | set(NAMES * (port == 80)):
+        raise web.HTTPForbidden(text=f"403: this server answers to {HOST}:{port} and localhost:{port} only")
+    if request.method not in ("GET", "HEAD"):
+        raise web.HTTPMethodNotAllowed(request.method, ["GET", "HEAD"])
+    if not request.raw_path.startswith("/"):
+        raise web.HTTPBadRequest
+    return await handler(request)
+
+
+class _Watched(asyncio.Protocol):
+    """A connection on its way to aiohttp's protocol. Closed if no first request comes, or if too many are open."""
+
+    def __init__(self, inner: web.RequestHandler, open_connections: set[_Watched]) -> None:
+        self._inner = inner
+        self._open = open_connections
+        self._timer: asyncio.TimerHandle | None = None
+        self._head = b""
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+        if len(self._open) >= MOST_CONNECTIONS:
+            self._transport.abort()
+            return
+        self._open.add(self)
+        self._timer = asyncio.get_running_loop().call_later(PATIENCE, self._transport.abort)
+        self._inner.connection_made(transport)
+
+    def data_received(self, data: bytes) -> None:
+        if self not in self._open:
+            return
+        if self._timer:
+            self._head = (self._head + data)[-(len(data) + 3) :]
+            if b"\r\n\r\n" in self._head or b"\n\n" in self._head:
+                self._timer.cancel()
+                self._timer, self._head = None, b""
+        self._inner.data_received(data)
+
+    def eof_received(self) -> bool | None:
+        self._inner.eof_received()
+        return None
+
+    def connection_lost(self, exc: BaseException | None) -> None:
+        if self._timer:
+            self._timer.cancel()
+        if self in self._open:
+            self._open.discard(self)
+            self._inner.connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        self._inner.pause_writing()
+
+    def resume_writing(self) -> None:
+        self._inner.resume_writing()
+
+
+async def _start(player: Path, assets: Mapping[str, Path], port: int) -> tuple[web.AppRunner, asyncio.Server]:
+    runner = web.AppRunner(
+        player_app(player, assets),
+        access_log=None,
+        logger=_quiet,
+        keepalive_timeout=IDLE,
+        lingering_time=1.0,
+        shutdown_timeout=1.0,
+    )
+    await runner.setup()
+    make, connections = cast(Callable[[], web.RequestHandler], runner.server), set[_Watched]()
+    try:
+        listener = await asyncio.get_running_loop().create_server(lambda: _Watched(make(), connections), HOST, port)
+    except BaseException:
+        await runner.cleanup()
+        raise
+    return runner, listener
 
 
 @contextmanager
@@ -43,8 +158,8 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
     """Serve in a thread for as long as the block lasts.
 
     Args:
-        player: the built player's folder.
-        assets: name in the address -> folder.
+        player: the built player's folder; all regular files in it and below are served.
+        assets: name in the address -> folder, of which the manifest and what it names are served.
         port: 0 for any free one.
 
     Yields:
@@ -56,30 +171,17 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
     loop = asyncio.new_event_loop()
     address: Future[str] = Future()
 
-    async def start() -> web.AppRunner:
-        runner = web.AppRunner(player_app(player, assets), access_log=None)
-        await runner.setup()
-        try:
-            await web.TCPSite(runner, HOST, port).start()
-        except OSError as error:
-            await runner.cleanup()
-            raise UserError(
-                "cannot listen on the port",
-                place=f"{HOST}:{port}",
-                found=error.strerror,
-                remedy="choose another one with --port, or leave it out for any free one",
-            ) from None
-        return runner
-
     def run() -> None:
         try:
-            runner = loop.run_until_complete(start())
+            runner, listener = loop.run_until_complete(_start(player, assets, port))
         except BaseException as error:  # whatever it is, the caller waits for it
-            address.set_exception(error)
+            address.set_exception(_port_error(error, port) if isinstance(error, OSError) else error)
             return
-        address.set_result(f"http://{HOST}:{runner.addresses[0][1]}/")
+        address.set_result(f"http://{HOST}:{listener.sockets[0].getsockname()[1]}/")
         loop.run_forever()
+        listener.close()
         loop.run_until_complete(runner.cleanup())
+        loop.run_until_complete(loop.shutdown_default_executor())
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
@@ -90,3 +192,12 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
             loop.call_soon_threadsafe(loop.stop)
         thread.join()
         loop.close()
+
+
+def _port_error(error: OSError, port: int) -> UserError:
+    return UserError(
+        "cannot listen on the port",
+        place=f"{HOST}:{port}",
+        found=error.strerror,
+        remedy="choose another one with --port, or leave it out for any free one",
+    )

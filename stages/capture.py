@@ -9,8 +9,9 @@ from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.paths import SubjectFolders, check_capture_place
 from facefolds_core.progress import progress
+from facefolds_core.reading import is_folder, is_regular
 from stages.common import run_stage
 
 
@@ -18,8 +19,8 @@ def capture(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
     if subject.source == "actor":
         return _generate(folders, subject, read_stage(CaptureParams, folders.config))
-    path = Path(subject.path)
-    if not path.exists():
+    path = check_capture_place(subject.path, folders)
+    if not (is_folder(path) or is_regular(path)):
         raise UserError(
             "the capture is not there",
             file=path,

@@ -1,19 +1,39 @@
-"""Check params.yaml and write one configuration file a stage: data/<subject>/config/<stage>.json."""
+"""Check params.yaml; write one configuration file a stage and subject, and digests of each stage's code.
+
+It writes data/.config/<subject>/<stage>.json and data/.code/<stage>.json, of all subjects: it takes as long as for one,
+and no stage of any subject runs before every name and value is checked.
+"""
 
 from __future__ import annotations
 
-from facefolds_core.files import atomic_folder
-from facefolds_core.params_file import load_params, write_configs
-from facefolds_core.paths import SubjectFolders
-from stages.common import run_stage
+from pathlib import Path
+
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.params import STAGE_SECTIONS
+from facefolds_core.params_file import idle_keys, load_params, write_configs
+from facefolds_core.paths import SubjectFolders, check_capture_place
+from facefolds_core.source_code import digests_of_stages
+from stages.common import run_for_all
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
-def configure(folders: SubjectFolders) -> str:
+def configure(data: Path) -> str:
+    """Write all subjects' files below `data`; returns a line that says what was made."""
     params = load_params("params.yaml")
-    with atomic_folder(folders.config) as temporary:
-        count = len(write_configs(params, folders.root.name, temporary))
-    return f"{count} files in {folders.config}"
+    for name, subject in params.subjects.items():
+        if subject.source != "actor":
+            check_capture_place(subject.path, SubjectFolders(data / name))
+    code = digests_of_stages(ROOT, STAGE_SECTIONS)
+    with atomic_folder(data / ".config") as temporary:
+        for name in params.subjects:
+            write_configs(params, name, temporary / name)
+    with atomic_folder(data / ".code") as temporary:
+        for stage, digests in code.items():
+            write_json(temporary / f"{stage}.json", digests)
+    notes = "".join(f"\nconfigure: note: {line}" for line in idle_keys(params))
+    return f"{len(params.subjects)} subjects in {data / '.config'}{notes}"
 
 
 if __name__ == "__main__":
-    run_stage("configure", configure, __doc__ or "")
+    run_for_all("configure", configure, __doc__ or "")

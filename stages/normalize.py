@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import typer
 
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
@@ -12,7 +10,7 @@ from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.transforms import read_transforms
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.paths import SubjectFolders, check_capture_place
 from stages.common import run_stage
 
 SHOWN = 5
@@ -24,9 +22,8 @@ def read_capture(subject: Subject, folders: SubjectFolders) -> Capture:
     if subject.source == "actor":
         fps = read_stage(CaptureParams, folders.config).fps
         return read_multiface(folders.capture, subject, fps)
-    if subject.source == "multiface":
-        return read_multiface(Path(subject.path), subject)
-    return read_transforms(Path(subject.path), subject)
+    path = check_capture_place(subject.path, folders)
+    return read_multiface(path, subject) if subject.source == "multiface" else read_transforms(path, subject)
 
 
 def summary(plan: Plan) -> str:

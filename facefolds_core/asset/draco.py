@@ -34,6 +34,8 @@ class MeshSettings(Protocol):
 
 DEGENERATE = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
+MOST_CLAIMED = 1 << 24
+"""Faces or vertices of a mesh: far more than any asset has."""
 
 
 class DracoError(ValueError):
@@ -102,6 +104,7 @@ def decode_mesh(data: bytes) -> TexturedMesh:
     Raises:
         DracoError: if the bytes are not a Draco triangle mesh with texture coordinates.
     """
+    _check_claims(data)
     try:
         mesh = DracoPy.decode(data)
     except Exception as error:  # DracoPy's own exceptions have no common base.
@@ -116,6 +119,37 @@ def decode_mesh(data: bytes) -> TexturedMesh:
     if st.shape != (len(vertices), 2):
         raise DracoError(f"texture coordinates of shape {st.shape} for {len(vertices)} vertices")
     return TexturedMesh(vertices, np.asarray(faces).astype(np.int32), st)
+
+
+def _check_claims(data: bytes) -> None:
+    """Refuse a mesh that claims more than any has, before the decoder makes room for it.
+
+    Draco's header (bitstream 2.2): "DRACO", version (2), kind (1: mesh), method (0 sequential, 1 edgebreaker), flags
+    (2); then, if there are no metadata, the numbers of faces and points, or a byte and those of vertices and faces.
+
+    Raises:
+        DracoError: if it does, or is no mesh.
+    """
+    if len(data) < 12 or data[:5] != b"DRACO":
+        raise DracoError("it does not begin with Draco's header")
+    major, minor, kind, method = data[5:9]
+    if kind != 1:
+        raise DracoError("it holds no mesh")
+    if (major, minor) != (2, 2) or data[10] & 0x80:
+        return  # other versions and metadata: laid out otherwise, and no writer of assets makes them
+    place = 11 if method == 0 else 12
+    for _ in range(2):
+        count, shift = 0, 0
+        while True:
+            if place >= len(data) or shift > 28:
+                raise DracoError("its header is cut off")
+            byte = data[place]
+            count |= (byte & 0x7F) << shift
+            place, shift = place + 1, shift + 7
+            if byte < 0x80:
+                break
+        if count > MOST_CLAIMED:
+            raise DracoError(f"it claims {count} faces or vertices")
 
 
 def attribute_ids(data: bytes) -> tuple[int, int]:

@@ -14,6 +14,7 @@ from PIL import Image
 from facefolds_core.asset.manifest import REMEDY, Level
 from facefolds_core.asset.packing import Rect
 from facefolds_core.errors import UserError
+from facefolds_core.pictures import DamagedPictureError, open_picture
 
 Map = NDArray[np.float32]
 """(h, w, 3, 3) of one layer: what to add to R, G and B (last axis) for each unit of d_x, d_y and d_z."""
@@ -83,9 +84,8 @@ def read_effects(folder: Path, level: Level) -> tuple[Map, ...] | None:
         return None
     path = folder / effects.file
     try:
-        with Image.open(path) as picture:
-            codes = np.asarray(picture.convert("RGB"))
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises all three for damaged files
+        codes = np.asarray(open_picture(path).convert("RGB"))
+    except (OSError, DamagedPictureError) as error:
         raise UserError("damaged view effects", file=path, found=str(error), remedy=REMEDY) from None
     rects = [layer.effects_rect for layer in level.layers]
     return _maps(codes, effects.planes, [rect for rect in rects if rect is not None], effects.scale)

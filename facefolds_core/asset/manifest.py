@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 from facefolds_core.geometry.similarity import Similarity
@@ -22,12 +23,15 @@ MANIFEST_NAME = "manifest.json"
 SCHEMA_PATH = Path(__file__).with_name("manifest.schema.json")
 REMEDY = "make the asset again (`dvc repro`), or copy it again from where it is whole"
 
+LARGEST = 1 << 24
+"""Bytes of a manifest: one has some kB a level."""
+
 _SEAL = re.compile(rb'"manifest_sha256"\s*:\s*"([0-9a-f]{64})"')
 _UNSEALED = "0" * 64
 
 Count = Annotated[int, Field(ge=1)]
 UV = Annotated[float, Field(ge=-1, le=1)]
-FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]
+FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=200)]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Offset = Annotated[int, Field(ge=0)]
 Rect = tuple[Offset, Offset, Count, Count]
@@ -290,6 +294,11 @@ def parse_manifest(path: Path) -> Manifest:
     Raises:
         UserError: if it is missing, not JSON, not a facefolds asset, of another version, or a key is wrong.
     """
+    problem = special_problem(path)
+    if problem is None and path.stat().st_size > LARGEST:
+        problem = f"the file has {path.stat().st_size} bytes, a manifest at most {LARGEST}"
+    if problem not in (None, MISSING):
+        raise UserError("the manifest cannot be read", file=path, found=problem, remedy=REMEDY)
     value = read_json(path, remedy=REMEDY)
     if not isinstance(value, dict) or value.get("format") != "facefolds":
         found = value.get("format") if isinstance(value, dict) else type(value).__name__
@@ -298,7 +307,7 @@ def parse_manifest(path: Path) -> Manifest:
             file=path,
             place="format",
             expected="facefolds",
-            found=found,
+            found=_shown(found),
             remedy=REMEDY,
         )
     if value.get("version") != FORMAT_VERSION or isinstance(value.get("version"), bool):
@@ -307,7 +316,7 @@ def parse_manifest(path: Path) -> Manifest:
             file=path,
             place="version",
             expected=FORMAT_VERSION,
-            found=value.get("version"),
+            found=_shown(value.get("version")),
             remedy="make the asset again with this version of facefolds, or read it with the one that made it",
         )
     try:
@@ -327,6 +336,14 @@ def parse_manifest(path: Path) -> Manifest:
     if missing:
         raise UserError("the manifest lacks keys", file=path, place=", ".join(missing), remedy=REMEDY)
     return manifest
+
+
+def _shown(value: object) -> object:
+    """A value as a message may show it: short, and without characters that steer terminals."""
+    if isinstance(value, int | float | None) and abs(value or 0) < 1e9:
+        return value
+    text = str(value)[:200]
+    return text if text.isprintable() else repr(text)
 
 
 def _missing_keys(whole: Any, given: Any, place: str = "") -> list[str]:

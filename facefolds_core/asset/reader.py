@@ -1,7 +1,11 @@
-"""Read an asset. Nothing here knows the model: files only."""
+"""Read an asset. Nothing here knows the model: files only.
+
+Nothing is decoded whose bytes are not the manifest's: a file that is changed after the asset was opened is refused too.
+"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -10,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.effects import Map, read_effects
 from facefolds_core.asset.manifest import (
@@ -19,12 +24,10 @@ from facefolds_core.asset.manifest import (
     Level,
     Manifest,
     parse_manifest,
-    seal_is_whole,
 )
-from facefolds_core.asset.packing import AtlasLayout, inside
-from facefolds_core.asset.video import decode_video, unpack_picture
+from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
+from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
-from facefolds_core.files import file_sha256
 from facefolds_core.geometry.meshes import TexturedMesh
 
 Frame = tuple[NDArray[np.uint8], ...]
@@ -61,6 +64,9 @@ class AssetLevel:
         Raises:
             UserError: if their picture is damaged.
         """
+        effects = self.entry.view_effects
+        if effects is not None:
+            refuse_changed(self.folder / effects.file, effects.bytes, effects.sha256, REMEDY)
         return read_effects(self.folder, self.entry)
 
     def frames(self) -> Iterator[Frame]:
@@ -95,11 +101,20 @@ class AssetLevel:
     def _path(self) -> Path:
         return self.folder / self.entry.texture.videos[self.video].file
 
-    def _decode(self, start: int) -> Iterator[Frame]:
+    def pictures(self, start: int = 0) -> Iterator[Picture]:
+        """The video's planar pictures from frame `start` on, decoded as they are asked for.
+
+        Raises:
+            UserError: if the video is damaged, or not the one that the manifest names.
+        """
         texture = self.entry.texture
+        video = texture.videos[self.video]
+        refuse_changed(self._path, video.bytes, video.sha256, REMEDY)
+        return decode_video(self._path, (texture.width, texture.height), texture.fps, start)
+
+    def _decode(self, start: int) -> Iterator[Frame]:
         layout = layout_of(self.entry)
-        pictures = decode_video(self._path, (texture.width, texture.height), texture.fps, start)
-        return (unpack_picture(picture, layout) for picture in pictures)
+        return (unpack_picture(picture, layout) for picture in self.pictures(start))
 
     def _wrong_count(self, found: int) -> UserError:
         return UserError(
@@ -154,78 +169,6 @@ class Asset:
         return self.full.frame(index)
 
 
-def layout_of(level: Level) -> AtlasLayout:
-    """Where the manifest says the textures lie."""
-    texture = level.texture
-    return AtlasLayout(
-        width=texture.width,
-        height=texture.height,
-        colour_rect=texture.colour_rect,
-        alpha_rect=texture.alpha_rect,
-        rects=tuple(layer.texture_rect for layer in level.layers),
-    )
-
-
-def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
-    """What is wrong inside a manifest that has all its keys, in words; the files that it names are not looked at."""
-    problems = []
-    if not seal_is_whole(path.read_bytes()):
-        problems.append("manifest_sha256 is not this file's: its content was changed")
-    for level in manifest.levels:
-        problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
-    if len({level.name for level in manifest.levels}) != len(manifest.levels):
-        problems.append("two levels have one name")
-    if len({(level.texture.frames, level.texture.fps) for level in manifest.levels}) != 1:
-        problems.append("the levels differ in frames or fps")
-    rotation = np.array(manifest.coordinates.to_capture.rotation)
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
-        problems.append("coordinates.to_capture.rotation is not a rotation")
-    names = [MANIFEST_NAME, *(name for name, _, _ in manifest.files())]
-    if len(set(names)) != len(names):
-        problems.append("one file is named twice")
-    return problems
-
-
-def _level_problems(level: Level) -> list[str]:
-    texture, effects = level.texture, level.view_effects
-    problems = []
-    if texture.width % 2 or texture.height % 2:
-        problems.append(f"a video of {texture.width} x {texture.height} pixels: both must be even")
-    problems += layout_of(level).problems()
-    for index, (u0, u1, v0, v1) in enumerate(layer.uv_window for layer in level.layers):
-        if not (u0 < u1 and v0 < v1):
-            problems.append(f"uv_window {[u0, u1, v0, v1]} of layer {index} is empty")
-    if level.bytes != (total := sum(size for _, size, _ in level.files())):
-        problems.append(f"bytes are {level.bytes}, those of its files are {total}")
-    rects = [layer.effects_rect for layer in level.layers if layer.effects_rect is not None]
-    if effects is None:
-        return problems + ["effects_rects without view_effects"] * bool(rects)
-    if len(rects) != len(level.layers):
-        problems.append("view_effects, but a layer without effects_rect")
-    planes = effects.planes
-    if any(plane[2:] != planes[0][2:] for plane in planes):
-        problems.append("the planes of view_effects differ in size")
-    problems += [
-        f"plane {list(p)} is not inside the effects picture"
-        for p in planes
-        if not inside(p, (effects.width, effects.height))
-    ]
-    problems += [f"effects_rect {list(r)} is not inside its plane" for r in rects if not inside(r, planes[0][2:])]
-    return problems
-
-
-def check_file(path: Path, size: int, sha256: str) -> str | None:
-    """What is wrong with a file against the manifest's byte count and checksum, in words; None if it is whole."""
-    if not path.is_file():
-        return "the file is missing"
-    found = path.stat().st_size
-    if found != size:
-        return f"the file has {found} bytes, the manifest says {size}: " + ("truncated" if found < size else "too long")
-    if file_sha256(path) != sha256:
-        return "the file's SHA-256 is not the manifest's: its content was changed"
-    return None
-
-
 def read_asset(folder: str | Path) -> Asset:
     """Read the manifest and the meshes of all levels; check every file's length and checksum.
 
@@ -233,7 +176,7 @@ def read_asset(folder: str | Path) -> Asset:
         UserError: if anything is missing, damaged or of another version; names the file.
     """
     folder = Path(folder)
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise UserError("no such folder", file=folder, expected="an asset's folder", remedy="make it with `dvc repro`")
     path = folder / MANIFEST_NAME
     manifest = parse_manifest(path)
@@ -257,27 +200,16 @@ def read_level(folder: Path, level: Level) -> AssetLevel:
 
 
 def _read_layer(folder: Path, layer: Layer) -> TexturedMesh:
+    path = folder / layer.mesh
+    refuse_changed(path, layer.bytes, layer.sha256, REMEDY)
+    data = path.read_bytes()
+    if hashlib.sha256(data).hexdigest() != layer.sha256:  # changed between the two
+        raise UserError("damaged asset", file=path, found="the file changed while it was read", remedy="try again")
     try:
-        mesh = decode_mesh((folder / layer.mesh).read_bytes())
+        mesh = decode_mesh(data)
     except DracoError as error:
         raise UserError("damaged mesh", file=folder / layer.mesh, found=str(error), remedy=REMEDY) from None
     problems = mesh_problems(mesh, layer.vertices, layer.triangles)
     if problems:
         raise UserError("damaged mesh", file=folder / layer.mesh, found="; ".join(problems), remedy=REMEDY)
     return mesh
-
-
-def mesh_problems(mesh: TexturedMesh, vertices: int, triangles: int) -> list[str]:
-    """What makes a decoded mesh unusable or different from its manifest's counts, in words."""
-    problems = []
-    if len(mesh.vertices) != vertices:
-        problems.append(f"{len(mesh.vertices)} vertices, the manifest says {vertices}")
-    if len(mesh.faces) != triangles:
-        problems.append(f"{len(mesh.faces)} triangles, the manifest says {triangles}")
-    if not np.isfinite(mesh.vertices).all():
-        problems.append("vertices that are not finite")
-    if not (mesh.st >= -1e-6).all() or not (mesh.st <= 1 + 1e-6).all():
-        problems.append("texture coordinates outside [0, 1]")
-    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        problems.append("faces that name vertices which are not there")
-    return problems

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
+from facefolds_core.asset.audio import sound_problem
+from facefolds_core.asset.checks import manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Layer,
+    Level,
     Manifest,
     Poster,
     Texture,
@@ -18,15 +21,22 @@ from facefolds_core.asset.manifest import (
     ViewEffects,
     parse_manifest,
 )
-from facefolds_core.asset.reader import check_file, manifest_problems, mesh_problems
-from facefolds_core.asset.video import decode_video, probe_video
+from facefolds_core.asset.nesting import lies_within
+from facefolds_core.asset.stored import check_file, is_folder, leads_out
+from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
 
 _BT709_LIMITED = (1, 1)
+_COLOURFUL = 24
+"""Codes off neutral that the chroma of the alpha image may be, by the codec's error."""
+_MOST_STRAYS = 20
+"""Files that the manifest does not name: so many are listed."""
 
 
 def validate_asset(folder: str | Path) -> list[str]:
-    """Check an asset whole: manifest, lengths and checksums, meshes, every frame of the video.
+    """Check an asset whole: manifest, lengths and checksums, meshes, every frame of the video, pictures, sound.
 
     A file whose bytes are not the manifest's is reported and not decoded: decoders promise nothing for such input.
 
@@ -34,37 +44,66 @@ def validate_asset(folder: str | Path) -> list[str]:
         problems in words, each beginning with the file concerned; empty if the asset is sound.
     """
     folder = Path(folder)
-    if not folder.is_dir():
+    if not is_folder(folder):
         return [f"{folder}: no such folder"]
     path = folder / MANIFEST_NAME
     try:
         manifest = parse_manifest(path)
     except UserError as error:
         return [_in_words(MANIFEST_NAME, error)]
-    problems = [f"{MANIFEST_NAME}: {problem}" for problem in manifest_problems(path, manifest)]
+    said = manifest_problems(path, manifest)
+    problems = [f"{MANIFEST_NAME}: {problem}" for problem in said]
     whole = set()
     for name, size, sha256 in manifest.files():
         problem = check_file(folder / name, size, sha256)
         problems += [f"{name}: {problem}"] if problem else []
         whole |= set() if problem else {name}
+    names = [MANIFEST_NAME, *(name for name, _, _ in manifest.files())]
+    problems += [f"{name}: a link that leads out of the folder" for name in names if leads_out(folder, name)]
+    problems += _strays(folder, set(names))
+    # What the manifest says is what decoders are given room for: nothing is decoded by one that says nonsense.
+    return problems if said else problems + list(_content_problems(folder, manifest, whole))
+
+
+def _strays(folder: Path, expected: set[str]) -> list[str]:
+    """Files that the manifest does not name."""
+    try:
+        found = sorted({entry.name for entry in folder.iterdir()} - expected)
+    except OSError as error:
+        return [f"{folder}: the folder cannot be listed: {error.strerror}"]
+    problems = [f"{name}: not named in the manifest" for name in found[:_MOST_STRAYS]]
+    more = len(found) - _MOST_STRAYS
+    return problems + ([f"and {more} more files that are not named in the manifest"] if more > 0 else [])
+
+
+def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iterator[str]:
+    """What is wrong inside the files whose bytes are the manifest's."""
     for level in manifest.levels:
-        for layer in level.layers:
-            if layer.mesh in whole:
-                problems += [f"{layer.mesh}: {problem}" for problem in _layer_problems(folder / layer.mesh, layer)]
+        yield from _mesh_problems(folder, level, whole, manifest.coordinates.sphere_centre)
         for video in level.texture.videos:
             if video.file in whole:
                 found = _video_problems(folder / video.file, video, level.texture)
-                problems += [f"{video.file}: {problem}" for problem in found]
+                yield from (f"{video.file}: {problem}" for problem in found)
     pictures: list[Poster | ViewEffects] = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
     pictures += [level.view_effects for level in manifest.levels if level.view_effects]
     for picture in pictures:
         if picture.file in whole:
-            problems += [f"{picture.file}: {problem}" for problem in _picture_problems(folder / picture.file, picture)]
-    expected = {MANIFEST_NAME, *(name for name, _, _ in manifest.files())}
-    problems += [
-        f"{file.name}: not named in the manifest" for file in sorted(folder.iterdir()) if file.name not in expected
-    ]
-    return problems
+            yield from (f"{picture.file}: {found}" for found in _picture_problems(folder / picture.file, picture))
+    if manifest.audio and manifest.audio.file in whole:
+        texture = manifest.full.texture
+        problem = sound_problem(folder / manifest.audio.file, texture.frames / texture.fps)
+        yield from [f"{manifest.audio.file}: {problem}"] if problem else []
+
+
+def _mesh_problems(folder: Path, level: Level, whole: set[str], centre: tuple[float, float, float]) -> Iterator[str]:
+    """The layers of a level, each by itself and against the one around it."""
+    outer: TexturedMesh | None = None
+    for layer in level.layers:
+        mesh, problems = _layer(folder / layer.mesh, layer) if layer.mesh in whole else (None, [])
+        yield from (f"{layer.mesh}: {problem}" for problem in problems)
+        if mesh is not None and outer is not None and lies_within(outer, mesh, centre):
+            yield f"{layer.mesh}: lies around the layer before it: the order is from the outermost in"
+        outer = mesh
 
 
 def summary(manifest: Manifest) -> str:
@@ -86,17 +125,17 @@ def _in_words(name: str, error: UserError) -> str:
     return ", ".join(parts)
 
 
-def _layer_problems(path: Path, layer: Layer) -> list[str]:
+def _layer(path: Path, layer: Layer) -> tuple[TexturedMesh | None, list[str]]:
+    """A layer's mesh (None if it is unusable), and what is wrong with it."""
     try:
         mesh = decode_mesh(path.read_bytes())
     except DracoError as error:
-        return [f"not a Draco mesh with texture coordinates: {error}"]
+        return None, [f"not a Draco mesh with texture coordinates: {error}"]
     problems = mesh_problems(mesh, layer.vertices, layer.triangles)
-    if not problems:
-        flat = np.flatnonzero(degenerate_faces(mesh.vertices, mesh.faces))
-        if len(flat):
-            problems.append(f"{len(flat)} faces without area, the first is face {flat[0]}")
-    return problems
+    if problems:
+        return None, problems
+    flat = np.flatnonzero(degenerate_faces(mesh.vertices, mesh.faces))
+    return mesh, [f"{len(flat)} faces without area, the first is face {flat[0]}"] if len(flat) else []
 
 
 def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
@@ -117,7 +156,13 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
             problems.append(f"its colour tags (matrix, range) are {facts.tags}, not BT.709 and limited")
         if problems:
             return problems
-        frames = sum(1 for _ in decode_video(path, (texture.width, texture.height), texture.fps))
+        frames = 0
+        for picture in decode_video(path, (texture.width, texture.height), texture.fps):
+            if frames == 0 and _colourful(picture, texture):
+                problems.append("there are colours in its alpha_rect: it may stand in colour_rect's place")
+            frames += 1
+            if frames > texture.frames:
+                return [*problems, f"at least {frames} frames, the manifest says {texture.frames}"]
         if frames != texture.frames:
             problems.append(f"{frames} frames, the manifest says {texture.frames}")
     except UserError as error:
@@ -125,14 +170,21 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
     return problems
 
 
+def _colourful(picture: Picture, texture: Texture) -> bool:
+    """Whether more than one in a hundred pixels of the alpha image has a hue: it should have none."""
+    height, width = texture.height, texture.width
+    x, y, w, h = (number // 2 for number in texture.alpha_rect)
+    chroma = picture[height:].reshape(2, height // 2, width // 2)[:, y : y + h, x : x + w]
+    return bool((np.abs(chroma.astype(np.int16) - 128) > _COLOURFUL).any(0).mean() > 0.01)
+
+
 def _picture_problems(path: Path, said: Poster | ViewEffects) -> list[str]:
     try:
-        with Image.open(path) as picture:
-            picture.load()
-            size, mode = picture.size, picture.mode
-    except (OSError, ValueError, SyntaxError) as error:  # Pillow raises all three for damaged files
+        size = picture_size(path)
+        if size != (said.width, said.height):
+            # Not decoded: the manifest's size is bounded, this one may be anything.
+            return [f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}"]
+        mode = open_picture(path).mode
+    except (OSError, DamagedPictureError) as error:
         return [f"not a picture: {error}"]
-    found = [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]
-    if size != (said.width, said.height):
-        found.append(f"{size[0]} x {size[1]} pixels, the manifest says {said.width} x {said.height}")
-    return found
+    return [] if mode == "RGB" else [f"a picture of mode {mode}, not RGB"]

@@ -16,6 +16,7 @@ from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
 from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
+from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import Image, write_frames
@@ -108,6 +109,10 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     vertices = None
     if still.tracking is not None:
         vertices = similarity.apply(still.tracking.world_vertices()[frames]).astype(np.float32)
+    seen: list[list[int]] = [[] for _ in cameras]
+    for row in rows:
+        seen[row.camera].append(row.frame)
+    check_sight(cameras, seen, scene.frame_ids, vertices, capture.root)
     return Plan(capture, scene, tuple(rows), vertices, sound)
 
 

@@ -18,6 +18,9 @@ from facefolds_core.params import FrameRange, Subject
 
 Array = NDArray[np.float64]
 
+RATES = (0.1, 1000.0)
+"""Frames a second of a capture."""
+
 
 @dataclass(frozen=True)
 class View:
@@ -136,11 +139,25 @@ def select_frames(
 
 
 def frame_rate(subject: Subject, default: float, count: int) -> float:
-    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame."""
+    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame.
+
+    Raises:
+        UserError: for a rate out of `RATES`.
+    """
+    rate = subject.fps or default
+    if not RATES[0] <= rate <= RATES[1]:
+        raise UserError(
+            "a frame rate that no capture has",
+            file="params.yaml",
+            place="fps",
+            expected=f"{RATES[0]:g} to {RATES[1]:g} frames a second",
+            found=f"{rate:g}",
+            remedy="correct `fps` of this subject (of source actor: of `capture`) in params.yaml",
+        )
     if count < 2:
         return 0.0
     step = subject.frames.step if isinstance(subject.frames, FrameRange) else 1
-    return (subject.fps or default) / step
+    return rate / step
 
 
 def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int], list[int], list[str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import cv2
@@ -11,24 +10,16 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from facefolds_core.errors import UserError
+from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
+from facefolds_core.reading import LARGEST, check_regular, no_memory, read_bytes
 
 Image = NDArray[np.uint8]
 _REMEDY = "copy the file again from its source, or take this image out of the capture"
 
 
-def _open(path: Path, place: str) -> Pillow.Image:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Pillow.DecompressionBombWarning)
-            return Pillow.open(path)
-    except FileNotFoundError:
-        raise UserError("an image is missing", file=path, place=place, remedy=_REMEDY) from None
-    except (OSError, SyntaxError, ValueError, Pillow.DecompressionBombError) as error:
-        length = path.stat().st_size if path.is_file() else 0
-        found = "an empty file" if length == 0 else f"{length} bytes that are no image ({type(error).__name__})"
-        raise UserError(
-            "cannot read an image", file=path, place=place, expected="a PNG or JPEG image", found=found, remedy=_REMEDY
-        ) from None
+def _check(path: Path, place: str) -> int:
+    """The file's length; raises unless it is a regular file."""
+    return check_regular(path, _REMEDY, place=place, missing="an image is missing", largest=LARGEST)
 
 
 def image_size(path: Path, place: str) -> tuple[int, int]:
@@ -38,26 +29,40 @@ def image_size(path: Path, place: str) -> tuple[int, int]:
         place: camera and frame, for the message.
 
     Raises:
-        UserError: if the file is missing, empty or not an image.
+        UserError: if the file is missing, empty, not a regular file or not an image.
     """
-    with _open(path, place) as image:
-        return image.size
+    length = _check(path, place)
+    try:
+        return picture_size(path)
+    except (OSError, DamagedPictureError) as error:
+        raise _unreadable(path, place, length, error) from None
+
+
+def _unreadable(path: Path, place: str, length: int, error: Exception) -> UserError:
+    if isinstance(error, PermissionError):
+        return UserError("no permission", file=path, place=place, remedy="give yourself permission to read it")
+    found = "an empty file" if length == 0 else f"{length} bytes that are no image ({error})"
+    return UserError(
+        "cannot read an image", file=path, place=place, expected="a PNG or JPEG image", found=found, remedy=_REMEDY
+    )
 
 
 def _load(path: Path, place: str) -> Pillow.Image:
-    with _open(path, place) as image:
-        try:
-            image.load()
-        except (OSError, SyntaxError, ValueError) as error:
-            raise UserError(
-                "a damaged image",
-                file=path,
-                place=place,
-                expected=f"{image.size[0]} x {image.size[1]} pixels, as its header says",
-                found=f"{error} ({path.stat().st_size} bytes in the file)",
-                remedy=_REMEDY,
-            ) from None
-        return image
+    data = read_bytes(path, _REMEDY, place=place, missing="an image is missing")
+    try:
+        return open_picture(data)
+    except MemoryError:
+        raise no_memory(path, place) from None
+    except (OSError, DamagedPictureError) as error:
+        size = image_size(path, place)
+        raise UserError(
+            "a damaged image",
+            file=path,
+            place=place,
+            expected=f"{size[0]} x {size[1]} pixels, as its header says",
+            found=f"{error} ({len(data)} bytes in the file)",
+            remedy=_REMEDY,
+        ) from None
 
 
 def _grey_8bit(image: Pillow.Image) -> Image:
@@ -72,7 +77,8 @@ def decode_image(path: Path, place: str) -> Image:
     background of a capture with transparent images). EXIF rotation is ignored: K refers to the pixels as stored.
 
     Raises:
-        UserError: if the file is missing, truncated or not an image; names file and `place` (camera and frame).
+        UserError: if the file is missing, damaged (see `pictures`) or not an image; names file and `place`
+            (camera and frame).
     """
     image = _load(path, place)
     if image.mode.startswith("I") or image.mode == "F":

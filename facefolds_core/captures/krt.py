@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.cameras import Camera, check_camera
+from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
+from facefolds_core.reading import is_regular, read_text
 
 Array = NDArray[np.float64]
 
@@ -46,9 +47,9 @@ def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
         values = [float(word) for word in text.split()]
     except ValueError:
         values = []
-    if len(values) != count or not np.isfinite(values).all():
+    if len(values) != count or not (np.abs(values) <= HUGE).all() or "_" in text:
         raise UserError(
-            "garbled KRT", file=path, place=place, expected=f"{count} numbers", found=repr(text), remedy=_REMEDY
+            "garbled KRT", file=path, place=place, expected=f"{count} numbers", found=repr(text)[:200], remedy=_REMEDY
         )
     return values
 
@@ -60,16 +61,8 @@ def read_krt(path: Path) -> list[Calibration]:
         UserError: if the file is missing, garbled, truncated, names a camera twice, or has a singular K or R; names the
             line and the camera.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UserError(
-            "file not found", file=path, remedy="point `path` at a Multiface subject's folder, which holds KRT"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise UserError(
-            "not a text file", file=path, place=f"byte {error.start}", expected="KRT in text", remedy=_REMEDY
-        ) from None
+    here = "point `path` at a Multiface subject's folder, which holds KRT"
+    text = read_text(path, _REMEDY if is_regular(path) else here, expected="KRT")
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     cameras: list[Calibration] = []
     for first in range(0, len(lines), 8):
@@ -98,7 +91,7 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
             file=path,
             place=f"line {number}",
             expected="the name of a camera",
-            found=repr(name),
+            found=repr(name)[:200],
             remedy=_REMEDY,
         )
     rows = [
@@ -138,6 +131,15 @@ def krt_reference(
         UserError: if neither hypothesis fits.
     """
     if given is not None:
+        if min(given) < 1 or max(given) > 1 << 20:
+            raise UserError(
+                "a size that no image has",
+                file="params.yaml",
+                place="krt_size",
+                expected="[width, height] in pixels",
+                found=list(given),
+                remedy="correct `krt_size` of this subject in params.yaml",
+            )
         return given, None
     if image == FULL_SIZE:
         return image, None

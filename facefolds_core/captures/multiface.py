@@ -23,6 +23,7 @@ from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import Subject
+from facefolds_core.reading import check_folder, is_there, read_text
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
@@ -61,25 +62,28 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     masks = {
         (c, f): path
         for c, f in images
-        if (path := root / "masks" / segment / views[c].name / f"{frames[f]}.png").exists()
+        if is_there(path := root / "masks" / segment / views[c].name / f"{frames[f]}.png")
     }
     audio = root / "audio" / f"{segment}.wav"
+    rate = frame_rate(subject, fps, len(frames))
     seconds = tuple(names.index(name) / (subject.fps or fps) for name in frames)
     return Capture(
         root,
         views,
         tuple(frames),
-        frame_rate(subject, fps, len(frames)),
+        rate,
         images,
         masks,
         tracking,
         tuple(left_out),
-        Sound(audio, seconds) if audio.is_file() else None,
+        Sound(audio, seconds) if is_there(audio) else None,
     )
 
 
 def _segment(root: Path, wanted: str | None) -> str:
     folder = root / "images"
+    for place in (root, folder):
+        check_folder(place, "point `path` at a Multiface subject's folder, which holds KRT and images")
     segments = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
     if wanted in segments:
         return str(wanted)
@@ -104,7 +108,7 @@ def _segment(root: Path, wanted: str | None) -> str:
 def _photos(folder: Path) -> dict[str, dict[str, Path]]:
     """Camera -> frame -> file, of what is there."""
     return {
-        camera.name: {path.stem: path for path in sorted(camera.glob("*.png"))}
+        camera.name: {path.stem: path for path in sorted(camera.iterdir()) if path.suffix == ".png"}
         for camera in sorted(folder.iterdir())
         if camera.is_dir()
     }
@@ -112,9 +116,12 @@ def _photos(folder: Path) -> dict[str, dict[str, Path]]:
 
 def _listed(path: Path, segment: str) -> list[str]:
     """Frames of a segment in frame_list.txt, which is not needed and may be missing."""
-    if not path.exists():
+    if not is_there(path):
         return []
-    pairs = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
+    text = read_text(
+        path, "copy it again from the dataset, or remove it: it may be missing", expected="a list of frames"
+    )
+    pairs = [line.split() for line in text.splitlines()]
     return [pair[1] for pair in pairs if len(pair) == 2 and pair[0] == segment]
 
 

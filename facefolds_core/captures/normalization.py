@@ -56,8 +56,25 @@ def _from_tracking(tracking: Tracking) -> tuple[Array, Array]:
     """
     vertices = tracking.world_vertices()
     centre = ((vertices.min(1) + vertices.max(1)) / 2).mean(0)
+    return centre, orientation(*_mean_pose(tracking))
+
+
+def _mean_pose(tracking: Tracking) -> tuple[Array, Array]:
+    """Where the head faces and its up (3,), averaged over the frames; neither is of unit length.
+
+    Raises:
+        UserError: if the poses turn every way, so that their means say nothing.
+    """
     facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
-    return centre, orientation(facing, up)
+    if min(np.linalg.norm(facing), np.linalg.norm(up), np.linalg.norm(np.cross(facing, up))) < 0.1:
+        raise UserError(
+            "the head poses contradict one another",
+            place="tracked_mesh/SEGMENT/FRAME_transform.txt",
+            expected="a head that faces about the same way in all frames",
+            found=f"mean direction {facing.tolist()}, mean up {up.tolist()}",
+            remedy="copy the head poses again, or choose other frames for this subject in params.yaml",
+        )
+    return facing, up
 
 
 def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, list[str]]:
@@ -122,7 +139,7 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
 
 def stabilizing_similarities(tracking: Tracking) -> list[Similarity]:
     """For each frame, world -> the world in which the head has its mean pose."""
-    facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
+    facing, up = _mean_pose(tracking)
     still = Similarity(
         1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0)
     )

@@ -17,16 +17,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.reading import check_regular, is_there, remake
 
 SCENE_VERSION = 1
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
@@ -34,7 +35,6 @@ SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 
 Split = Literal["train", "holdout", "out"]
 """What a camera is for; "out" is nothing: a trainer does not believe it. No scene on disk has that."""
-_REMEDY = "run `dvc repro` to make the normalised scene again"
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Scene:
     def open_masks(self) -> FrameStore | None:
         """True opacity (0..255, one channel) of some held-out images, or None where the capture has none."""
         path = self.folder / "masks.arrow"
-        return FrameStore(path) if path.exists() else None
+        return FrameStore(path) if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
         """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None.
@@ -100,19 +100,25 @@ class Scene:
             UserError: if the file is damaged.
         """
         path = self.folder / "surface.npz"
-        if not path.exists():
+        if not is_there(path):
             return None
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                return archive["vertices"], archive["faces"]
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-            raise UserError(
-                "the tracked mesh of the scene is damaged",
-                file=path,
-                expected="vertices and faces",
-                found=str(error),
-                remedy="run `dvc repro` to make the normalised scene again",
-            ) from None
+        message = "the tracked mesh of the scene is damaged"
+        arrays = read_npz(path, message)
+        vertices, faces = arrays.get("vertices"), arrays.get("faces")
+        if (
+            vertices is None
+            or faces is None
+            or (vertices.dtype.name, faces.dtype.name) != ("float32", "int32")
+            or (vertices.shape[:1], vertices.shape[2:], faces.shape[1:]) != ((self.num_frames,), (3,), (3,))
+            or min(vertices.size, faces.size) == 0
+            or not np.isfinite(vertices).all()
+            or faces.min() < 0
+            or faces.max() >= vertices.shape[1]
+        ):
+            found = {name: f"{array.dtype} {array.shape}" for name, array in arrays.items()}
+            expected = f"finite vertices ({self.num_frames}, V, 3), and faces (F, 3) that name them"
+            raise UserError(message, file=path, expected=expected, found=found, remedy=remake(path))
+        return vertices, faces
 
 
 def write_scene(scene: Scene, folder: Path) -> None:
@@ -150,21 +156,23 @@ def read_scene(folder: str | Path) -> Scene:
     """
     folder = Path(folder)
     path = folder / "scene.json"
-    value: dict[str, Any] = read_json(path, remedy=_REMEDY)
-    if value.get("version") != SCENE_VERSION:
+    remedy = remake(path)
+    check_regular(path, remedy)
+    value: Any = read_json(path, remedy=remedy)
+    if not isinstance(value, dict) or value.get("version") != SCENE_VERSION:
         raise UserError(
             "a normalised scene of another version",
             file=path,
             expected=f"version {SCENE_VERSION}",
-            found=value.get("version"),
-            remedy=_REMEDY,
+            found=value.get("version") if isinstance(value, dict) else type(value).__name__,
+            remedy=remedy,
         )
     try:
         cameras = tuple(
             Camera(c["name"], np.array(c["K"], float), np.array(c["w2c"], float), int(c["width"]), int(c["height"]))
             for c in value["cameras"]
         )
-        return Scene(
+        scene = Scene(
             subject=value["subject"],
             cameras=cameras,
             splits=tuple(c["split"] for c in value["cameras"]),
@@ -175,5 +183,30 @@ def read_scene(folder: str | Path) -> Scene:
             left_out=tuple(value["left_out"]),
             folder=folder,
         )
-    except (KeyError, TypeError, ValueError) as error:
-        raise UserError("garbled scene.json", file=path, found=repr(error), remedy=_REMEDY) from None
+        _check(scene)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise UserError("garbled scene.json", file=path, found=repr(error)[:300], remedy=remedy) from None
+    for i, camera in enumerate(scene.cameras):
+        check_camera(camera, path, f"cameras[{i}] ({camera.name})")
+    return scene
+
+
+def _check(scene: Scene) -> None:
+    """ValueError for what `write_scene` never writes; the cameras' numbers are checked by `check_camera`."""
+    cameras, frames = scene.cameras, len(scene.frame_ids)
+    words = [scene.subject, *scene.frame_ids, *scene.left_out, *(camera.name for camera in cameras)]
+    if not cameras or not frames or not all(isinstance(word, str) for word in words):
+        raise ValueError("no cameras, no frames, or names that are no text")
+    if any((c.K.shape, c.w2c.shape) != ((3, 3), (3, 4)) for c in cameras):
+        raise ValueError("matrices of the wrong shape")
+    if len({(c.width, c.height) for c in cameras}) != 1 or not 1 <= min(scene.width, scene.height) <= 1 << 20:
+        raise ValueError("image sizes that differ, or are none")
+    if not set(scene.splits) <= {"train", "holdout"}:
+        raise ValueError(f"splits {sorted(set(scene.splits))}")
+    if scene.times.shape != (frames,) or not np.isfinite([*scene.times, scene.fps]).all() or not 0 <= scene.fps < 1e4:
+        raise ValueError("times or a rate that are none")
+    similarity = scene.from_capture
+    if (similarity.rotation.shape, similarity.translation.shape) != ((3, 3), (3,)):
+        raise ValueError("from_capture is no similarity")
+    if not (similarity.scale > 0 and np.isfinite([*similarity.rotation.flat, *similarity.translation]).all()):
+        raise ValueError("from_capture is no similarity")

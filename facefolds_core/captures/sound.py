@@ -11,7 +11,11 @@ import numpy as np
 from av.error import FFmpegError
 
 from facefolds_core.errors import UserError
+from facefolds_core.reading import LARGEST, check_regular, no_memory
 
+_REMEDY = "replace the file, or remove it"
+RATES = (1000, 384_000)
+"""Samples a second."""
 LATE = 1e-3
 """Seconds by which a picture may be off its sound."""
 
@@ -33,17 +37,22 @@ def cut_sound(source: Path, target: Path, start: float, seconds: float) -> None:
     Raises:
         UserError: if the file is not sound.
     """
+    _check_length(source)
     try:
-        with av.open(str(source)) as container:
+        with av.open(str(source), format="wav") as container:  # any other would let FFmpeg guess: playlists, addresses
             if not container.streams.audio:
                 raise _unreadable(source, "it has no audio stream")
             stream = container.streams.audio[0]
             rate, layout = stream.codec_context.sample_rate, stream.codec_context.channels > 1
+            if not RATES[0] <= rate <= RATES[1]:
+                raise _unreadable(source, f"{rate} samples a second")
             convert = av.AudioResampler(format="s16", layout="stereo" if layout else "mono", rate=rate)
             frames = [part for frame in container.decode(stream) for part in convert.resample(frame)]
             frames += convert.resample(None)
-    except FFmpegError as error:
+    except (FFmpegError, ValueError, OverflowError) as error:
         raise _unreadable(source, str(error)) from None
+    except MemoryError:
+        raise no_memory(source) from None
     channels = 2 if layout else 1
     samples = np.concatenate([np.zeros(0, np.int16), *(frame.to_ndarray().reshape(-1) for frame in frames)])
     first, length = round(start * rate), round(seconds * rate)
@@ -54,5 +63,17 @@ def cut_sound(source: Path, target: Path, start: float, seconds: float) -> None:
         file.writeframes(np.concatenate([samples, silence]).astype("<i2").tobytes())
 
 
+def _check_length(path: Path) -> None:
+    """Refuse what is no regular WAV file, and one that is shorter than its own header says."""
+    size = check_regular(path, _REMEDY, largest=LARGEST)
+    with path.open("rb") as file:
+        head = file.read(12)
+    if head[:4] != b"RIFF" or head[8:] != b"WAVE":
+        raise _unreadable(path, f"{size} bytes that are no WAV file")
+    said = int.from_bytes(head[4:8], "little")
+    if said not in (0, 0xFFFFFFFF) and said + 8 > size + 1:  # both: written to a pipe, length unknown
+        raise _unreadable(path, f"{size} bytes of the {said + 8} that its header says")
+
+
 def _unreadable(path: Path, found: str) -> UserError:
-    return UserError("the sound cannot be read", file=path, found=found, remedy="replace the file, or remove it")
+    return UserError("the sound cannot be read", file=path, found=found, remedy=_REMEDY)

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Tracking
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.reading import check_folder, is_there, read_bytes, read_text
 
 Array = NDArray[np.float64]
 _REMEDY = "copy the file again from the dataset, or choose other frames for this subject in params.yaml"
@@ -29,7 +31,7 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
     faces: list[list[int]] = []
     number = 0
     try:
-        for line in path.read_text(encoding="utf-8").splitlines():
+        for line in read_text(path, _REMEDY, expected="a Wavefront mesh").splitlines():
             number += 1
             words = line.split()
             if words and words[0] == "v":
@@ -37,26 +39,32 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
             elif words and words[0] == "f":
                 corners = [int(word.split("/")[0]) - 1 for word in words[1:]]
                 faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
-    except (ValueError, IndexError) as error:
+    except (ValueError, IndexError, OverflowError) as error:
         raise UserError(
             "garbled mesh",
             file=path,
-            place=None if isinstance(error, UnicodeDecodeError) else f"line {number}",
+            place=f"line {number}",
             expected="`v x y z` or `f a b c`",
             found=str(error),
             remedy=_REMEDY,
         ) from None
-    points, triangles = np.array(vertices, float).reshape(-1, 3), np.array(faces, np.int32).reshape(-1, 3)
-    if len(points) == 0 or (len(triangles) and (triangles.min() < 0 or triangles.max() >= len(points))):
+    points, triangles = np.array(vertices, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
+    if (
+        len(points) == 0
+        or len(triangles) == 0
+        or not (np.abs(points) <= HUGE).all()
+        or triangles.min() < 0
+        or triangles.max() >= len(points)
+    ):
         raise UserError(
             "garbled mesh",
             file=path,
-            expected="vertices, and faces that name them",
+            expected="finite vertices, and faces that name them",
             found=f"{len(points)} vertices, {len(triangles)} triangles"
             + (f", vertex numbers {triangles.min() + 1} to {triangles.max() + 1}" if len(triangles) else ""),
             remedy=_REMEDY,
         )
-    return points, triangles
+    return points, triangles.astype(np.int32)
 
 
 def read_bin(path: Path, count: int | None) -> Array:
@@ -66,9 +74,9 @@ def read_bin(path: Path, count: int | None) -> Array:
         count: V where it is known.
 
     Raises:
-        UserError: if the length of the file does not fit.
+        UserError: if the length of the file does not fit, or a part of it is zeros.
     """
-    data = path.read_bytes()
+    data = read_bytes(path, _REMEDY)
     if not data or len(data) % 12 or (count is not None and len(data) != 12 * count):
         raise UserError(
             "the tracked mesh has a wrong length",
@@ -77,7 +85,17 @@ def read_bin(path: Path, count: int | None) -> Array:
             found=f"{len(data)} bytes",
             remedy=_REMEDY,
         )
-    return np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
+    points = np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
+    zeros = int((points == 0).all(1).sum())
+    if zeros > 1:
+        raise UserError(
+            "a damaged tracked mesh",
+            file=path,
+            expected="vertices in different places",
+            found=f"{zeros} of {len(points)} exactly at 0 0 0, as after an interrupted copy",
+            remedy=_REMEDY,
+        )
+    return points
 
 
 def read_pose(path: Path) -> Array:
@@ -86,19 +104,21 @@ def read_pose(path: Path) -> Array:
     Raises:
         UserError: if the file is garbled, has numbers that are not finite, or R is not a rotation (to 1e-3).
     """
+    text = read_text(path, _REMEDY, expected="a head pose")
     try:
-        pose = np.array([[float(w) for w in line.split()] for line in path.read_text().splitlines() if line.strip()])
-    except (ValueError, UnicodeDecodeError):
+        pose = np.array([[float(w) for w in line.split()] for line in text.splitlines() if line.strip()])
+    except ValueError:
         pose = np.zeros(0)
     if pose.shape != (3, 4):
         raise UserError(
-            "garbled head pose", file=path, expected="3 rows of 4 numbers", found=_start(path), remedy=_REMEDY
+            "garbled head pose", file=path, expected="3 rows of 4 numbers", found=repr(text[:60]), remedy=_REMEDY
         )
-    if not np.isfinite(pose).all():
+    if not (np.abs(pose) <= HUGE).all():
+        finite = bool(np.isfinite(pose).all())
         raise UserError(
-            "the head pose has numbers that are not finite",
+            f"the head pose has numbers that are {'beyond sense' if finite else 'not finite'}",
             file=path,
-            expected="3 rows of 4 finite numbers",
+            expected=f"3 rows of 4 finite numbers, none above {HUGE:g}",
             found=pose.tolist(),
             remedy=_REMEDY,
         )
@@ -114,8 +134,18 @@ def read_pose(path: Path) -> Array:
     return pose
 
 
-def _start(path: Path) -> str:
-    return repr(path.read_bytes()[:60])
+def _check_extent(points: Array, file: Path) -> None:
+    """Refuse vertices (V, 3) that all lie in one point or on one line."""
+    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
+    if len(points) < 3 or spread[1] <= 1e-4 * spread[0] or spread[0] <= 1e-12:
+        low, high = points.min(0), points.max(0)
+        raise UserError(
+            "the vertices of the tracked mesh lie in one point or on one line",
+            file=file,
+            expected="the shape of a head",
+            found=f"{len(points)} vertices from {low.tolist()} to {high.tolist()}",
+            remedy=_REMEDY,
+        )
 
 
 def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, list[str], list[str]]:
@@ -135,7 +165,8 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
     def meshes(name: str) -> tuple[Path, Path, Path]:
         return folder / f"{name}.bin", folder / f"{name}.obj", folder / f"{name}_transform.txt"
 
-    tracked = [n for n in frames if meshes(n)[2].exists() and (meshes(n)[0].exists() or meshes(n)[1].exists())]
+    check_folder(folder, _REMEDY)
+    tracked = [n for n in frames if is_there(meshes(n)[2]) and (is_there(meshes(n)[0]) or is_there(meshes(n)[1]))]
     if not tracked:
         return (
             None,
@@ -143,7 +174,7 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
             [f"tracked mesh: none in {folder} with its _transform.txt; cameras give centre and orientation"],
         )
     left_out = [f"frame {name}: no tracked mesh or no head pose" for name in frames if name not in tracked]
-    topology = next((meshes(name)[1] for name in tracked if meshes(name)[1].exists()), None)
+    topology = next((meshes(name)[1] for name in tracked if is_there(meshes(name)[1])), None)
     faces, count = None, None
     if topology is None:
         left_out.append(f"tracked mesh: {folder} has no .obj, so no faces; it gives centre and orientation only")
@@ -153,14 +184,16 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
     vertices, poses = [], []
     for name in tracked:
         binary, text, transform = meshes(name)
-        points = read_bin(binary, count) if binary.exists() else read_obj(text)[0]
-        file = binary if binary.exists() else text
+        points = read_bin(binary, count) if is_there(binary) else read_obj(text)[0]
+        file = binary if is_there(binary) else text
         count = count or len(points)
-        if len(points) != count or not np.isfinite(points).all():
-            found = f"{len(points)} vertices, {int((~np.isfinite(points)).any(1).sum())} of them not finite"
+        sound = (np.abs(points) <= HUGE).all(1)
+        if len(points) != count or not sound.all():
+            found = f"{len(points)} vertices, {int((~sound).sum())} of them not finite or above {HUGE:g}"
             raise UserError(
                 "a damaged tracked mesh", file=file, expected=f"{count} finite vertices", found=found, remedy=_REMEDY
             )
+        _check_extent(points, file)
         vertices.append(points)
         poses.append(read_pose(transform))
     return Tracking(np.array(poses), np.array(vertices), faces), tracked, left_out

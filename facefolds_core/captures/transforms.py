@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames, shorten
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.errors import UserError
+from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.files import read_json
-from facefolds_core.geometry.cameras import Camera, check_camera
+from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.params import Subject
+from facefolds_core.reading import LARGEST, check_regular, is_folder, is_regular, is_there
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,8 @@ FPS = 30.0
 PIXEL_CENTRES = 0.5
 _PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 _DISTORTION = ("k1", "k2", "p1", "p2", "k3")
-_REMEDY = "mend transforms.json, or make it again with the tool that wrote it"
+LATEST = 1e19
+"""Of `time`: nanoseconds since 1970 are 1.8e18."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +63,9 @@ class Entry:
         return None if self.values.get("time") is None else _number(self, "time")
 
 
-def _fail(path: Path, place: str, message: str, expected: object, found: object, remedy: str = _REMEDY) -> UserError:
-    return UserError(message, file=path, place=place, expected=expected, found=found, remedy=remedy)
-
-
 def _number(entry: Entry, key: str) -> float:
-    value = entry.values[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _fail(entry.file, f"{entry.place}, {key}", "not a number", "a finite number", repr(value))
-    return float(value)
+    limit = LATEST if key == "time" else HUGE
+    return json_number(entry.values[key], entry.file, f"{entry.place}, {key}", limit)
 
 
 def read_transforms(root: Path, subject: Subject) -> Capture:
@@ -82,16 +78,18 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     Raises:
         UserError: if the file is missing, garbled, lacks a key or has a matrix that is none; names the entry and key.
     """
-    path = root if root.suffix == ".json" else root / "transforms.json"
-    value = read_json(path, remedy="point `path` at the folder that holds transforms.json, or make the file again")
+    path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
+    remedy = "point `path` at the folder that holds transforms.json, or make the file again"
+    check_regular(path, remedy, largest=LARGEST)
+    value = read_json(path, remedy=remedy)
     if not isinstance(value, dict) or not isinstance(value.get("frames"), list) or not value["frames"]:
-        raise _fail(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
+        raise wrong(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
     common = {key: entry for key, entry in value.items() if key != "frames"}
     entries = [_entry(e, common, path, f"frames[{i}]") for i, e in enumerate(value["frames"])]
     left_out = [f"{e.place}: no image {e.label}" for e in entries if e.image is None]
     present = [e for e in entries if e.image is not None]
     if not present:
-        raise _fail(
+        raise wrong(
             path,
             "frames",
             "none of the images exists",
@@ -111,7 +109,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
             name = frame_of[entry.place]
             if name in position and entry.image is not None:
                 if (c, position[name]) in images:
-                    raise _fail(
+                    raise wrong(
                         path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label
                     )
                 images[c, position[name]] = entry.image
@@ -121,14 +119,14 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
 
 def _entry(value: Any, common: dict[str, Any], path: Path, place: str) -> Entry:
     if not isinstance(value, dict):
-        raise _fail(
+        raise wrong(
             path, place, "an entry that is no object", "{file_path, transform_matrix, ...}", type(value).__name__
         )
     label = value.get("file_path")
     if not isinstance(label, str) or not label:
-        raise _fail(path, f"{place}, file_path", "a key is missing", "the path of an image", repr(label))
+        raise wrong(path, f"{place}, file_path", "a key is missing", "the path of an image", short(label))
     if "transform_matrix" not in value:
-        raise _fail(path, f"{place} ({label}), transform_matrix", "a key is missing", "a 4 x 4 matrix", "nothing")
+        raise wrong(path, f"{place} ({label}), transform_matrix", "a key is missing", "a 4 x 4 matrix", "nothing")
     place = f"{place} ({label})"
     return Entry(path, place, label, _find(path.parent, label), common | value, _w2c(value, path, place))
 
@@ -138,24 +136,18 @@ def _find(folder: Path, label: str) -> Path | None:
     candidates = [folder / label] + [
         folder / f"{label}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".JPG", ".PNG")
     ]
-    return next((candidate for candidate in candidates if candidate.is_file()), None)
+    found = [candidate for candidate in candidates if is_regular(candidate)]
+    # What is there but no file (a FIFO, a folder, a broken link) is refused when it is opened, not taken for missing.
+    return next(iter(found), None) or next((candidate for candidate in candidates if is_there(candidate)), None)
 
 
 def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
     """(3, 4) world -> camera with OpenCV axes, from camera -> world with OpenGL axes."""
     place = f"{place}, transform_matrix"
-    try:
-        c2w = np.array(value["transform_matrix"], dtype=float)
-    except (TypeError, ValueError):
-        c2w = np.zeros(0)
-    if c2w.shape not in ((4, 4), (3, 4)):
-        found = f"an array of shape {c2w.shape}" if c2w.size else repr(value["transform_matrix"])[:80]
-        raise _fail(path, place, "a camera matrix of the wrong shape", "4 x 4 numbers", found)
-    if not np.isfinite(c2w).all():
-        raise _fail(path, place, "the camera has numbers that are not finite", "finite numbers", c2w.tolist())
+    c2w = json_matrix(value["transform_matrix"], path, place)
     rotation = c2w[:3, :3] @ np.diag([1.0, -1.0, -1.0])
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-        raise _fail(
+        raise wrong(
             path,
             place,
             "a camera matrix is no rotation and translation",
@@ -180,7 +172,7 @@ def _arrange(entries: list[Entry], path: Path) -> tuple[dict[str, list[Entry]], 
     times = {entry.time for entry in entries}
     if max(len(group) for group in groups) == 1:
         if len(times) > 1:
-            raise _fail(
+            raise wrong(
                 path,
                 "time",
                 "every camera is seen at one time only, as from a single moving camera",
@@ -242,7 +234,7 @@ def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
     _check_model(entry, path)
     for key, size in (("w", width), ("h", height)):
         if key in entry.values and _number(entry, key) != size:
-            raise _fail(
+            raise wrong(
                 path,
                 f"{entry.place}, {key}",
                 "the image has another size than transforms.json says",
@@ -263,14 +255,17 @@ def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
 
 def _check_model(entry: Entry, path: Path) -> None:
     model = entry.values.get("camera_model", "OPENCV")
-    fisheye = bool(entry.values.get("is_fisheye")) or bool(entry.values.get("k4"))
+    fisheye = entry.values.get("is_fisheye", False)
+    if not isinstance(fisheye, bool):
+        raise wrong(path, f"{entry.place}, is_fisheye", "neither true nor false", "true or false", short(fisheye))
+    fisheye = fisheye or (entry.values.get("k4") is not None and _number(entry, "k4") != 0)
     if str(model).upper() not in _PINHOLES or fisheye:
-        raise _fail(
+        raise wrong(
             path,
             entry.place,
             "a camera model that is not read",
             f"{shorten(_PINHOLES)}, k1 k2 p1 p2 k3 at most",
-            "k4 or is_fisheye" if fisheye else model,
+            "k4 or is_fisheye" if fisheye else short(model),
             "rectify the images first",
         )
 
@@ -285,9 +280,9 @@ def _focal(entry: Entry, width: int, height: int, path: Path) -> tuple[float, fl
         elif f"camera_angle_{axis}" in values:
             angle = _number(entry, f"camera_angle_{axis}")
             if not 0 < angle < math.pi:
-                raise _fail(path, entry.place, f"camera_angle_{axis} is no angle of view", "radians in (0, pi)", angle)
+                raise wrong(path, entry.place, f"camera_angle_{axis} is no angle of view", "radians in (0, pi)", angle)
             focal[axis] = size / 2 / math.tan(angle / 2)
     if not focal:
-        raise _fail(path, entry.place, "no focal length", "fl_x (and fl_y) or camera_angle_x", "neither")
+        raise wrong(path, entry.place, "no focal length", "fl_x (and fl_y) or camera_angle_x", "neither")
     fx = focal.get("x", focal.get("y", 0.0))
     return fx, focal.get("y", fx)

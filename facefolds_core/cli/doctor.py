@@ -1,9 +1,13 @@
-"""Check that this machine has what pip cannot install; name what is missing and how to get it."""
+"""Check that this machine has what pip cannot install, and that DVC's files are whole; say or mend what is wrong."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from pathlib import Path
+
+from facefolds_core.cli.mending import mend
+from facefolds_core.errors import report_user_errors
 
 SYSTEM_LIBRARIES = {
     # shared object -> (who needs it, Debian/Ubuntu package, Fedora package)
@@ -29,6 +33,9 @@ def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRAR
 
 
 def command() -> None:
+    with report_user_errors("doctor"):
+        for line in mend(Path.cwd()):
+            print(f"doctor: {line}")
     missing = missing_libraries()
     if missing:
         text = "\n  ".join(missing)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from facefolds_core.cli.numbers import finite
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.sweeps.edit import set_for_subject
 from facefolds_core.sweeps.recommend import Budget, recommend
@@ -21,12 +22,19 @@ def command(
         "sweep.parquet"
     ),
     subject: Annotated[str, typer.Option(help="Name of the subject; needed where the table has several.")] = "",
-    max_bytes: Annotated[float | None, typer.Option(help="Of meshes, video and view effects together.")] = None,
-    max_triangles: Annotated[float | None, typer.Option(help="Of all layers.")] = None,
-    max_gpu_bytes: Annotated[float | None, typer.Option(help="Of vertices, indices and a decoded picture.")] = None,
-    max_bit_rate: Annotated[float | None, typer.Option(help="Of the texture video, bits a second.")] = None,
+    max_bytes: Annotated[
+        float | None, typer.Option(help="Of meshes, video and view effects together.", callback=finite)
+    ] = None,
+    max_triangles: Annotated[float | None, typer.Option(help="Of all layers.", callback=finite)] = None,
+    max_gpu_bytes: Annotated[
+        float | None, typer.Option(help="Of vertices, indices and a decoded picture.", callback=finite)
+    ] = None,
+    max_bit_rate: Annotated[
+        float | None, typer.Option(help="Of the texture video, bits a second.", callback=finite)
+    ] = None,
     min_psnr: Annotated[
-        float | None, typer.Option(help="dB on held-out cameras, of the subject where there are masks.")
+        float | None,
+        typer.Option(help="dB on held-out cameras, of the subject where there are masks.", callback=finite),
     ] = None,
     write: Annotated[bool, typer.Option("--write", help="Put it into params.yaml, for this subject.")] = False,
     params: Annotated[Path, typer.Option(help="The file that --write changes.")] = Path("params.yaml"),

@@ -28,6 +28,17 @@ from facefolds_core.rendering.opengl import OpenGLRenderer
 STILL_RATE = 30
 """Pictures a second of a film of an asset that does not move."""
 FILM = VideoCodec(crf=16, preset="medium")
+LARGEST_SIDE = 16_384
+"""Pixels, with anti-aliasing: what graphics drivers draw at once."""
+LIMITS = {
+    "azimuth": (-3600.0, 3600.0),
+    "elevation": (-3600.0, 3600.0),
+    "distance": (1e-3, 1e3),
+    "field-of-view": (1.0, 150.0),
+    "seconds": (0.1, 3600.0),
+    "sweep": (-3600.0, 3600.0),
+}
+"""Options with numbers, from and to. The command line's own check of bounds lets `nan` through."""
 SUFFIXES = {"still": ".png", "turntable": ".mp4", "fly": ".mp4"}
 
 
@@ -45,7 +56,7 @@ def parse_size(text: str, film: bool) -> tuple[int, int]:
     Raises:
         UserError: if it is no size, or odd numbers where a film is made (its colours are stored 2 x 2).
     """
-    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    match = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", text)
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if min(size) < 16 or (film and (size[0] % 2 or size[1] % 2)):
         expected = f"WIDTHxHEIGHT in pixels, at least 16{', even' if film else ''}"
@@ -53,6 +64,25 @@ def parse_size(text: str, film: bool) -> tuple[int, int]:
             "no size for a picture", place="--size", expected=expected, found=text, remedy="such as 1280x720"
         )
     return size
+
+
+def check_limits(**options: float) -> None:
+    """Refuse numbers of options beyond `LIMITS`, and those that are none.
+
+    Raises:
+        UserError: naming the option.
+    """
+    for name, value in options.items():
+        option = name.replace("_", "-")
+        low, high = LIMITS[option]
+        if not low <= value <= high:
+            raise UserError(
+                "a number out of bounds",
+                place=f"--{option}",
+                expected=f"{low:g} to {high:g}",
+                found=value,
+                remedy="choose one within",
+            )
 
 
 def parse_colour(text: str) -> tuple[float, float, float]:
@@ -115,6 +145,13 @@ def command(
     with report_user_errors("render"):
         width, height = parse_size(size, kind is not Kind.STILL)
         colour = parse_colour(background)
+        if samples * max(width, height) > LARGEST_SIDE:
+            expected = f"at most {LARGEST_SIDE // samples} pixels a side with --samples {samples}"
+            raise UserError(
+                "too large a picture", place="--size", expected=expected, found=size, remedy="a smaller one"
+            )
+        check_limits(azimuth=azimuth, elevation=elevation, distance=distance, field_of_view=field_of_view)
+        check_limits(seconds=seconds, sweep=sweep)
         if out.suffix.lower() != SUFFIXES[kind]:
             remedy = f"name a file that ends in {SUFFIXES[kind]}, or choose another --kind"
             raise UserError(f"the wrong kind of file for {kind.value}", file=out, remedy=remedy)

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
+from facefolds_core.asset.stored import is_folder
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.player import find_player
 from facefolds_core.serving import serving
@@ -46,7 +47,10 @@ def command(
 ) -> None:
     """Serve an asset and the web player to this machine only, and open the player. Ctrl+C ends it."""
     with report_user_errors("view"):
-        folder = (asset or latest_asset(data)).resolve()
+        folder = asset or latest_asset(data)
+        if not is_folder(folder):
+            raise UserError("no such folder", file=folder, expected="an asset's folder", remedy="name another one")
+        folder = folder.resolve()
         parse_manifest(folder / MANIFEST_NAME)
         with serving(find_player(), {"asset": folder}, port) as address:
             typer.echo(f"view: {folder}\nview: {address}  (Ctrl+C ends)")

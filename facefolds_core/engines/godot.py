@@ -9,7 +9,6 @@ A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from PIL import Image
 from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
 from facefolds_core.asset.manifest import Texture
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.asset.video import Picture, decode_video
+from facefolds_core.asset.video import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -45,6 +44,8 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
     Raises:
         UserError: if the folder holds anything else than an earlier export, or the asset's video is damaged.
     """
+    if folder.is_file():
+        raise UserError("a file stands where the folder is to be", file=folder, remedy="name another folder")
     if folder.exists() and any(folder.iterdir()) and not (folder / CONTENTS).is_file():
         raise UserError(
             "the folder is not empty, and holds no earlier export",
@@ -60,7 +61,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             (out / name).write_bytes(mesh_bytes(mesh))
             counts = {"vertices": len(mesh.vertices), "triangles": len(mesh.faces)}
             layers.append({"mesh": name, **counts, "texture_rect": list(entry.texture_rect)})
-        for number, picture in enumerate(_pictures(level)):
+        for number, picture in enumerate(level.pictures()):
             Image.fromarray(rgb_picture(picture, texture)).save(out / PICTURE.format(number), quality=QUALITY, method=4)
         contents = {
             "format": FORMAT,
@@ -94,9 +95,3 @@ def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
     x0, y0, w, h = texture.alpha_rect
     rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
     return rgb
-
-
-def _pictures(level: AssetLevel) -> Iterator[Picture]:
-    texture = level.entry.texture
-    path = level.folder / texture.videos[level.video].file
-    return decode_video(path, (texture.width, texture.height), texture.fps)

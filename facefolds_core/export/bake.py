@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.export.bake_kernel import PARTS, SCALE, accumulate, render, true_positions, update
+from facefolds_core.export.bake_kernel import SCALE, accumulate, render, true_positions, update
 from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
@@ -128,7 +128,7 @@ class Baker:
     ) -> None:
         self.rays, self._damping = rays, damping
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
-        self._sums: Float = np.zeros((PARTS, len(meshes), size, size, 6), np.float32)
+        self._sums: Float = np.zeros((len(meshes), size, size, 6), np.float32)
 
     def frame(self, textures: Image, samples: Image, iterations: int) -> Image:
         """One frame's textures.
@@ -148,7 +148,7 @@ class Baker:
         shown = values.copy()
         for _ in range(iterations):
             accumulate(self.rays.shipped, target, shown, self._sums)
-            update(values.reshape(-1, 4), self._sums.reshape(PARTS, -1, 6), self._damping, shown.reshape(-1, 4))
+            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._damping, shown.reshape(-1, 4))
         return np.stack([_finished(image) for image in shown])
 
 

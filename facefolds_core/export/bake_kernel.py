@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
-
-PARTS = 2
-"""Rays are worked on in this many parts, side by side, each with sums of its own: the result does not depend on the
-number of threads."""
+from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
 OPAQUE = 1e-3
 """Layers behind less than this transmittance are left out."""
@@ -20,7 +18,10 @@ SCALE = 65534.0
 """Texture coordinates in 16 bits: code = 1 + SCALE s, 0 where a ray misses the layer."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+_scatter = scatter_of(6)
+
+
+@inlined
 def _corner(code, size):  # type: ignore[no-untyped-def]
     """16-bit texture coordinate -> index of the texel before it, and the fraction beyond its centre; clamped."""
     x = min(max((code - 1) * (size / SCALE) - 0.5, 0.0), size - 1.0)
@@ -28,7 +29,7 @@ def _corner(code, size):  # type: ignore[no-untyped-def]
     return i, np.float32(x - i)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[n, i, j, q] * (one - b) + texture[n, i, j + 1, q] * b
@@ -36,13 +37,13 @@ def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def render(codes, texture, out):  # type: ignore[no-untyped-def]
     """codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255] -> out (P, 4) float32: rgb over black, transmittance."""
     height, width = texture.shape[1], texture.shape[2]
     scale = np.float32(1 / 255.0)
     one = np.float32(1.0)
-    for p in numba.prange(codes.shape[0]):
+    for p in prange(codes.shape[0]):
         through = one
         r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
         for n in range(codes.shape[1]):
@@ -59,116 +60,115 @@ def render(codes, texture, out):  # type: ignore[no-untyped-def]
         out[p, 0], out[p, 1], out[p, 2], out[p, 3] = r0, r1, r2, through
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
-def accumulate(  # type: ignore[no-untyped-def]
-    codes,  # (P, N, 2) uint16
-    target,  # (P, 4) float32: rgb over black and transmittance
-    texture,  # (N, H, W, 4) float32 in [0, 1]
-    sums,  # (PARTS, N, H, W, 6), added to
-):
+@kernel(parallel=True)
+def accumulate(codes, target, texture, sums):  # type: ignore[no-untyped-def]
     """Adds, for each texel: sum J r of its rgb and alpha, and sum |J| (row sum of |J|) of colour and of alpha.
 
     r = (C - C*, T - T*) of a ray, J its derivative by the texel's values. Returns the sum of |r|^2.
+
+    codes (P, N, 2) uint16, target (P, 4) float32: rgb over black and transmittance; texture (N, H, W, 4) float32 in
+    [0, 1]; sums (N, H, W, 6) are added to, each in the order of the rays: the result does not depend on the threads.
     """
+    layers, count = texture.shape[0], codes.shape[0]
+    squares = np.zeros((count + BLOCK - 1) // BLOCK)
+    index = np.empty((layers, CHUNK), np.int32)
+    wish = np.empty((layers, CHUNK, 8), np.float32)
+    for start in range(0, count, CHUNK):
+        own = min(CHUNK, count - start)
+        for block in prange((own + BLOCK - 1) // BLOCK):
+            first, last = block * BLOCK, min((block + 1) * BLOCK, own)
+            squares[start // BLOCK + block] = _residuals(
+                codes[start + first : start + last],
+                target[start + first : start + last],
+                texture,
+                index[:, first:last],
+                wish[:, first:last],
+            )
+        for task in prange(layers):
+            n = spread(task, layers)
+            _scatter(index[n, :own], wish[n, :own], sums[n])
+    total = 0.0  # not squares.sum(), which numba shares out among the threads
+    for block in range(squares.shape[0]):
+        total += squares[block]
+    return total
+
+
+@compiled
+def _residuals(codes: Any, target: Any, texture: Any, index: Any, wish: Any) -> Any:
+    """A block of R rays: texels before their hits (N, R), -1 where there is none, and what is to be added there
+    (N, R, 8): fractions of row and column, and the six sums. Returns the sum of |r|^2."""
     height, width, layers = texture.shape[1], texture.shape[2], texture.shape[0]
-    count = codes.shape[0]
-    totals = np.zeros(PARTS)
-    one = np.float32(1.0)
-    for part in numba.prange(PARTS):
-        own = sums[part]
-        layer = np.empty(layers, np.int64)
-        row = np.empty(layers, np.int64)
-        column = np.empty(layers, np.int64)
-        a = np.empty(layers, np.float32)
-        b = np.empty(layers, np.float32)
-        c = np.empty((layers, 4), np.float32)
-        before = np.empty(layers, np.float32)
-        slope = np.empty(layers, np.float32)
-        size = np.empty(layers, np.float32)
-        total = 0.0
-        for p in range(count * part // PARTS, count * (part + 1) // PARTS):
-            through = one
-            r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            m = 0
-            for n in range(layers):
-                if codes[p, n, 0] == 0:
-                    continue
-                j, fb = _corner(codes[p, n, 0], width)
-                i, fa = _corner(codes[p, n, 1], height)
-                alpha = _tap(texture, n, i, j, 3, fa, fb)
-                if alpha <= np.float32(0.0):
-                    continue
-                layer[m], row[m], column[m], a[m], b[m] = n, i, j, fa, fb
-                for q in range(3):
-                    c[m, q] = _tap(texture, n, i, j, q, fa, fb)
-                c[m, 3] = alpha
-                before[m] = through
-                weight = through * alpha
-                r0 += weight * c[m, 0]
-                r1 += weight * c[m, 1]
-                r2 += weight * c[m, 2]
-                through *= one - alpha
-                m += 1
-                if through < OPAQUE:
-                    break
-            d0, d1, d2 = r0 - target[p, 0], r1 - target[p, 1], r2 - target[p, 2]
-            d3 = through - target[p, 3]
-            total += d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3
-            # From the back: s is the colour, rest the transmittance of what lies behind a layer.
-            s0, s1, s2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            rest = one
-            norm = one - through
-            for q in range(m - 1, -1, -1):
-                alpha = c[q, 3]
-                g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
-                slope[q] = before[q] * (d0 * g0 + d1 * g1 + d2 * g2 - d3 * rest)
-                size[q] = before[q] * max(max(abs(g0), abs(g1)), max(abs(g2), rest))
-                norm += size[q]
-                rest *= one - alpha
-                s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
-            for q in range(m):
-                weight = before[q] * c[q, 3]
-                e0, e1, e2, e3 = weight * d0, weight * d1, weight * d2, slope[q]
-                e4, e5 = weight * norm, size[q] * norm
-                for tap in range(4):
-                    di, dj = tap >> 1, tap & 1
-                    w = (a[q] if di else one - a[q]) * (b[q] if dj else one - b[q])
-                    texel = own[layer[q], row[q] + di, column[q] + dj]
-                    texel[0] += w * e0
-                    texel[1] += w * e1
-                    texel[2] += w * e2
-                    texel[3] += w * e3
-                    texel[4] += w * e4
-                    texel[5] += w * e5
-        totals[part] = total
-    return totals.sum()
+    one, zero = np.float32(1.0), np.float32(0.0)
+    layer = np.empty(layers, np.int64)
+    c = np.empty((layers, 4), np.float32)
+    before, slope, size = np.empty(layers, np.float32), np.empty(layers, np.float32), np.empty(layers, np.float32)
+    total = 0.0
+    for p in range(codes.shape[0]):
+        through, r0, r1, r2 = one, zero, zero, zero
+        m = 0
+        for n in range(layers):
+            index[n, p] = -1
+        for n in range(layers):
+            if codes[p, n, 0] == 0:
+                continue
+            j, b = _corner(codes[p, n, 0], width)
+            i, a = _corner(codes[p, n, 1], height)
+            alpha = _tap(texture, n, i, j, 3, a, b)
+            if alpha <= zero:
+                continue
+            index[n, p] = i * width + j
+            wish[n, p, 0], wish[n, p, 1] = a, b
+            for q in range(3):
+                c[m, q] = _tap(texture, n, i, j, q, a, b)
+            c[m, 3] = alpha
+            layer[m], before[m] = n, through
+            weight = through * alpha
+            r0 += weight * c[m, 0]
+            r1 += weight * c[m, 1]
+            r2 += weight * c[m, 2]
+            through *= one - alpha
+            m += 1
+            if through < OPAQUE:
+                break
+        d0, d1, d2 = r0 - target[p, 0], r1 - target[p, 1], r2 - target[p, 2]
+        d3 = through - target[p, 3]
+        total += d0 * d0 + d1 * d1 + d2 * d2 + d3 * d3
+        # From the back: s is the colour, rest the transmittance of what lies behind a layer.
+        s0, s1, s2 = zero, zero, zero
+        rest = one
+        norm = one - through
+        for q in range(m - 1, -1, -1):
+            alpha = c[q, 3]
+            g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
+            slope[q] = before[q] * (d0 * g0 + d1 * g1 + d2 * g2 - d3 * rest)
+            size[q] = before[q] * max(max(abs(g0), abs(g1)), max(abs(g2), rest))
+            norm += size[q]
+            rest *= one - alpha
+            s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+        for q in range(m):
+            n, weight = layer[q], before[q] * c[q, 3]
+            wish[n, p, 2], wish[n, p, 3], wish[n, p, 4] = weight * d0, weight * d1, weight * d2
+            wish[n, p, 5], wish[n, p, 6], wish[n, p, 7] = slope[q], weight * norm, size[q] * norm
+    return total
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def update(values, sums, damping, shown):  # type: ignore[no-untyped-def]
-    """values (M, 4) -= sum J r / (damping + sum |J| row), in [0, 1]; sums (PARTS, M, 6) are zeroed.
+    """values (M, 4) -= sum J r / (damping + sum |J| row), in [0, 1]; sums (M, 6) are zeroed.
 
     shown (M, 4) becomes what 8 bits hold of values. Texels without rays stay as they are.
     """
-    for k in numba.prange(values.shape[0]):
-        colour, opacity = np.float32(0.0), np.float32(0.0)
-        for part in range(sums.shape[0]):
-            colour += sums[part, k, 4]
-            opacity += sums[part, k, 5]
-        if opacity > 0:
+    for k in prange(values.shape[0]):
+        if sums[k, 5] > 0:
             for q in range(4):
-                g = np.float32(0.0)
-                for part in range(sums.shape[0]):
-                    g += sums[part, k, q]
-                value = values[k, q] - g / ((colour if q < 3 else opacity) + np.float32(damping))
+                value = values[k, q] - sums[k, q] / (sums[k, 4 if q < 3 else 5] + np.float32(damping))
                 values[k, q] = min(max(value, np.float32(0.0)), np.float32(1.0))
                 shown[k, q] = np.rint(values[k, q] * np.float32(255.0)) * np.float32(1 / 255.0)
-            for part in range(sums.shape[0]):
-                for q in range(6):
-                    sums[part, k, q] = 0
+            for q in range(6):
+                sums[k, q] = 0
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def true_positions(vertices, faces, st, window, out):  # type: ignore[no-untyped-def]
     """Where each texel of a mesh's texture lies in the layer: out (H, W, 2) float32 columns and rows, in texels.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.export.bake_kernel import SCALE
+from facefolds_core.export.bake_kernel import OPAQUE, SCALE
 
 
 def look_up(codes: Tensor, texture: Tensor) -> Tensor:
@@ -19,6 +19,13 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     top = texture[n, i, j] * (1 - b) + texture[n, i, j + 1] * b
     bottom = texture[n, i + 1, j] * (1 - b) + texture[n, i + 1, j + 1] * b
     return (top * (1 - a) + bottom * a) * (codes[..., :1] > 0)
+
+
+def visible(rgba: Tensor) -> Tensor:
+    """[P, N, 4] -> the same without what lies behind less transmittance than OPAQUE, which a step leaves out."""
+    through = torch.cumprod(1 - rgba[..., 3].detach(), -1)
+    before = torch.cat([torch.ones_like(through[:, :1]), through[:, :-1]], -1)
+    return torch.where((before >= OPAQUE)[..., None], rgba, 0.0)
 
 
 def composite(rgba: Tensor) -> Tensor:
@@ -38,7 +45,7 @@ def accumulate(codes: Tensor, target: Tensor, texture: Tensor) -> tuple[Tensor, 
         texture: [N, H, W, 4].
     """
     texture = texture.detach().requires_grad_()
-    rgba = look_up(codes, texture)
+    rgba = visible(look_up(codes, texture))
     residual = composite(rgba) - target
     (gradient,) = torch.autograd.grad(0.5 * residual.square().sum(), texture, retain_graph=True)
     # Derivatives of a ray's four numbers by its layers' rgb and alpha, then |J| times the row's sum, at the texels.

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+
+from facefolds_core.jit import inlined, kernel
 
 TERMS = 21
 """Of a quadric in five dimensions: 15 of the symmetric matrix, 5 linear, 1 constant."""
@@ -18,7 +19,7 @@ MOST_NEIGHBOURS = 64
 """A collapse that would give a vertex more neighbours than this is not made."""
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def _add_face(quadric, p, q, r, weight):  # type: ignore[no-untyped-def]
     """Add weight times the squared distance from the plane through p, q, r (5,) to a quadric (21,)."""
     first = np.empty(5)
@@ -57,7 +58,7 @@ def _add_face(quadric, p, q, r, weight):  # type: ignore[no-untyped-def]
     quadric[20] += weight * (pp - p1 * p1 - p2 * p2)
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def build_quadrics(points, faces, weights):  # type: ignore[no-untyped-def]
     """points (V, L, 5), faces (F, 3), weights (F, L) -> (V, L, 21): sums over each vertex's faces, times their area."""
     quadrics = np.zeros((points.shape[0], points.shape[1], TERMS))
@@ -74,7 +75,7 @@ def build_quadrics(points, faces, weights):  # type: ignore[no-untyped-def]
     return quadrics
 
 
-@numba.njit(error_model="numpy", cache=True, inline="always")
+@inlined
 def _cost(a, b, x):  # type: ignore[no-untyped-def]
     """The sum of two quadrics (21,) at x (5,)."""
     x0, x1, x2, x3, x4 = x[0], x[1], x[2], x[3], x[4]
@@ -89,7 +90,7 @@ def _cost(a, b, x):  # type: ignore[no-untyped-def]
     return value
 
 
-@numba.njit(error_model="numpy", cache=True, inline="always")
+@inlined
 def _upright(st, directions, i, j, k, least):  # type: ignore[no-untyped-def]
     """Triangle (i, j, k) keeps its side both in the plane of (s, t) and seen from c."""
     area = (st[j, 0] - st[i, 0]) * (st[k, 1] - st[i, 1]) - (st[j, 1] - st[i, 1]) * (st[k, 0] - st[i, 0])
@@ -100,7 +101,7 @@ def _upright(st, directions, i, j, k, least):  # type: ignore[no-untyped-def]
     return det > 0.0
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def _neighbours(v, faces, alive, head, after, found):  # type: ignore[no-untyped-def]
     """Writes v's neighbours to `found`, unlinks its dead faces; returns how many (MOST_NEIGHBOURS if more)."""
     count = 0
@@ -130,7 +131,7 @@ def _neighbours(v, faces, alive, head, after, found):  # type: ignore[no-untyped
     return count
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def _may_collapse(v, w, faces, alive, head, after, st, directions, least):  # type: ignore[no-untyped-def]
     """Whether all of v's faces that do not hold w stay upright with w in the place of v."""
     corner = head[v]
@@ -146,7 +147,7 @@ def _may_collapse(v, w, faces, alive, head, after, st, directions, least):  # ty
     return True
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def _best(v, faces, alive, head, after, st, directions, borders, points, quadrics, least, around):  # type: ignore[no-untyped-def]
     """The cheapest neighbour that v may move onto, and its cost; -1 and infinity if there is none."""
     best, best_cost = -1, np.inf
@@ -163,7 +164,7 @@ def _best(v, faces, alive, head, after, st, directions, borders, points, quadric
     return best, best_cost
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def _sift(heap, place, keys, position, size):  # type: ignore[no-untyped-def]
     """Restore the order of the binary heap after the key at `position` changed."""
     v = heap[position]
@@ -187,7 +188,7 @@ def _sift(heap, place, keys, position, size):  # type: ignore[no-untyped-def]
     place[v] = position
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def collapse(  # type: ignore[no-untyped-def]
     st,  # (V, 2) float64
     directions,  # (V, 3) float64, unit
@@ -265,7 +266,7 @@ def collapse(  # type: ignore[no-untyped-def]
     return found
 
 
-@numba.njit(error_model="numpy", cache=True, inline="always")
+@inlined
 def _holds(corners, r, c):  # type: ignore[no-untyped-def]
     """Whether a triangle with corners (3, 2) in rows and columns holds the point (r, c), its border included."""
     e0 = (corners[1, 1] - corners[0, 1]) * (r - corners[0, 0]) - (corners[1, 0] - corners[0, 0]) * (c - corners[0, 1])
@@ -274,7 +275,7 @@ def _holds(corners, r, c):  # type: ignore[no-untyped-def]
     return (e0 <= 0 and e1 <= 0 and e2 <= 0) or (e0 >= 0 and e1 >= 0 and e2 >= 0)
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def locate(faces, n):  # type: ignore[no-untyped-def]
     """(n, n): the last of the faces (F, 3) over an n x n grid's vertices that holds each vertex; -1 without any."""
     found = np.full((n, n), -1, np.int64)
@@ -289,7 +290,7 @@ def locate(faces, n):  # type: ignore[no-untyped-def]
     return found
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def covers(faces, n, opaque):  # type: ignore[no-untyped-def]
     """(F, N) bool: faces (F, 3) that hold a vertex of the n x n grid with `opaque` (n, n, N), corners included."""
     found = np.zeros((faces.shape[0], opaque.shape[2]), np.bool_)

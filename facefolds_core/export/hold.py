@@ -17,7 +17,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.export.bake_kernel import PARTS
 from facefolds_core.export.hold_kernel import add_weights, hold
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.params import BakeParams
@@ -41,9 +40,9 @@ def texel_weights(
     chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, min(looked_at, len(frames)))})
     weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
     for frame in chosen:
-        sums = np.zeros((PARTS, *weights.shape), np.float32)
+        sums = np.zeros_like(weights)
         add_weights(codes, np.stack([textures.image(n, frame) for n in layers]).astype(np.float32), sums)
-        np.maximum(weights, sums.sum(0) / np.float32(cameras), out=weights)
+        np.maximum(weights, sums / np.float32(cameras), out=weights)
     return weights
 
 

@@ -2,65 +2,82 @@
 
 from __future__ import annotations
 
-import numba
+from typing import Any
+
 import numpy as np
+from numba import prange
 
-from facefolds_core.export.bake_kernel import FASTMATH, OPAQUE, PARTS, _corner, _tap
+from facefolds_core.export.bake_kernel import OPAQUE, _corner, _tap
+from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
+
+_scatter = scatter_of(2)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
     """Adds to each texel's sums, over all rays, share * (dC/dcolour)^2 and share * |dC/dalpha|^2 / 3.
 
     C is a ray's colour over black, in the texture's unit; the share is the texel's in the bilinear look-up, and the
     derivatives are those by the value looked up.
 
-    codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255], sums (PARTS, N, H, W, 2) float32.
+    codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255], sums (N, H, W, 2) float32.
     """
+    layers, count = texture.shape[0], codes.shape[0]
+    index = np.empty((layers, CHUNK), np.int32)
+    wish = np.empty((layers, CHUNK, 4), np.float32)
+    for start in range(0, count, CHUNK):
+        own = min(CHUNK, count - start)
+        for block in prange((own + BLOCK - 1) // BLOCK):
+            first, last = block * BLOCK, min((block + 1) * BLOCK, own)
+            _weigh(codes[start + first : start + last], texture, index[:, first:last], wish[:, first:last])
+        for task in prange(layers):
+            n = spread(task, layers)
+            _scatter(index[n, :own], wish[n, :own], sums[n])
+
+
+@compiled
+def _weigh(codes: Any, texture: Any, index: Any, wish: Any) -> None:
+    """A block of R rays: index (N, R) and wish (N, R, 4) as `scatter` takes them."""
     height, width, layers = texture.shape[1], texture.shape[2], texture.shape[0]
-    count = codes.shape[0]
-    scale, one = np.float32(1 / 255.0), np.float32(1.0)
-    for part in numba.prange(PARTS):
-        own = sums[part]
-        layer, row, column = np.empty(layers, np.int64), np.empty(layers, np.int64), np.empty(layers, np.int64)
-        a, b = np.empty(layers, np.float32), np.empty(layers, np.float32)
-        before, c = np.empty(layers, np.float32), np.empty((layers, 4), np.float32)
-        for p in range(count * part // PARTS, count * (part + 1) // PARTS):
-            through, m = one, 0
-            for n in range(layers):
-                if codes[p, n, 0] == 0:
-                    continue
-                column[m], b[m] = _corner(codes[p, n, 0], width)
-                row[m], a[m] = _corner(codes[p, n, 1], height)
-                layer[m], before[m] = n, through
-                for q in range(4):
-                    c[m, q] = _tap(texture, n, row[m], column[m], q, a[m], b[m]) * scale
-                through *= one - c[m, 3]
-                m += 1
-                if through < OPAQUE:
-                    break
-            s0, s1, s2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-            for q in range(m - 1, -1, -1):
-                g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
-                colour = (before[q] * c[q, 3]) ** 2
-                opacity = before[q] ** 2 * (g0 * g0 + g1 * g1 + g2 * g2) * np.float32(1 / 3.0)
-                s0, s1, s2 = s0 + c[q, 3] * g0, s1 + c[q, 3] * g1, s2 + c[q, 3] * g2
-                for tap in range(4):
-                    di, dj = tap >> 1, tap & 1
-                    w = (a[q] if di else one - a[q]) * (b[q] if dj else one - b[q])
-                    texel = own[layer[q], row[q] + di, column[q] + dj]
-                    texel[0] += w * colour
-                    texel[1] += w * opacity
+    scale, one, zero = np.float32(1 / 255.0), np.float32(1.0), np.float32(0.0)
+    layer = np.empty(layers, np.int64)
+    before, c = np.empty(layers, np.float32), np.empty((layers, 4), np.float32)
+    for p in range(codes.shape[0]):
+        through, m = one, 0
+        for n in range(layers):
+            index[n, p] = -1
+        for n in range(layers):
+            if codes[p, n, 0] == 0:
+                continue
+            j, b = _corner(codes[p, n, 0], width)
+            i, a = _corner(codes[p, n, 1], height)
+            index[n, p] = i * width + j
+            wish[n, p, 0], wish[n, p, 1] = a, b
+            layer[m], before[m] = n, through
+            for q in range(4):
+                c[m, q] = _tap(texture, n, i, j, q, a, b) * scale
+            through *= one - c[m, 3]
+            m += 1
+            if through < OPAQUE:
+                break
+        s0, s1, s2 = zero, zero, zero
+        for q in range(m - 1, -1, -1):
+            n = layer[q]
+            g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
+            wish[n, p, 2] = (before[q] * c[q, 3]) ** 2
+            wish[n, p, 3] = before[q] ** 2 * (g0 * g0 + g1 * g1 + g2 * g2) * np.float32(1 / 3.0)
+            s0, s1, s2 = s0 + c[q, 3] * g0, s1 + c[q, 3] * g1, s2 + c[q, 3] * g2
 
 
-@numba.njit(error_model="numpy", inline="always")
+@inlined
 def _fill(x, first, last, value):  # type: ignore[no-untyped-def]
     for i in range(first, last + 1):
         x[i] = value
     return last + 1
 
 
-@numba.njit(error_model="numpy", cache=True)
+@kernel
 def steady(y, price, x):  # type: ignore[no-untyped-def]
     """x = argmin 1/2 sum (x_k - y_k)^2 + price sum |x_k - x_(k-1)|: Condat 2013, direct, (K,) each.
 
@@ -110,14 +127,14 @@ def steady(y, price, x):  # type: ignore[no-untyped-def]
                 over = -price
 
 
-@numba.njit(error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def hold(images, weights, price):  # type: ignore[no-untyped-def]
     """images (K, H, W, 4) uint8, in place: each channel of each texel `steady` in time, at price / weight.
 
     weights (H, W, 2) float32 of colour and of alpha; a texel without weight keeps its mean.
     """
     count, height, width = images.shape[0], images.shape[1], images.shape[2]
-    for row in numba.prange(height):
+    for row in prange(height):
         y, x = np.empty(count), np.empty(count)
         for column in range(width):
             for q in range(4):

@@ -10,7 +10,8 @@ from __future__ import annotations
 import os
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -73,8 +74,19 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool =
         if workers == 1:
             return [_advance(bar, _reconstruct_job(job)) for job in jobs]
         # spawn: a fork of a process that has run torch or pymeshlab threads may hang.
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool:
             return [_advance(bar, result) for result in pool.map(_reconstruct_job, jobs)]
+
+
+def _end_with_parent() -> None:
+    """A process of the pool whose parent is killed would wait for its next layer for ever."""
+
+    def wait() -> None:
+        if (parent := parent_process()) is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
 
 
 def _advance(bar: Any, result: Reconstruction) -> Reconstruction:

@@ -11,8 +11,6 @@ Layers are outermost first. Every array is checked when it is read: shape, type,
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -21,12 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
-
-_REMEDY = "delete it and run `dvc repro`, which makes it again"
+from facefolds_core.reading import remake
 
 
 @dataclass(frozen=True)
@@ -198,18 +196,13 @@ def _write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
 
 def _read(path: Path, names: set[str] | None = None) -> dict[str, NDArray[Any]]:
     """The archive's arrays by name; all, or those of `names` that are there."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files if names is None or name in names}
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy="run `dvc repro`, which makes it") from None
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, TypeError, RuntimeError) as error:
-        # TypeError: a lone array is no archive. RuntimeError: flags that make zipfile look for a password.
-        raise UserError("a damaged geometry file", file=path, found=str(error), remedy=_REMEDY) from None
+    return read_npz(path, "a damaged geometry file", names)
 
 
 def _damaged(path: Path, name: str, expected: object, found: object) -> UserError:
-    return UserError("a damaged geometry file", file=path, place=name, expected=expected, found=found, remedy=_REMEDY)
+    return UserError(
+        "a damaged geometry file", file=path, place=name, expected=expected, found=found, remedy=remake(path)
+    )
 
 
 def _shape(arrays: dict[str, NDArray[Any]], path: Path, name: str, axes: int = 1) -> tuple[int, ...]:

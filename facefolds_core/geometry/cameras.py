@@ -18,6 +18,9 @@ from facefolds_core.geometry.similarity import Similarity
 
 Array = NDArray[np.float64]
 
+HUGE = 1e9
+"""No number of a calibration is larger: a million kilometres in millimetres."""
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -99,21 +102,26 @@ def check_camera(camera: Camera, file: object, place: str) -> None:
         UserError: if K is singular or not finite, or R is not a rotation (tolerance 1e-3), naming `file` and `place`.
     """
     remedy = "mend the calibration of this camera, or take the camera out of the capture"
-    if not (np.isfinite(camera.K).all() and np.isfinite(camera.w2c).all()):
+    numbers = np.concatenate([camera.K.ravel(), camera.w2c.ravel()])
+    if not (np.abs(numbers) <= HUGE).all():
+        finite = bool(np.isfinite(numbers).all())
         raise UserError(
-            "the camera has numbers that are not finite",
+            f"the camera has numbers that are {'beyond sense' if finite else 'not finite'}",
             file=str(file),
             place=place,
-            expected="finite K and [R|t]",
+            expected=f"finite K and [R|t], no number above {HUGE:g}",
+            found=f"{float(np.abs(numbers).max()):g}",
             remedy=remedy,
         )
     K = camera.K
-    if min(K[0, 0], K[1, 1]) <= 0 or abs(np.linalg.det(K)) < 1e-9 or not np.allclose(K[2], [0, 0, 1]):
+    fx, fy = K[0, 0], K[1, 1]
+    slanted = abs(K[1, 0]) > 1e-6 * fy or abs(K[0, 1]) > fx
+    if min(fx, fy) <= 1e-3 or max(fx, fy) > 10 * min(fx, fy) or slanted or not np.allclose(K[2], [0, 0, 1]):
         raise UserError(
             "the intrinsic matrix K is singular or not a pinhole camera's",
             file=str(file),
             place=place,
-            expected="positive focal lengths, last row 0 0 1",
+            expected="fx 0 cx, 0 fy cy, 0 0 1: positive focal lengths, less than tenfold different",
             found=K.tolist(),
             remedy=remedy,
         )

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
+
+from facefolds_core.jit import inlined, kernel
 
 Array = NDArray[Any]
 
-_FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
 _TO_UV = 2.0 / math.pi
 
 
-@numba.njit(fastmath=_FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _grid_position(x, y, z, r, window, rows, columns):  # type: ignore[no-untyped-def]
     """Row and column (continuous, node 0 at the window's top left corner) of direction (x, y, z) / r."""
     u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
@@ -25,7 +26,7 @@ def _grid_position(x, y, z, r, window, rows, columns):  # type: ignore[no-untype
     return row, column
 
 
-@numba.njit(fastmath=_FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
     """Bilinear radius of one layer; the position lies inside the grid."""
     i = min(int(row), rho.shape[0] - 2)
@@ -72,7 +73,7 @@ def ceiling(rho: Array, window: Array) -> Array:
     return top
 
 
-@numba.njit(fastmath=_FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def crossing_distances(
     offsets: Array,  # (R, 3) ray origins minus c, float64
     directions: Array,  # (R, 3) unit, float64
@@ -92,7 +93,7 @@ def crossing_distances(
     rows, columns = rho.shape[0], rho.shape[1]
     cells = ceiling.shape[0]
     result = np.zeros((count, layers), np.float32)
-    for ray in numba.prange(count):
+    for ray in prange(count):
         ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
         dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
         along = ox * dx + oy * dy + oz * dz
@@ -186,7 +187,7 @@ def crossing_distances(
     return result
 
 
-@numba.njit(fastmath=_FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def texture_positions(
     offsets: Array,  # (R, 3) float64
     directions: Array,  # (R, 3) float64
@@ -195,7 +196,7 @@ def texture_positions(
 ) -> Array:
     """(R, N, 2) uint16: s and t of the crossings over the window as 1 + 65534 s, 1 + 65534 t; 0 where missed."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
-    for ray in numba.prange(distance.shape[0]):
+    for ray in prange(distance.shape[0]):
         for n in range(distance.shape[1]):
             d = distance[ray, n]
             if d == 0.0:

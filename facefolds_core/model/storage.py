@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,13 +14,14 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.errors import UserError, disk_error, is_disk_error
+from facefolds_core.files import atomic_file, read_json, write_json
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.textures import MlpTextures
+from facefolds_core.reading import check_regular, no_memory
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 
@@ -133,18 +137,39 @@ def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
     return RadianceManifolds(manifolds, textures)
 
 
+def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:
+    """Write a safetensors file, whole or not at all.
+
+    Raises:
+        OSError: where the disk fails, as for every other file; safetensors has an error of its own for it.
+    """
+    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    with atomic_file(path) as temporary:
+        try:
+            save_file(tensors, str(temporary), metadata=metadata)
+        except SafetensorError as error:
+            number = re.search(r"os error (\d+)", str(error))
+            if number is None:
+                raise
+            code = int(number[1])
+            raise OSError(code, os.strerror(code)) from None
+
+
 def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Tensors and metadata of a safetensors file, on the CPU.
 
     Raises:
         UserError: if the file is missing or damaged.
     """
+    check_regular(path, remedy)
     try:
         with safe_open(str(path), "pt") as file:
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=remedy) from None
-    except (SafetensorError, OSError) as error:
+    except MemoryError:
+        raise no_memory(path) from None
+    except (SafetensorError, OSError, ValueError, OverflowError, RuntimeError) as error:
+        if is_disk_error(error):
+            raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
         raise UserError(
             "damaged file", file=path, expected="a whole safetensors file", found=str(error), remedy=remedy
         ) from None
@@ -181,8 +206,7 @@ def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: P
 
 def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:
     """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in model.state_dict().items()}
-    save_file(tensors, str(folder / "model.safetensors"), metadata={"spec": spec.model_dump_json()})
+    write_tensors(folder / "model.safetensors", model.state_dict(), {"spec": spec.model_dump_json()})
     write_json(folder / "model.json", spec.model_dump(mode="json"))
 
 
@@ -193,6 +217,7 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
         UserError: if it is missing, garbled or of another kind.
     """
     path = folder / "model.json"
+    check_regular(path, _REMEDY)
     value: Any = read_json(path, remedy=_REMEDY)
     try:
         return _SPEC.validate_python(value)

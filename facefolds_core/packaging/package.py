@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +39,7 @@ from facefolds_core.asset.writer import (
     write_level,
 )
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.export.between import at_frame_rate
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -49,7 +51,7 @@ from facefolds_core.packaging.levels import Decimate, coarse_content, level_para
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import ViewMeter, spread, training_cameras
-from facefolds_core.params import CompressParams, CrfSearchParams, VideoCodec
+from facefolds_core.params import CompressParams, CrfSearchParams, LevelParams, VideoCodec
 from facefolds_core.rendering.reference import AssetCaster, composite
 
 
@@ -76,6 +78,7 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
     Raises:
         UserError: if the export cannot be an asset.
     """
+    _check_order(params.levels)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
     cameras = training_cameras(scene)
@@ -98,6 +101,18 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
         photos = _photos(temporary, scene, params, factor)
         manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos, params.jpeg_quality)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
+
+
+def _check_order(levels: Sequence[LevelParams]) -> None:
+    """Refuse levels that are clearly not in the format's order, which readers would refuse."""
+    for coarse, fine in pairwise(levels):
+        if coarse.mesh_resolution > fine.mesh_resolution and coarse.texture_resolution > fine.texture_resolution:
+            raise UserError(
+                "the levels of detail are in the wrong order",
+                place=f"compress.levels: {coarse.name}, {fine.name}",
+                expected="the coarsest first",
+                remedy="change their order in params.yaml",
+            )
 
 
 def make_meter(content: LevelContent, cameras: Sequence[Camera], params: CompressParams) -> ViewMeter | None:
@@ -124,7 +139,7 @@ def _level(
     crfs = None
     if meter is not None and video.target_psnr is not None and not video.lossless:
         search, target = params.search, video.target_psnr
-        crfs = {codec: _crf(content, CODECS[codec], video, meter, target, search) for codec in video.codec}
+        crfs = {codec: _crf(folder, content, CODECS[codec], video, meter, target, search) for codec in video.codec}
     level = write_level(folder, name, content, params, crfs)
     if meter is None:
         return level
@@ -149,6 +164,7 @@ def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) ->
 
 
 def _crf(
+    folder: Path,
     content: LevelContent,
     codec: Codec,
     video: VideoCodec,
@@ -157,7 +173,7 @@ def _crf(
     search: CrfSearchParams,
 ) -> int:
     layout = content.layout
-    with TemporaryDirectory() as scratch:
+    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:

@@ -18,6 +18,7 @@ from facefolds_core.params.export import BakeParams, DecimateParams, Reconstruct
 from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.renamed import EXPLICIT
 from facefolds_core.params.train import TrainParams, TrainSection
+from facefolds_core.parsing import brief
 
 SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "capture": (CaptureParams,),
@@ -82,10 +83,10 @@ def user_error(
         kind = next(k for k in kinds if k.model_fields["model"].default == names[0])
         names = names[1:]
     remedy = f"mend it; {REFERENCE} describes all keys"
-    expected, found = first["msg"].removeprefix("Value error, "), repr(first["input"])
+    expected, found = first["msg"].removeprefix("Value error, "), brief(first["input"])
     if first["type"] == "extra_forbidden":
         expected, remedy = _unknown_key(kind, names, remedy)
-        found = names[-1]
+        found = brief(names[-1]) if len(names[-1]) > 100 else names[-1]
     where = ".".join([place, *names])
     return UserError("a parameter is wrong", file=file, place=where, expected=expected, found=found, remedy=remedy)
 

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.jit import kernel
 from facefolds_core.rendering.reference import Hits, Mesh
 
 EDGE = 1e-9
@@ -57,7 +57,7 @@ def cast_layers(camera: Camera, layers: Any) -> Hits:
     return Hits(hit, st)
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@kernel(nogil=True)
 def _draw(  # type: ignore[no-untyped-def]
     corners,  # (V, 3) float64, camera axes
     pixels,  # (V, 2) float64, their projections

@@ -17,11 +17,11 @@ import pyarrow.parquet as pq
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.reading import check_regular, is_there, no_memory
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 
 STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
-    "configure": ("config",),
     "capture": ("capture",),
     "normalize": ("scene",),
     "train": ("model", "training"),
@@ -142,8 +142,9 @@ def read_mapping(path: Path) -> dict[str, Any] | None:
     Raises:
         UserError: if it is not JSON, or no object.
     """
-    if not path.is_file():
+    if not is_there(path):
         return None
+    check_regular(path, REMEDY)
     value = read_json(path, remedy=REMEDY)
     if not isinstance(value, dict):
         found = type(value).__name__
@@ -157,12 +158,15 @@ def read_images(path: Path) -> tuple[ImageScores, ...]:
     Raises:
         UserError: if it is damaged or lacks columns.
     """
-    if not path.is_file():
+    if not is_there(path):
         return ()
+    check_regular(path, REMEDY)
     columns = ["camera", "frame", "variant", "psnr", "psnr_subject"]
     try:
         rows = pq.read_table(path, columns=columns).to_pylist()
-    except (pa.ArrowException, OSError, KeyError) as error:
+    except MemoryError:
+        raise no_memory(path) from None
+    except (pa.ArrowException, OSError, KeyError, ValueError, TypeError, OverflowError) as error:
         raise UserError("damaged scores", file=path, found=str(error), remedy=REMEDY) from None
     return tuple(
         ImageScores(row["camera"], row["frame"], finite(row["psnr"]), finite(row["psnr_subject"]))

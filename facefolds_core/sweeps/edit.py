@@ -9,10 +9,12 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import YAMLError
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.params_file import load_params
+from facefolds_core.parsing import brief
 
 
 def set_for_subject(path: Path, subject: str, values: Mapping[str, Any]) -> None:
@@ -30,7 +32,13 @@ def set_for_subject(path: Path, subject: str, values: Mapping[str, Any]) -> None
     yaml.preserve_quotes = True
     yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
-    tree = yaml.load(path.read_text(encoding="utf-8"))
+    try:
+        tree = yaml.load(path.read_text(encoding="utf-8"))
+    except (YAMLError, ValueError, TypeError) as error:  # ruamel reads YAML 1.2, `load_params` 1.1, as DVC does
+        remedy = "write the values that it names in another way"
+        raise UserError(
+            "YAML that cannot be changed in place", file=path, found=brief(str(error)), remedy=remedy
+        ) from None
     for name, value in values.items():
         *folders, key = name.split(".")
         place = tree["subjects"][subject]

@@ -21,6 +21,7 @@ import pyarrow.parquet as pa_parquet
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
+from facefolds_core.parsing import parse_json
 
 NAMES = ("experiment", "revision", "subject", "error")
 SUFFIXES = (".parquet", ".csv")
@@ -125,17 +126,7 @@ def _run(row: dict[str, Any], path: Path) -> Run:
 def _value(value: Any, name: str, path: Path) -> Any:
     if not isinstance(value, str):
         return value
-    try:
-        return json.loads(value)
-    except json.JSONDecodeError:
-        raise UserError(
-            "garbled parameter",
-            file=path,
-            place=f"column {name}",
-            expected="JSON",
-            found=value,
-            remedy="collect it again",
-        ) from None
+    return parse_json(value, path, f"column {name} holds something that is no JSON: collect it again")
 
 
 def _union(mappings: Any) -> list[str]:

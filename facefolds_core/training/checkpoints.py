@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors.torch import save_file
 from torch import Tensor
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
 from facefolds_core.model.radiance import RadianceManifolds
-from facefolds_core.model.storage import check_tensors, read_tensors
+from facefolds_core.model.storage import check_tensors, read_tensors, write_tensors
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"
@@ -35,6 +34,7 @@ class TrainingState:
         generator: draws rays; on the CPU.
         iteration: steps done.
         seconds: spent on them, over all runs.
+        psnr: last logged, dB.
     """
 
     model: RadianceManifolds
@@ -42,6 +42,7 @@ class TrainingState:
     generator: torch.Generator
     iteration: int = 0
     seconds: float = 0.0
+    psnr: float = 0.0
 
 
 def fingerprint(params: TrainParams, scene: Scene) -> str:
@@ -84,10 +85,8 @@ def save_checkpoint(state: TrainingState, mark: str, folder: Path) -> Path:
         mark: the run's `fingerprint`.
     """
     path = folder / CHECKPOINT
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in _state_tensors(state).items()}
-    metadata = {"fingerprint": mark, "iteration": str(state.iteration), "seconds": repr(state.seconds)}
-    with atomic_file(path) as temporary:
-        save_file(tensors, str(temporary), metadata=metadata)
+    numbers = {"iteration": state.iteration, "seconds": state.seconds, "psnr": state.psnr}
+    write_tensors(path, _state_tensors(state), {"fingerprint": mark} | {name: repr(x) for name, x in numbers.items()})
     return path
 
 
@@ -108,6 +107,9 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
             found=f"fingerprint {metadata.get('fingerprint')}",
             remedy=remedy,
         )
+    numbers = metadata.get("iteration", ""), metadata.get("seconds", ""), metadata.get("psnr", "")
+    if not numbers[0].isdecimal() or not _is_finite(numbers[1]) or float(numbers[1]) < 0 or not _is_finite(numbers[2]):
+        raise UserError("a damaged checkpoint", file=path, place="iteration, seconds, psnr", remedy=remedy)
     _fill_optimiser(state)
     check_tensors(tensors, _state_tensors(state), path, remedy)
     state.model.load_state_dict(
@@ -118,8 +120,15 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
             for moment in _MOMENTS:
                 state.optimiser.state[parameter][moment].copy_(tensors[f"optimiser.{moment}.{name}"])
     state.generator.set_state(tensors["generator"])
-    state.iteration = int(metadata["iteration"])
-    state.seconds = float(metadata["seconds"])
+    state.iteration, state.seconds = int(metadata["iteration"]), float(metadata["seconds"])
+    state.psnr = float(metadata["psnr"])
+
+
+def _is_finite(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _fill_optimiser(state: TrainingState) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 import time
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import torch
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
-from facefolds_core.errors import UserError
+from facefolds_core.errors import UserError, is_disk_error
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
@@ -26,8 +28,9 @@ from facefolds_core.training.checkpoints import (
     load_checkpoint,
     save_checkpoint,
 )
-from facefolds_core.training.log import open_log
+from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.losses import Losses, batch_losses
+from facefolds_core.training.patience import patiently
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.start import Start, find_start, fit_outline
@@ -151,7 +154,7 @@ def begin(scene: Scene, params: MlpParams, checkpoints: Path) -> TrainingRun:
 class _Progress:
     """Log (dvclive) and progress bar: averages over the iterations since the last line."""
 
-    def __init__(self, params: MlpParams, folder: Path, iteration: int) -> None:
+    def __init__(self, params: MlpParams, folder: Path, iteration: int, psnr: float) -> None:
         self.params = params
         self.every = max(1, min(100, params.iterations // LOG_POINTS))
         _trim_log(folder, iteration)
@@ -160,7 +163,7 @@ class _Progress:
         self.sums: list[float] = []
         self.count = 0
         self.since = time.perf_counter()
-        self.psnr = 0.0
+        self.psnr = psnr
 
     def update(self, losses: Losses, iteration: int) -> None:
         values = [float(value.detach()) for value in asdict_shallow(losses).values()]
@@ -173,14 +176,11 @@ class _Progress:
         self.psnr = -10 * math.log10(max(means.pop("squared_error"), 1e-10))
         now = time.perf_counter()
         rates = learning_rates(self.params, iteration - 1)
-        self.live.step = iteration
-        for name, value in means.items():
-            self.live.log_metric(f"loss/{name}", value)
-        self.live.log_metric("psnr", self.psnr)
-        self.live.log_metric("lr/manifold", rates["manifold"])
-        self.live.log_metric("lr/texture", rates["texture"])
-        self.live.log_metric("rays_per_second", self.count * self.params.rays / (now - self.since))
-        self.live.make_summary()
+        metrics = {f"loss/{name}": value for name, value in means.items()}
+        metrics |= {"psnr": self.psnr, "lr/manifold": rates["manifold"], "lr/texture": rates["texture"]}
+        metrics["rays_per_second"] = self.count * self.params.rays / (now - self.since)
+        log_metrics(self.live, iteration, metrics)
+        patiently(self.live.make_summary)
         self.bar.set_postfix_str(f"PSNR {self.psnr:.2f} dB", refresh=False)
         self.count, self.since = 0, now
 
@@ -219,9 +219,18 @@ def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path
     state = run.state
     rays = state.iteration * params.rays
     report = make_report(state.seconds, state.iteration, run.sampler.device, params.preset, rays, psnr)
-    with atomic_folder(model_folder) as temporary:
-        save_model(state.model, run.spec, temporary)
-        write_json(temporary / "training.json", asdict(report))
+
+    def write() -> None:
+        with atomic_folder(model_folder) as temporary:
+            save_model(state.model, run.spec, temporary)
+            write_json(temporary / "training.json", asdict(report))
+
+    try:
+        patiently(write)
+    except OSError:
+        with suppress(OSError):  # the one before stays
+            save_checkpoint(state, run.mark, run.checkpoints)
+        raise
     shutil.rmtree(run.checkpoints, ignore_errors=True)
     return report
 
@@ -238,7 +247,7 @@ def _move_to_mesh(state: TrainingState, params: MlpParams, start: Start) -> None
 def _finish(run: TrainingRun, params: MlpParams, log: Path) -> float:
     """All remaining iterations; returns the PSNR of the last log interval."""
     state = run.state
-    progress = _Progress(params, log, state.iteration)
+    progress = _Progress(params, log, state.iteration, state.psnr)
     saved = last = time.perf_counter()
     try:
         while state.iteration < params.iterations:
@@ -247,8 +256,22 @@ def _finish(run: TrainingRun, params: MlpParams, log: Path) -> float:
             now = time.perf_counter()
             state.seconds, last = state.seconds + now - last, now
             if now - saved > params.checkpoint_seconds:
-                save_checkpoint(state, run.mark, run.checkpoints)
+                state.psnr = progress.psnr
+                _checkpoint(run)
                 saved = now
     finally:
         progress.close()
+    state.psnr = progress.psnr
     return progress.psnr
+
+
+def _checkpoint(run: TrainingRun) -> None:
+    """Save one; where the disk fails the one before stays, and training goes on: there may be room at its end."""
+    try:
+        save_checkpoint(run.state, run.mark, run.checkpoints)
+    except OSError as error:
+        if not is_disk_error(error):
+            raise
+        sys.stderr.write(
+            f"\ntrain: no checkpoint at iteration {run.state.iteration}: {error.strerror} ({error.filename})\n"
+        )

@@ -30,8 +30,8 @@ def subject(tmp_path: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(name)
     for stage in [*RUN, "evaluate"]:
-        folder = root / "config"
-        folder.mkdir(exist_ok=True)
+        folder = SubjectFolders(root).config
+        folder.mkdir(parents=True, exist_ok=True)
         section = {"resolution": 64} if stage != "compress" else {"levels": [1]}
         (folder / f"{stage}.json").write_text(json.dumps(section))
     return root
@@ -106,9 +106,9 @@ def test_the_key_follows_configuration_and_data(subject: Path, tmp_path: Path) -
 
     first = key(16)
     assert key(16) == first and key(17) != first
-    (subject / "config" / "bake.json").write_text('{"resolution": 65}')
+    (SubjectFolders(subject).config / "bake.json").write_text('{"resolution": 65}')
     assert key(16) != first
-    (subject / "config" / "bake.json").write_text('{"resolution": 64}')
+    (SubjectFolders(subject).config / "bake.json").write_text('{"resolution": 64}')
     assert key(16) == first
     (subject / "surfaces" / "file").write_text("others")
     assert key(16) != first

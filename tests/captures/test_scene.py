@@ -17,7 +17,7 @@ from facefolds_core.geometry.similarity import Similarity
 
 def scene(folder: Path) -> Scene:
     K = np.array([[100 / 3, 0, 20.1], [0, 31.7, 30.3], [0, 0, 1]])
-    cameras = tuple(Camera(name, K, np.eye(3, 4) + 1 / 7, 40, 60) for name in "abc")
+    cameras = tuple(Camera(name, K, np.concatenate([np.eye(3), np.full((3, 1), 1 / 7)], 1), 40, 60) for name in "abc")
     return Scene(
         subject="head",
         cameras=cameras,

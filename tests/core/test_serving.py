@@ -20,6 +20,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         "player/index.html": b"<!doctype html>",
         "player/page.js": b"1",
         "player/draco/decoder.wasm": b"\0asm",
+        "asset/manifest.json": b'{"levels": [{"file": "full.mp4"}]}',
         "asset/full.mp4": bytes(range(200)),
         "secret": b"not to be seen",
     }.items():

@@ -10,7 +10,7 @@ import torch
 
 from facefolds_core.export import bake_reference
 from facefolds_core.export.bake import Baker, cast_codes, gather_rays, reproject, reprojection
-from facefolds_core.export.bake_kernel import PARTS, SCALE, accumulate, render, update
+from facefolds_core.export.bake_kernel import SCALE, accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.sampling import sample_grids, texture_rows
 from facefolds_core.export.sheets import grid_sheets
@@ -46,13 +46,14 @@ def test_rendering_is_that_of_the_reference(problem: tuple[np.ndarray, np.ndarra
 
 def test_the_step_is_that_of_the_reference(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     codes, target, texture = problem
-    sums = np.zeros((PARTS, 3, 7, 9, 6), np.float32)
+    texture[..., 3] **= 0.2  # a few rays end before the last layer
+    sums = np.zeros((3, 7, 9, 6), np.float32)
     squares = accumulate(codes, target, texture, sums)
     expected, total = bake_reference.accumulate(
         torch.tensor(codes.astype(np.int32)), torch.tensor(target), torch.tensor(texture)
     )
-    assert squares == pytest.approx(float(total), rel=1e-4)
-    assert np.abs(sums.sum(0) - expected.numpy()).max() < 2e-3 * float(expected.abs().max())
+    assert squares == pytest.approx(float(total), rel=1e-6)
+    assert np.abs(sums - expected.numpy()).max() < 1e-5  # seen 1.9e-6, of sums up to 10.7
 
 
 def test_a_texel_without_rays_or_without_opacity_stays() -> None:
@@ -61,9 +62,9 @@ def test_a_texel_without_rays_or_without_opacity_stays() -> None:
     codes = np.full((1, 1, 2), 1 + int(SCALE * 0.5), np.uint16)
     codes[0, 0, 1] = 1 + int(SCALE * 0.8)
     before, shown = texture.copy(), texture.copy()
-    sums = np.zeros((PARTS, 1, 8, 8, 6), np.float32)
+    sums = np.zeros((1, 8, 8, 6), np.float32)
     accumulate(codes, np.ones((1, 4), np.float32), texture, sums)
-    update(texture.reshape(-1, 4), sums.reshape(PARTS, -1, 6), 0.05, shown.reshape(-1, 4))
+    update(texture.reshape(-1, 4), sums.reshape(-1, 6), 0.05, shown.reshape(-1, 4))
     changed = np.argwhere((texture != before).any(-1))
     assert set(changed[:, 1]) <= {5, 6}
     assert set(changed[:, 2]) <= {3, 4}
@@ -73,8 +74,8 @@ def test_a_texel_without_rays_or_without_opacity_stays() -> None:
 
 def test_what_is_shown_has_eight_bits() -> None:
     values, shown = np.full((1, 4), 0.3, np.float32), np.zeros((1, 4), np.float32)
-    sums = np.zeros((PARTS, 1, 6), np.float32)
-    sums[0, 0] = [0.1, 0.1, 0.1, 0.1, 0.95, 0.95]
+    sums = np.zeros((1, 6), np.float32)
+    sums[0] = [0.1, 0.1, 0.1, 0.1, 0.95, 0.95]
     update(values, sums, 0.05, shown)
     assert values[0] == pytest.approx([0.2] * 4)
     assert shown[0] * 255 == pytest.approx([51.0] * 4)

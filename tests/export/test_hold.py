@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from facefolds_core.export.bake_kernel import PARTS, render
+from facefolds_core.export.bake_kernel import render
 from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.hold_kernel import add_weights, steady
 from facefolds_core.frame_store import FrameStore, write_frames
@@ -47,9 +47,9 @@ def test_weights_are_squared_derivatives() -> None:
     rng = np.random.default_rng(1)
     texture = rng.uniform(30, 200, (3, 5, 5, 4)).astype(np.float32)
     codes = np.full((1, 3, 2), round(1 + 65534 * 0.5), np.uint16)
-    sums = np.zeros((PARTS, 3, 5, 5, 2), np.float32)
+    sums = np.zeros((3, 5, 5, 2), np.float32)
     add_weights(codes, texture, sums)
-    weights = sums.sum(0)
+    weights = sums
 
     def colour(layer: int, channel: int, change: float) -> np.ndarray:
         moved, out = texture.copy(), np.empty((1, 4), np.float32)

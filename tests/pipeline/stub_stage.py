@@ -15,16 +15,17 @@ import yaml
 
 
 def main() -> None:
-    stage, subject = Path(sys.argv[0]).stem, sys.argv[2]
+    stage, subject = os.environ["DVC_STAGE"].split("@")
     with Path(os.environ["RAN"]).open("a") as file:
         file.write(f"{stage}\n")
-    config = Path("data", subject, "config")
+    config = Path("data", ".config", subject)
     resolution = {
         name: json.loads((config / f"{name}.json").read_text())["resolution"] for name in ("decimate", "texture")
     }
     if stage == "texture" and resolution["texture"] == 13:
         sys.exit("texture: error: 13 is unlucky")
     stages = yaml.safe_load(Path("dvc.yaml").read_text().replace("${key}", subject))["stages"]
+    del stages["configure"]
     wanted = {dep for other in stages.values() for dep in other["do"]["deps"]}
     deps = sorted(dep for dep in stages[stage]["do"]["deps"] if dep.startswith("data/"))
     digest = hashlib.sha256()

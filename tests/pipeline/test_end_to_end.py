@@ -55,7 +55,7 @@ def test_a_texture_resolution_reruns_three_stages(project: TinyProject) -> None:
     project.write_params(PARAMS.replace("texture: {resolution: 32}", "texture: {resolution: 48}"))
     status, output = project.repro("evaluate@actor")
     assert status == 0, output
-    assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
+    assert stages_run(output) == ["configure", *EXPORT_OF_TEXTURES]
 
 
 def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
@@ -63,7 +63,7 @@ def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
     project.write_params(PARAMS.replace("    holdout: {every: 4}\n", override, 1))
     status, output = project.repro("evaluate@actor")
     assert status == 0, output
-    assert stages_run(output) == ["configure@actor", *EXPORT_OF_TEXTURES]
+    assert stages_run(output) == ["configure", *EXPORT_OF_TEXTURES]
 
 
 def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
@@ -71,7 +71,7 @@ def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
     project.write_params(before.replace("compress: {}", "compress: {frame_rate_factor: 2}"))
     status, output = project.repro("evaluate@actor")
     assert status == 0, output
-    assert stages_run(output) == ["configure@actor", "compress@actor", "evaluate@actor"]
+    assert stages_run(output) == ["configure", "compress@actor", "evaluate@actor"]
     assert "2 of the asset's 4 frames have photos" in output
     texture = json.loads((project.root / "data/actor/asset/manifest.json").read_text())["levels"][-1]["texture"]
     assert (texture["frames"], texture["fps"]) == (4, 60)
@@ -129,7 +129,7 @@ def test_mistakes_in_params_stop_with_one_message(project: TinyProject, params: 
         status, output = project.repro("evaluate@actor")
     finally:
         project.write_params(before)
-        project.repro("configure@actor")
+        project.repro("configure")
     assert status != 0
     assert says in output
     assert "Traceback" not in output

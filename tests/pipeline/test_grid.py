@@ -31,11 +31,10 @@ class GridProject:
         skip = shutil.ignore_patterns("__pycache__", "tmp", "cache", "config.local")
         for name in ("facefolds_core", ".dvc"):
             shutil.copytree(source / name, root / name, ignore=skip)
-        for name in ("params.yaml", ".gitignore", ".dvcignore"):
+        for name in ("dvc.yaml", "params.yaml", ".gitignore", ".dvcignore"):
             shutil.copy(source / name, root)
-        (root / "dvc.yaml").write_text((source / "dvc.yaml").read_text().split("\nplots:")[0] + "\n")
         (root / "stages").mkdir()
-        for name in ("__init__", "common", "configure", "collect"):
+        for name in ("__init__", "common", "configure"):
             shutil.copy(source / "stages" / f"{name}.py", root / "stages")
         for name in COMPUTING:
             shutil.copy(STUB, root / "stages" / f"{name}.py")

@@ -56,7 +56,8 @@ class TinyProject:
         skip = shutil.ignore_patterns("__pycache__", "*.pyc")
         for name in ("stages", "facefolds_core"):
             shutil.copytree(source / name, root / name, ignore=skip)
-        shutil.copy(source / "dvc.yaml", root)
+        for name in ("dvc.yaml", ".dvcignore"):
+            shutil.copy(source / name, root)
         (root / ".dvc").mkdir()
         (root / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
         self.write_params(params)

@@ -28,7 +28,7 @@ def subject(tmp_path_factory: pytest.TempPathFactory) -> SubjectFolders:
 @pytest.fixture
 def copy(subject: SubjectFolders, tmp_path: Path) -> SubjectFolders:
     """The same, to spoil."""
-    return SubjectFolders(Path(shutil.copytree(subject.root, tmp_path / "somebody")))
+    return SubjectFolders(shutil.copytree(subject.root.parent, tmp_path / "data") / "somebody")
 
 
 def page_of(folders: SubjectFolders) -> str:
@@ -70,7 +70,7 @@ def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
         ("evaluation", "dvc repro evaluate@somebody"),
         ("training", "dvc repro train@somebody"),
         ("waterfall", "python -m bench.export_waterfall --subjects somebody"),
-        ("config", "dvc repro configure@somebody"),
+        ("../.config", "dvc repro configure"),
     ],
 )
 def test_what_is_missing_is_said_with_the_command_that_makes_it(copy: SubjectFolders, gone: str, command: str) -> None:
@@ -83,6 +83,7 @@ def test_with_scores_and_asset_alone_there_is_a_page(copy: SubjectFolders) -> No
     for path in copy.root.iterdir():
         if path.is_dir() and path != copy.asset:
             shutil.rmtree(path)
+    shutil.rmtree(copy.config)
     assert page_of(copy).count('class="missing"') == 6
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 import torch
 
+from facefolds_core import scatter
 from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.model.grids import GridTextures
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 
@@ -31,51 +34,71 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
     }
 
 
+FAST = ExplicitParams()
+OPACITY, LATE, RATE = FAST.losses.opacity, FAST.losses.late_opacity, FAST.background.rate
+SETTINGS = {
+    "rounds of geometry": (OPACITY, 0.0, RATE, 0.0),
+    "textures": (OPACITY * LATE, FAST.losses.binarisation, RATE, FAST.textures.min_alpha),
+    "stronger": (0.02, 0.05, RATE, 0.05),
+}
+"""Prices of opacity and half opacity, the background's rate, what is faint: as in production, and one that shows."""
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
 @pytest.mark.parametrize("rays, layers, shape", [(1, 1, (2, 2)), (300, 3, (7, 5)), (1000, 12, (16, 24))])
-def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int]) -> None:
+def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int], setting: str) -> None:
+    """With the settings of `fast`, and alphas of which a third is faint: what a GPU trains is what a CPU trains."""
     p = _problem(rays, layers, shape)
-    gradient = np.zeros((shading_kernel.PARTS, *shape, layers, 4), np.float32)
+    p["texture"][..., 3] *= np.random.default_rng(1).choice([0.003, 0.3, 1.9], (*shape, layers))
+    gradient = np.zeros((layers, *shape, 4), np.float32)
     before = torch.from_numpy(p["background"][0].copy())
-    squares = shading_kernel.shade(*p.values(), gradient, 0.02, 0.05, 0.5, 0.0)
+    squares = shading_kernel.shade(*p.values(), gradient, *SETTINGS[setting])
     target = torch.from_numpy(p["images"][0]).float() / 255
     codes = torch.from_numpy(p["codes"].astype(np.int32))
-    expected, moved, total = reference.shade(codes, target, before, torch.from_numpy(p["texture"]), 0.02, 0.05, 0.5)
-    # Worst seen: the kernel stops behind a transmittance of 0.002, 4e-3 of a ray's gradient.
-    torch.testing.assert_close(torch.from_numpy(gradient.sum(0)), expected, atol=2e-2, rtol=1e-3)
-    torch.testing.assert_close(torch.from_numpy(p["background"][0]), moved, atol=1e-5, rtol=0)
-    assert squares == pytest.approx(float(total), rel=1e-3)
+    expected, moved, total = reference.shade(codes, target, before, torch.from_numpy(p["texture"]), *SETTINGS[setting])
+    # Worst seen 1.4e-6 of gradients up to 2.3; 1.8 by a reference that does not leave out what is faint.
+    torch.testing.assert_close(torch.from_numpy(gradient).permute(1, 2, 0, 3), expected, atol=1e-5, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(p["background"][0]), moved, atol=1e-6, rtol=0)  # seen: 1.2e-7
+    assert squares == pytest.approx(float(total), rel=1e-5)  # seen: 4e-7
 
 
 def test_contributions_match_the_reference() -> None:
     p = _problem(500, 5, (9, 7))
-    peak = np.zeros((shading_kernel.PARTS, 9, 7, 5), np.float32)
+    p["texture"][..., 3] *= 1.9
+    peak = np.zeros((5, 9, 7), np.float32)
     shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak)
     expected = reference.contributions(torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]))
-    # The kernel stops behind a transmittance of 0.002.
-    torch.testing.assert_close(torch.from_numpy(peak.max(0)), expected, atol=2e-3, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(peak), expected, atol=1e-6, rtol=0)  # seen: 2.7e-7
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])
 def test_shading_at_extreme_alphas(alpha: float) -> None:
     p = _problem(50, 4, (6, 6))
     p["texture"][..., 3] = alpha
-    gradient = np.zeros((shading_kernel.PARTS, 6, 6, 4, 4), np.float32)
+    gradient = np.zeros((4, 6, 6, 4), np.float32)
     assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.1, 0.1, 0.5, 0.0))
     assert np.isfinite(gradient).all()
 
 
 def test_shading_does_not_depend_on_the_number_of_threads() -> None:
-    import numba
-
     results = []
-    for threads in (1, 2):
+    for threads in (1, 2, 4):
         numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
-        p = _problem(1000, 6, (9, 9))
-        gradient = np.zeros((shading_kernel.PARTS, 9, 9, 6, 4), np.float32)
-        shading_kernel.shade(*p.values(), gradient, 0.0, 0.0, 0.5, 0.0)
-        results.append(gradient)
+        p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
+        gradient = np.zeros((6, 9, 9, 4), np.float32)
+        squares = shading_kernel.shade(*p.values(), gradient, 0.0, 0.0, 0.5, 0.0)
+        peak = np.zeros((6, 9, 9), np.float32)
+        shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak)
+        results.append((gradient, p["background"], peak, squares))
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    np.testing.assert_array_equal(results[0], results[1])
+    for other in results[1:]:
+        for a, b in zip(results[0], other, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("layers", range(1, 20))
+def test_every_layer_is_somebodys_task(layers: int) -> None:
+    assert sorted(scatter.spread(task, layers) for task in range(layers)) == list(range(layers))
 
 
 def test_adam_step_matches_the_reference() -> None:
@@ -85,9 +108,9 @@ def test_adam_step_matches_the_reference() -> None:
     for part in parts:
         part[2].abs_()
     parts[0][0].clamp_(0, 1)
-    gradient = torch.randn(2, m, n, 4)
-    gradient[:, torch.rand(m, n) < 0.4] = 0
-    gradient[:, :5] = 0
+    gradient = torch.randn(m, n, 4)
+    gradient[torch.rand(m, n) < 0.4] = 0
+    gradient[:5] = 0
     texture = reference.activate(*(p[0] for p in parts))
     out = np.empty((m, n, 4), np.float32)
     adam_kernel.activate(*(p[0].numpy() for p in parts), out)
@@ -98,12 +121,12 @@ def test_adam_step_matches_the_reference() -> None:
     adam_kernel.adam_step(
         *(p.numpy() for p in compiled),
         texture.numpy(),
-        gradient.clone().numpy(),
+        gradient.permute(1, 0, 2).contiguous().numpy(),
         rates.numpy(),
         np.float32(keep),
         correct.numpy(),
     )
-    reference.adam_step(*parts, texture, gradient.sum(0), rates, keep, correct)
+    reference.adam_step(*parts, texture, gradient, rates, keep, correct)
     for a, b in zip(compiled, parts, strict=True):
         torch.testing.assert_close(a, b, atol=1e-5, rtol=1e-4)
 

@@ -36,7 +36,7 @@ def _problem(rays: int = 120) -> dict[str, np.ndarray]:
 def test_looking_and_its_gradient_match_autograd() -> None:
     p = _problem()
     rgb, through = room_kernel.look(p["origins"], p["directions"], p["jitter"], p["grid"], RADIUS, STEP, FARTHEST)
-    gradient = np.zeros((kernel.PARTS, *p["grid"].shape), np.float32)
+    gradient, touched = kernel.empty_gradient(p["grid"].shape)
     room_kernel.splat(
         *(p[k] for k in ("origins", "directions", "jitter", "grid")),
         RADIUS,
@@ -46,6 +46,7 @@ def test_looking_and_its_gradient_match_autograd() -> None:
         p["beyond"],
         p["slope"],
         gradient,
+        touched,
     )
     t = {name: torch.from_numpy(value).double() for name, value in p.items()}
     t["grid"].requires_grad_()

@@ -76,3 +76,11 @@ def test_nothing_solid_is_no_body() -> None:
     assert not body_at_centre(volume, 0.15, 0.1).any()
     assert cut_share(volume, PARAMS) == 0
     assert positions(replace(volume, lower=np.zeros(3)))[0, 0, 0].tolist() == [0, 0, 0]
+
+
+def test_faint_hair_stays_where_there_is_no_room_and_no_other_body() -> None:
+    head, hair = _ball(0.1, 0.0, 0.0, 0.0), _ball(0.2, 0.0, 0.0, 0.0)
+    volume = _volume((hair, -3.0), (head, 5.0))
+    assert subject_of(volume, PARAMS).grid[30, 30, 42, 0] < -10
+    volume.room.outer = False
+    assert subject_of(volume, PARAMS).grid[30, 30, 42, 0] == -3.0

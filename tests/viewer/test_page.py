@@ -56,7 +56,7 @@ def test_the_address_follows_the_view(new_player: NewPlayer, rich: Path) -> None
     player = new_player({"asset": rich})
     player.open("asset")
     player.run("e.spread = 0.25; await e.step(2)")
-    player.page.wait_for_function("location.hash.includes('spread=0.25') && location.hash.includes('frame=2')")
+    player.page.wait_for_function("() => location.hash.includes('spread=0.25') && location.hash.includes('frame=2')")
 
 
 def test_nonsense_in_the_address_is_left_out(new_player: NewPlayer, rich: Path) -> None:

@@ -12,7 +12,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.jit import compiled
 from facefolds_core.captures.actor.noise import (
     Vector,
     clamp,
@@ -22,6 +21,7 @@ from facefolds_core.captures.actor.noise import (
     smoothstep,
     value_noise,
 )
+from facefolds_core.jit import compiled
 
 _CENTRE_Y, _CENTRE_Z = 25.0, -12.0
 # Unit axis through the crown, and two unit vectors across it.

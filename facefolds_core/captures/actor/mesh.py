@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.jit import kernel, source_digest
 from facefolds_core.captures.actor.motion import NOSE, pose_at
 from facefolds_core.captures.actor.shape import trace
+from facefolds_core.jit import kernel
 
 Array = NDArray[np.float64]
 
@@ -42,23 +41,14 @@ class TrackedMesh:
     uv: NDArray[np.float32]
 
 
-def _build(digest: int) -> Callable[[Array, Array, Array, float], Array]:
-    """The kernel; `digest` of the sources is part of its cache key (see jit.kernel)."""
-
-    @kernel
-    def cut(origins: Array, directions: Array, pose: Array, far: float) -> Array:
-        """Distances (V,) along rays (V, 3), head mm, to the first crossing."""
-        assert digest >= 0
-        hits = np.empty(len(origins))
-        for i in prange(len(origins)):
-            o, d = origins[i], directions[i]
-            hits[i] = trace(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, far, pose)
-        return hits
-
-    return cut
-
-
-_cut = _build(source_digest())
+@kernel(parallel=True)
+def _cut(origins: Array, directions: Array, pose: Array, far: float) -> Array:
+    """Distances (V,) along rays (V, 3), head mm, to the first crossing."""
+    hits = np.empty(len(origins))
+    for i in prange(len(origins)):
+        o, d = origins[i], directions[i]
+        hits[i] = trace(o[0], o[1], o[2], d[0], d[1], d[2], 0.0, far, pose)
+    return hits
 
 
 def _rays() -> tuple[Array, Array, NDArray[np.float32]]:

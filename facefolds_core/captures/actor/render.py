@@ -8,7 +8,6 @@ only.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,13 +15,13 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.hair import STEP, density, envelope, hair_colour
-from facefolds_core.captures.actor.jit import compiled, kernel, source_digest
 from facefolds_core.captures.actor.motion import BALL, NOSE, head_pose, pose_at
 from facefolds_core.captures.actor.noise import Vector
 from facefolds_core.captures.actor.room import room_colour
 from facefolds_core.captures.actor.shade import surface_colour
 from facefolds_core.captures.actor.shape import normal, surface, trace
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.jit import compiled, kernel
 
 Array = NDArray[np.float64]
 
@@ -186,50 +185,41 @@ def _differs(image: Array, i: int, j: int) -> bool:
     return False
 
 
-def _build(digest: int) -> Callable[..., tuple[Array, Array]]:
-    """The kernel; `digest` of the sources is part of its cache key (see jit.kernel)."""
-
-    @kernel
-    def render_samples(
-        height: int,
-        width: int,
-        to_world: Array,
-        centre: Array,
-        frame: Array,
-        pose: Array,
-        lights: Array,
-        settings: Array,
-        seed: int,
-    ) -> tuple[Array, Array]:
-        """(H, W, 5) red, green, blue, opacity and ray distance at pixel centres, and (H, W, 4) anti-aliased."""
-        assert digest >= 0
-        first = np.empty((height, width, 5))
-        for i in prange(height):
-            for j in range(width):
-                r, g, b, a, t = _sample(j + 0.5, i + 0.5, to_world, centre, frame, pose, lights, settings, seed)
-                first[i, j, 0], first[i, j, 1], first[i, j, 2] = min(r, 1.0), min(g, 1.0), min(b, 1.0)
-                first[i, j, 3], first[i, j, 4] = a, t
-        smooth = np.empty((height, width, 4))
-        for i in prange(height):
-            for j in range(width):
-                smooth[i, j] = first[i, j, :4]
-                if _differs(first, i, j):
-                    for k in range(3):
-                        # A triangle about the centre, turned so that no two samples share a row or a column.
-                        angle = 2.0 * math.pi * (k / 3.0 + 0.04)
-                        u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
-                        r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
-                        smooth[i, j, 0] += min(r, 1.0)
-                        smooth[i, j, 1] += min(g, 1.0)
-                        smooth[i, j, 2] += min(b, 1.0)
-                        smooth[i, j, 3] += a
-                    smooth[i, j] *= 0.25
-        return first, smooth
-
-    return render_samples
-
-
-_render_samples = _build(source_digest())
+@kernel(parallel=True)
+def _render_samples(
+    height: int,
+    width: int,
+    to_world: Array,
+    centre: Array,
+    frame: Array,
+    pose: Array,
+    lights: Array,
+    settings: Array,
+    seed: int,
+) -> tuple[Array, Array]:
+    """(H, W, 5) red, green, blue, opacity and ray distance at pixel centres, and (H, W, 4) anti-aliased."""
+    first = np.empty((height, width, 5))
+    for i in prange(height):
+        for j in range(width):
+            r, g, b, a, t = _sample(j + 0.5, i + 0.5, to_world, centre, frame, pose, lights, settings, seed)
+            first[i, j, 0], first[i, j, 1], first[i, j, 2] = min(r, 1.0), min(g, 1.0), min(b, 1.0)
+            first[i, j, 3], first[i, j, 4] = a, t
+    smooth = np.empty((height, width, 4))
+    for i in prange(height):
+        for j in range(width):
+            smooth[i, j] = first[i, j, :4]
+            if _differs(first, i, j):
+                for k in range(3):
+                    # A triangle about the centre, turned so that no two samples share a row or a column.
+                    angle = 2.0 * math.pi * (k / 3.0 + 0.04)
+                    u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
+                    r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
+                    smooth[i, j, 0] += min(r, 1.0)
+                    smooth[i, j, 1] += min(g, 1.0)
+                    smooth[i, j, 2] += min(b, 1.0)
+                    smooth[i, j, 3] += a
+                smooth[i, j] *= 0.25
+    return first, smooth
 
 
 def render(camera: Camera, time: float, options: ActorOptions | None = None, seed: int = 0) -> Picture:

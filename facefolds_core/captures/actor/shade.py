@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.hair import envelope
-from facefolds_core.captures.actor.jit import compiled
 from facefolds_core.captures.actor.motion import BLINK, BROW, GAZE_X, GAZE_Y
 from facefolds_core.captures.actor.noise import Vector, clamp, hash3, mix, smoothstep, value_noise
 from facefolds_core.captures.actor.shape import (
@@ -28,6 +27,7 @@ from facefolds_core.captures.actor.shape import (
     mouth_gap,
     to_rest,
 )
+from facefolds_core.jit import compiled
 
 
 @compiled

@@ -15,9 +15,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.jit import compiled
 from facefolds_core.captures.actor.motion import BALL, BLINK, BROW, JAW, NOSE, SMILE
 from facefolds_core.captures.actor.noise import Vector, clamp, cone, ellipsoid, smooth_max, smooth_min, smoothstep
+from facefolds_core.jit import compiled
 
 SKIN, EYE, TEETH, TONGUE, SHIRT, PROP = range(6)
 """Materials."""

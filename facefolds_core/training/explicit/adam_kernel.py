@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+from numba import prange
 
-from facefolds_core.training.explicit.shading_kernel import FASTMATH
+from facefolds_core.jit import inlined, kernel
 
 BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def activate(colour, layers, frame_colour, frame_alpha, out):  # type: ignore[no-untyped-def]
     """(M, 3), (M, N, 4), (M, 3), (M, N) -> out (M, N, 4): rgb and alpha in [0, 1], see `GridTextures`."""
-    for k in numba.prange(layers.shape[0]):
+    for k in prange(layers.shape[0]):
         for n in range(layers.shape[1]):
             for q in range(3):
                 value = colour[k, q] + frame_colour[k, q] + layers[k, n, q]
@@ -21,7 +21,7 @@ def activate(colour, layers, frame_colour, frame_alpha, out):  # type: ignore[no
             out[k, n, 3] = 1 / (1 + np.exp(-(layers[k, n, 3] + frame_alpha[k, n])))
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _adam(values, first, second, index, g, rate, correct1, correct2, keep):  # type: ignore[no-untyped-def]
     """One Adam step on values[index], then shrinking by `keep`."""
     first[index] = np.float32(BETA1) * first[index] + np.float32(1 - BETA1) * g
@@ -30,46 +30,37 @@ def _adam(values, first, second, index, g, rate, correct1, correct2, keep):  # t
     values[index] = (values[index] - step) * keep
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def adam_step(  # type: ignore[no-untyped-def]
     colour,  # (3, M, 3): values, first and second moments
     layers,  # (3, M, N, 4)
     frame_colour,  # (3, M, 3)
     frame_alpha,  # (3, M, N)
     texture,  # (M, N, 4) as activated
-    gradient,  # (PARTS, M, N, 4) with respect to `texture`; zero afterwards
+    gradient,  # (N, M, 4) with respect to `texture`; zero afterwards
     rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
     keep,  # factor by which the frames' parts shrink each step
     correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
 ):
     """Adam on the texels that the rays have met; the others stay as they are, moments included."""
     count, layers_n = layers.shape[1], layers.shape[2]
-    parts = gradient.shape[0]
     colour0, colour1, colour2 = colour[0], colour[1], colour[2]
     layers0, layers1, layers2 = layers[0], layers[1], layers[2]
     frame0, frame1, frame2 = frame_colour[0], frame_colour[1], frame_colour[2]
     fade0, fade1, fade2 = frame_alpha[0], frame_alpha[1], frame_alpha[2]
     one = np.float32(1.0)
     # The clamp passes the gradient on: a colour at its border can come back.
-    for k in numba.prange(count):
+    for k in prange(count):
         sum0 = np.float32(0.0)
         sum1 = np.float32(0.0)
         sum2 = np.float32(0.0)
         met = False
         for n in range(layers_n):
-            g0 = np.float32(0.0)
-            g1 = np.float32(0.0)
-            g2 = np.float32(0.0)
-            g3 = np.float32(0.0)
-            for p in range(parts):
-                g0 += gradient[p, k, n, 0]
-                g1 += gradient[p, k, n, 1]
-                g2 += gradient[p, k, n, 2]
-                g3 += gradient[p, k, n, 3]
-                for q in range(4):
-                    gradient[p, k, n, q] = 0
+            g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
             if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
                 continue
+            for q in range(4):
+                gradient[n, k, q] = 0
             met = True
             sum0 += g0
             sum1 += g1

@@ -28,10 +28,11 @@ from facefolds_core.training.explicit.cameras import CameraChoice, choose_camera
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Level, plan
-from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
 from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
 from facefolds_core.training.explicit.warnings import warnings_of
-from facefolds_core.training.log import open_log
+from facefolds_core.training.log import log_metrics, open_log
+from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.volume.fit import Volume, iterations
 from facefolds_core.training.volume.search import find_subject
@@ -57,21 +58,27 @@ def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
+        check_space(model_folder, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
+        patiently(live.make_summary)
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
         time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
     )
-    with atomic_folder(model_folder) as temporary:
-        save_model(model, spec, temporary)
-        write_json(temporary / "training.json", asdict(report))
-        write_json(temporary / "fit.json", trainer.summary(spec))
-        draw_fit(temporary / "fit.png", fit, spec.num_layers, params.start.subject_opacity)
+
+    def write() -> None:
+        with atomic_folder(model_folder) as temporary:
+            save_model(model, spec, temporary)
+            write_json(temporary / "training.json", asdict(report))
+            write_json(temporary / "fit.json", trainer.summary(spec))
+            draw_fit(temporary / "fit.png", fit, spec.num_layers, params.start.subject_opacity)
+
+    patiently(write)
     return report
 
 
@@ -189,9 +196,7 @@ class _Trainer:
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
             if i % 10 == 9:
-                live.step = self.iteration
-                live.log_metric("psnr", self.psnr)
-                live.log_metric("texel_rows", level.texels[0])
+                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
         return True

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2, EPSILON
+from facefolds_core.training.explicit.shading_kernel import OPAQUE
 
 
 def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:
@@ -33,8 +34,15 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
 
 
+def visible(alpha: Tensor, faint: float) -> Tensor:
+    """[R, N] bool: layers with at least `faint` of alpha that do not lie behind less transmittance than OPAQUE."""
+    through = (1 - torch.where(alpha >= faint, alpha, 0.0)).cumprod(1)
+    before = torch.cat([torch.ones_like(alpha[:, :1]), through[:, :-1]], 1)
+    return (alpha >= faint) & (before >= OPAQUE)
+
+
 def contributions(codes: Tensor, texture: Tensor) -> Tensor:
-    """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [H, W, N]."""
+    """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [N, H, W]."""
     height, width, layers, _ = texture.shape
     x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
     y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
@@ -42,14 +50,14 @@ def contributions(codes: Tensor, texture: Tensor) -> Tensor:
     alpha = look_up(codes, texture)[..., 3]
     before = torch.cat([torch.ones_like(alpha[:, :1]), (1 - alpha).cumprod(1)[:, :-1]], 1)
     n = torch.arange(layers, device=texture.device).expand_as(i)
-    hit = codes[..., 0] > 0
+    hit = (codes[..., 0] > 0) & visible(alpha, 0.0)
     peak = texture.new_zeros(height * width * layers)
     for di, wi in ((0, 1 - (y - i)), (1, y - i)):
         for dj, wj in ((0, 1 - (x - j)), (1, x - j)):
-            index = ((i + di) * width + j + dj) * layers + n
+            index = (n * height + i + di) * width + j + dj
             share = before * wi * wj * texture[i + di, j + dj, n, 3]
             peak.scatter_reduce_(0, index[hit], share[hit], "amax")
-    return peak.view(height, width, layers)
+    return peak.view(layers, height, width)
 
 
 def shade(
@@ -60,12 +68,14 @@ def shade(
     veil: float,
     solid: float,
     rate: float,
+    faint: float,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
     texture = texture.detach().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
-        weights, through = compositing_weights(rgba[..., 3])
+        alpha = torch.where(visible(rgba[..., 3].detach(), faint), rgba[..., 3], 0.0)
+        weights, through = compositing_weights(alpha)
         colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * background
         squares = (colour - target).square().sum()
         nearly = through.clamp(max=0.5)

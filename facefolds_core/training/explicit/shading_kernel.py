@@ -1,26 +1,28 @@
-"""Shading of stored crossings, forwards and backwards in one pass, compiled for CPUs. Reference: `reference.py`."""
+"""Shading of stored crossings, forwards and backwards, compiled for CPUs. Reference: `reference.py`.
+
+For how threads share the work see `facefolds_core.scatter`."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 
+from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
+
 Array = NDArray[Any]
-
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
-
-PARTS = 2
-"""Rays are shaded in this many parts, side by side, each with a gradient of its own: the result does not depend on the
-number of threads."""
 
 OPAQUE = 0.002
 """Layers behind less than this transmittance are left out."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+_scatter = scatter_of(4)
+
+
+@inlined
 def _corner(code, size):  # type: ignore[no-untyped-def]
     """16-bit position over the window -> index of the texel before it, and the fraction beyond its centre."""
     x = min(max((code - 1) * (size / 65534.0) - 0.5, 0.0), size - 1.0)
@@ -28,7 +30,7 @@ def _corner(code, size):  # type: ignore[no-untyped-def]
     return i, np.float32(x - i)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
@@ -36,7 +38,7 @@ def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
     codes,  # (P, N, 2) uint16: 1 + 65534 s, 1 + 65534 t of the crossing with each layer; 0 where missed
     camera,  # (P,) int32
@@ -45,7 +47,7 @@ def shade(  # type: ignore[no-untyped-def]
     images,  # (C, H W, 3) uint8
     background,  # (C, H W, 3) float32, updated in place
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
-    gradient,  # (PARTS, H, W, N, 4), added to
+    gradient,  # (N, H, W, 4), added to
     veil,  # weight of opacity
     solid,  # weight of rays that are nearly, but not quite, opaque
     rate,  # of the background
@@ -57,110 +59,139 @@ def shade(  # type: ignore[no-untyped-def]
     C = sum_i w_i c_i + T B. Each pixel's background moves by -rate T^3 (C - I): in proportion to the cube of the
     transmittance, so that it cannot explain what the layers have begun to explain.
     """
-    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    count = rays.shape[0]
-    parts = gradient.shape[0]
-    sums = np.zeros(parts)
-    one = np.float32(1.0)
-    for part in numba.prange(parts):
-        own = gradient[part]
-        layer = np.empty(layers, np.int64)
-        row = np.empty(layers, np.int64)
-        column = np.empty(layers, np.int64)
-        a = np.empty(layers, np.float32)
-        b = np.empty(layers, np.float32)
-        c = np.empty((layers, 4), np.float32)
-        before = np.empty(layers, np.float32)
-        total = 0.0
-        for k in range(count * part // parts, count * (part + 1) // parts):
-            p = rays[k]
-            through = one
-            r0 = np.float32(0.0)
-            r1 = np.float32(0.0)
-            r2 = np.float32(0.0)
-            m = 0
-            for n in range(layers):
-                if codes[p, n, 0] == 0:
-                    continue
-                j, fb = _corner(codes[p, n, 0], width)
-                i, fa = _corner(codes[p, n, 1], height)
-                alpha = _tap(texture, i, j, n, 3, fa, fb)
-                if alpha < faint:
-                    continue
-                layer[m], row[m], column[m], a[m], b[m] = n, i, j, fa, fb
-                for q in range(3):
-                    c[m, q] = _tap(texture, i, j, n, q, fa, fb)
-                c[m, 3] = alpha
-                before[m] = through
-                r0 += through * alpha * c[m, 0]
-                r1 += through * alpha * c[m, 1]
-                r2 += through * alpha * c[m, 2]
-                through *= one - alpha
-                m += 1
-                if through < OPAQUE:
-                    break
-            cam, pix = camera[p], pixel[p]
-            inverse = np.float32(1 / 255.0)
-            s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
-            d0 = r0 + through * s0 - images[cam, pix, 0] * inverse
-            d1 = r1 + through * s1 - images[cam, pix, 1] * inverse
-            d2 = r2 + through * s2 - images[cam, pix, 2] * inverse
-            total += d0 * d0 + d1 * d1 + d2 * d2
-            step = np.float32(rate) * through * through * through
-            background[cam, pix, 0] = min(max(s0 - step * d0, np.float32(0.0)), one)
-            background[cam, pix, 1] = min(max(s1 - step * d1, np.float32(0.0)), one)
-            background[cam, pix, 2] = min(max(s2 - step * d2, np.float32(0.0)), one)
-            # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
-            push = np.float32(veil - solid * max(1 - 2 * through, np.float32(0.0)))
-            rest = one
-            for q in range(m - 1, -1, -1):
-                alpha = c[q, 3]
-                light = before[q]
-                slope = d0 * (c[q, 0] - s0) + d1 * (c[q, 1] - s1) + d2 * (c[q, 2] - s2) + push * rest
-                rest *= one - alpha
-                s0 = alpha * c[q, 0] + (one - alpha) * s0
-                s1 = alpha * c[q, 1] + (one - alpha) * s1
-                s2 = alpha * c[q, 2] + (one - alpha) * s2
-                e0, e1, e2, e3 = light * alpha * d0, light * alpha * d1, light * alpha * d2, light * slope
-                for tap in range(4):
-                    di, dj = tap >> 1, tap & 1
-                    w = (a[q] if di else one - a[q]) * (b[q] if dj else one - b[q])
-                    i, j, n = row[q] + di, column[q] + dj, layer[q]
-                    own[i, j, n, 0] += w * e0
-                    own[i, j, n, 1] += w * e1
-                    own[i, j, n, 2] += w * e2
-                    own[i, j, n, 3] += w * e3
-        sums[part] = total
-    return sums.sum()
+    layers, count = texture.shape[2], rays.shape[0]
+    squares = np.zeros((count + BLOCK - 1) // BLOCK)
+    index = np.empty((layers, CHUNK), np.int32)
+    wish = np.empty((layers, CHUNK, 6), np.float32)
+    prices = (np.float32(veil), np.float32(solid), np.float32(rate), np.float32(faint))
+    for start in range(0, count, CHUNK):
+        own = min(CHUNK, count - start)
+        for block in prange((own + BLOCK - 1) // BLOCK):
+            first, last = block * BLOCK, min((block + 1) * BLOCK, own)
+            squares[start // BLOCK + block] = _shade(
+                codes,
+                camera,
+                pixel,
+                rays[start + first : start + last],
+                images,
+                background,
+                texture,
+                prices,
+                index[:, first:last],
+                wish[:, first:last],
+            )
+        for task in prange(layers):
+            n = spread(task, layers)
+            _scatter(index[n, :own], wish[n, :own], gradient[n])
+    total = 0.0  # not squares.sum(), which numba shares out among the threads
+    for block in range(squares.shape[0]):
+        total += squares[block]
+    return total
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
-def contributions(  # type: ignore[no-untyped-def]
-    codes,  # (P, N, 2) uint16, as above
-    rays,  # (R,) int64, which of the P to look at
-    texture,  # (H, W, N, 4)
-    peak,  # (PARTS, H, W, N) float32, raised to what is found
-):
-    """What each texel adds to a ray's opacity at most: T w alpha; w bilinear weight, T transmittance before it."""
+@compiled
+def _shade(
+    codes: Any,
+    camera: Any,
+    pixel: Any,
+    rays: Any,
+    images: Any,
+    background: Any,
+    texture: Any,
+    prices: Any,
+    index: Any,
+    wish: Any,
+) -> Any:
+    """A block of R rays: texels before their crossings (N, R), -1 where there is none, and what is wanted there
+    (N, R, 6): fractions of row and column, gradient of rgba. Returns the sum of |C - I|^2."""
+    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
+    veil, solid, rate, faint = prices
+    one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
+    layer = np.empty(layers, np.int64)
+    c = np.empty((layers, 4), np.float32)
+    before = np.empty(layers, np.float32)
+    total = 0.0
+    for k in range(rays.shape[0]):
+        p = rays[k]
+        through, r0, r1, r2 = one, zero, zero, zero
+        m = 0
+        for n in range(layers):
+            index[n, k] = -1
+        for n in range(layers):
+            if codes[p, n, 0] == 0:
+                continue
+            j, b = _corner(codes[p, n, 0], width)
+            i, a = _corner(codes[p, n, 1], height)
+            alpha = _tap(texture, i, j, n, 3, a, b)
+            if alpha < faint:
+                continue
+            index[n, k] = i * width + j
+            wish[n, k, 0], wish[n, k, 1] = a, b
+            for q in range(3):
+                c[m, q] = _tap(texture, i, j, n, q, a, b)
+            c[m, 3] = alpha
+            layer[m], before[m] = n, through
+            light = through * alpha
+            r0 += light * c[m, 0]
+            r1 += light * c[m, 1]
+            r2 += light * c[m, 2]
+            through *= one - alpha
+            m += 1
+            if through < OPAQUE:
+                break
+        cam, pix = camera[p], pixel[p]
+        s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
+        d0 = r0 + through * s0 - images[cam, pix, 0] * inverse
+        d1 = r1 + through * s1 - images[cam, pix, 1] * inverse
+        d2 = r2 + through * s2 - images[cam, pix, 2] * inverse
+        total += d0 * d0 + d1 * d1 + d2 * d2
+        step = rate * through * through * through
+        background[cam, pix, 0] = min(max(s0 - step * d0, zero), one)
+        background[cam, pix, 1] = min(max(s1 - step * d1, zero), one)
+        background[cam, pix, 2] = min(max(s2 - step * d2, zero), one)
+        # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
+        push = veil - solid * max(one - 2 * through, zero)
+        rest = one
+        for q in range(m - 1, -1, -1):
+            n, alpha, light = layer[q], c[q, 3], before[q]
+            g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
+            wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
+            wish[n, k, 5] = light * (d0 * g0 + d1 * g1 + d2 * g2 + push * rest)
+            rest *= one - alpha
+            s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+    return total
+
+
+@kernel(parallel=True)
+def contributions(codes, rays, texture, peak):  # type: ignore[no-untyped-def]
+    """What each texel adds to a ray's opacity at most: T w alpha; w bilinear weight, T transmittance before it.
+
+    codes (P, N, 2) as above, rays (R,) which of them to look at, texture (H, W, N, 4); peak (N, H, W) float32 is raised
+    to what is found.
+    """
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
     count = rays.shape[0]
-    parts = peak.shape[0]
-    for part in numba.prange(parts):
-        own = peak[part]
-        for k in range(count * part // parts, count * (part + 1) // parts):
-            p = rays[k]
+    before = np.empty((layers, CHUNK), np.float32)
+    for start in range(0, count, CHUNK):
+        own = min(CHUNK, count - start)
+        for k in prange(own):
+            p = rays[start + k]
             through = np.float32(1.0)
             for n in range(layers):
-                if codes[p, n, 0] == 0:
+                before[n, k] = through if through >= OPAQUE else np.float32(0.0)
+                if codes[p, n, 0] > 0 and through >= OPAQUE:
+                    j, b = _corner(codes[p, n, 0], width)
+                    i, a = _corner(codes[p, n, 1], height)
+                    through *= 1 - _tap(texture, i, j, n, 3, a, b)
+        for task in prange(layers):
+            n = spread(task, layers)
+            for k in range(own):
+                p = rays[start + k]
+                if codes[p, n, 0] == 0 or before[n, k] == 0:
                     continue
                 j, b = _corner(codes[p, n, 0], width)
                 i, a = _corner(codes[p, n, 1], height)
-                alpha = np.float32(0.0)
                 for tap in range(4):
                     di, dj = tap >> 1, tap & 1
                     w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]
-                    alpha += w
-                    own[i + di, j + dj, n] = max(own[i + di, j + dj, n], through * w)
-                through *= 1 - alpha
-                if through < OPAQUE:
-                    break
+                    peak[n, i + di, j + dj] = max(peak[n, i + di, j + dj], before[n, k] * w)

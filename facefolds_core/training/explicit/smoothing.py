@@ -6,15 +6,15 @@ that shows each camera its own picture. `smooth` is compiled for CPUs, `smooth_r
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import torch
+from numba import prange
 from torch import Tensor
 
-from facefolds_core.training.explicit.shading_kernel import FASTMATH
+from facefolds_core.jit import kernel
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def smooth(values, height, width):  # type: ignore[no-untyped-def]
     """Mean over 3 x 3 texels, the outermost ones repeated beyond the border.
 
@@ -26,7 +26,7 @@ def smooth(values, height, width):  # type: ignore[no-untyped-def]
     """
     count = values.shape[1]
     out = np.empty_like(values)
-    for i in numba.prange(height):
+    for i in prange(height):
         above, below = max(i - 1, 0) * width, min(i + 1, height - 1) * width
         rows = np.empty((width, count), np.float32)
         for j in range(width):

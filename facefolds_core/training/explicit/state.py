@@ -34,6 +34,11 @@ class LossWeights:
     min_alpha: float
 
 
+def model_bytes(texels: tuple[int, int], layers: int, frames: int) -> int:
+    """Of the textures of a model with all its layers: float32, colour and alpha of the layers and of each frame."""
+    return 4 * texels[0] * texels[1] * (3 + 4 * layers + frames * (3 + layers))
+
+
 class TextureState:
     """Grids of `GridTextures` flattened to M = H W texels, each stacked with its two moments.
 
@@ -75,7 +80,7 @@ class TextureState:
         self.steps = np.zeros(self.frame_colour.shape[1], np.int64)
         if self.device.type == "cpu":
             self.texture = torch.empty(m, n, 4)
-            self.gradient = torch.zeros(shading_kernel.PARTS, m, n, 4)
+            self.gradient = torch.zeros(n, m, 4)
 
     def reset_alpha(self) -> None:
         """Back to the initial opacity; colours stay. For layers that have moved."""
@@ -143,7 +148,7 @@ class TextureState:
                 images,
                 self.background.numpy(),
                 texture.numpy().reshape(h, w, n, 4),
-                self.gradient.numpy().reshape(-1, h, w, n, 4),
+                self.gradient.numpy().reshape(n, h, w, 4),
                 weights.opacity,
                 weights.binarisation,
                 background_rate,
@@ -192,6 +197,7 @@ class TextureState:
             weights.opacity,
             weights.binarisation,
             self.params.background.rate,
+            weights.min_alpha,
         )
         self.background[at] = moved
         reference.adam_step(
@@ -220,7 +226,7 @@ class TextureState:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
         (h, w), frames = self.shape, len(self.steps)
         n = self.layers.shape[2]
-        peak = torch.zeros(shading_kernel.PARTS, h, w, n)
+        peak = torch.zeros(n, h, w)
         for i in range(max(passes, frames)):
             rays = np.arange(i % passes, len(views.pixel), passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
@@ -228,8 +234,8 @@ class TextureState:
                 shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy())
             else:
                 codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
-                peak[0] = torch.maximum(peak[0], reference.contributions(codes, texture).cpu())
-        return peak.amax(0).view(-1, n).to(self.device)
+                torch.maximum(peak, reference.contributions(codes, texture).cpu(), out=peak)
+        return peak.view(n, -1).T.contiguous().to(self.device)
 
     def hide(self, unseen: Tensor) -> None:
         """Make texels [M, N] bool transparent."""

@@ -7,16 +7,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
+
+from facefolds_core.jit import inlined, kernel
 
 Array = NDArray[Any]
 
-FASTMATH = {"contract", "afn", "arcp", "nsz", "reassoc"}
-
-PARTS = 2
-"""Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads."""
+PARTS = 8
+"""Rays are shaded in this many parts, each with a gradient of its own: the result does not depend on the threads, of
+which so many have work. Of a part's gradient only the rows (i, j) that it has touched are read."""
 
 BLOCK = 4
 """Voxels a side of a block of the occupancy map."""
@@ -29,12 +30,17 @@ LIMIT = 12.0
 """Of |raw density|."""
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+def empty_gradient(shape: tuple[int, ...]) -> tuple[Array, NDArray[np.bool_]]:
+    """Of a grid (X, Y, Z, 4): `gradient` and `touched` for `shade` and `adam_step`."""
+    return np.zeros((PARTS, *shape), np.float32), np.zeros((PARTS, *shape[:2]), np.bool_)
+
+
+@inlined
 def _softplus(x):  # type: ignore[no-untyped-def]
     return x if x > 15.0 else math.log1p(math.exp(x))
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     """Distances at which a ray enters and leaves the box of voxel centres; empty if the second is smaller."""
     near, far = 0.0, 1e30
@@ -47,7 +53,7 @@ def _span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     return near, far
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
     """Trilinear values at voxel coordinates (x, y, z) into out[0:4]; returns the lower corner and the fractions."""
     i = min(max(int(x), 0), grid.shape[0] - 2)
@@ -66,7 +72,7 @@ def _sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
     return i, j, k, fx, fy, fz
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
     origins,  # (R, 3) float32
     directions,  # (R, 3) float32, unit
@@ -80,6 +86,7 @@ def shade(  # type: ignore[no-untyped-def]
     step,  # between samples, units
     samples,  # at most so many on a ray
     gradient,  # (PARTS, X, Y, Z, 4), added to
+    touched,  # (PARTS, X, Y) bool, set where the gradient is added to
     residual,  # (R, 3) out: C - I
     through,  # (R,) out: transmittance
     veil,  # weight of opacity
@@ -92,7 +99,7 @@ def shade(  # type: ignore[no-untyped-def]
     count = origins.shape[0]
     sums = np.zeros(gradient.shape[0])
     density = step / voxel
-    for part in numba.prange(gradient.shape[0]):
+    for part in prange(gradient.shape[0]):
         own = gradient[part]
         corner = np.empty((samples, 3), np.int32)
         fraction = np.empty((samples, 3), np.float32)
@@ -150,6 +157,8 @@ def shade(  # type: ignore[no-untyped-def]
                 g = light * pull * slope[n]
                 i, j, k = corner[n, 0], corner[n, 1], corner[n, 2]
                 fx, fy, fz = fraction[n, 0], fraction[n, 1], fraction[n, 2]
+                for tap in range(4):
+                    touched[part, i + (tap >> 1), j + (tap & 1)] = True
                 for tap in range(8):
                     di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
                     w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
@@ -157,17 +166,20 @@ def shade(  # type: ignore[no-untyped-def]
                     for q in range(3):
                         own[i + di, j + dj, k + dk, q + 1] += w * light * a * residual[r, q]
         sums[part] = total
-    return sums.sum()
+    total = 0.0  # not sums.sum(), which numba shares out among the threads
+    for part in range(sums.shape[0]):
+        total += sums[part]
+    return total
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
     """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance where half of the light is left (R,) or 0."""
     count = origins.shape[0]
     rgb = np.zeros((count, 3), np.float32)
     alpha = np.zeros(count, np.float32)
     depth = np.zeros(count, np.float32)
-    for r in numba.prange(count):
+    for r in prange(count):
         o, d = origins[r], directions[r]
         near, far = _span(o, d, lower, voxel, grid)
         value = np.empty(4, np.float32)
@@ -189,10 +201,11 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
     return rgb, alpha, depth
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def adam_step(  # type: ignore[no-untyped-def]
     grid,  # (3, X, Y, Z, 4): values, first and second moments; all updated in place
     gradient,  # (PARTS, X, Y, Z, 4); zero afterwards
+    touched,  # (PARTS, X, Y) bool; False afterwards
     share,  # (X, Y, Z) factor on the rate of density
     rate_density,
     rate_colour,
@@ -204,15 +217,31 @@ def adam_step(  # type: ignore[no-untyped-def]
     values = grid[0]
     old = values[..., 0].copy()
     nx, ny, nz = old.shape
-    for i in numba.prange(nx):
+    for i in prange(nx):
+        parts = np.empty(gradient.shape[0], np.int64)
+        total = np.empty(4, np.float32)
         for j in range(ny):
+            count = 0
+            for part in range(gradient.shape[0]):
+                if touched[part, i, j]:
+                    touched[part, i, j] = False
+                    parts[count] = part
+                    count += 1
+            if count == 0:
+                continue
             for k in range(nz):
-                if gradient[0, i, j, k, 0] == 0 and gradient[1, i, j, k, 0] == 0:
+                total[:] = 0
+                met = False
+                for c in range(count):
+                    own = gradient[parts[c], i, j, k]
+                    met = met or own[0] != 0
+                    for q in range(4):
+                        total[q] += own[q]
+                        own[q] = 0
+                if not met:
                     continue
                 for q in range(4):
-                    g = gradient[0, i, j, k, q] + gradient[1, i, j, k, q]
-                    gradient[0, i, j, k, q] = 0
-                    gradient[1, i, j, k, q] = 0
+                    g = total[q]
                     if q == 0:
                         for n in range(6):
                             a, b = n >> 1, 2 * (n & 1) - 1
@@ -229,7 +258,7 @@ def adam_step(  # type: ignore[no-untyped-def]
                     values[i, j, k, q] = min(max(moved, low), high)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
     """Along each direction (R, 3), from `farthest` in to `centre`.
 
@@ -241,7 +270,7 @@ def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # 
     opacity = np.zeros(count, np.float32)
     rgb = np.zeros((count, 3), np.float32)
     radius = np.zeros((count, shares.shape[0]), np.float32)
-    for r in numba.prange(count):
+    for r in prange(count):
         reached = np.zeros(samples + 1, np.float32)
         value = np.empty(4, np.float32)
         t = np.float32(1.0)

@@ -68,6 +68,7 @@ def _shade(
     jitter: Array,
     background: Array,
     gradient: Array,
+    touched: NDArray[np.bool_],
     step: float,
     opacity_weight: float,
     binarisation_weight: float,
@@ -88,6 +89,7 @@ def _shade(
         step * voxel,
         samples,
         gradient,
+        touched,
         residual,
         through,
         opacity_weight,
@@ -106,7 +108,7 @@ def clear(
 ) -> None:
     """Empty the voxels without `min_contrast`, in place: the mean over rays, by their weights there, of how far what
     they see in the volume is from the room behind it. What no ray reaches stays."""
-    gradient = np.zeros((kernel.PARTS, *grid.shape), np.float32)
+    gradient, touched = kernel.empty_gradient(grid.shape)
     background = room.look_up(rays.origins, rays.directions)
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
@@ -117,7 +119,7 @@ def clear(
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
     seen = replace(rays, colours=target)
-    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, params.step, 0.0, 0.0)
+    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, params.step, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
     evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
@@ -139,7 +141,7 @@ def train(
 ) -> float:
     """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
     grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
-    gradient = np.zeros((kernel.PARTS, *values.shape), np.float32)
+    gradient, touched = kernel.empty_gradient(values.shape)
     count = min(params.rays, len(rays.origins))
     recent = math.nan
     for i in range(level.iterations):
@@ -159,6 +161,7 @@ def train(
             jitter,
             behind.colours,
             gradient,
+            touched,
             params.step,
             params.opacity_weight,
             params.binarisation_weight,
@@ -169,7 +172,7 @@ def train(
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
         room.step(behind, through[:, None] * residual, scale, *rates)
-        kernel.adam_step(grid, gradient, share, *rates, bias1, bias2, params.smoothness_weight)
+        kernel.adam_step(grid, gradient, touched, share, *rates, bias1, bias2, params.smoothness_weight)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.training.volume.kernel import CLEAR, OPAQUE
 
 
 def sample(grid: Tensor, points: Tensor, lower: Tensor, voxel: float) -> Tensor:
@@ -50,7 +51,9 @@ def shade(
     s = near[:, None] + (jitter[:, None] + torch.arange(count)) * step
     rgba = sample(grid, origins[:, None] + s[..., None] * directions[:, None], lower, voxel)
     alpha = 1 - torch.exp(-torch.nn.functional.softplus(rgba[..., 0]) * step / voxel)
-    alpha = torch.where(s < far[:, None], alpha, 0.0)
+    alpha = torch.where((s < far[:, None]) & (alpha >= CLEAR), alpha, 0.0)
+    before = torch.cat([torch.ones_like(alpha[:, :1]), (1 - alpha.detach()).cumprod(1)[:, :-1]], 1)
+    alpha = torch.where(before >= OPAQUE, alpha, 0.0)
     weights, through = compositing_weights(alpha)
     residual = (weights[..., None] * rgba[..., 1:]).sum(1) + through[:, None] * background - target
     squares = residual.square().sum()

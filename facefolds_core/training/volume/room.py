@@ -78,7 +78,7 @@ class Room:
         depth = np.logaddexp(0, values[..., 0]) * (len(old) - 1) / (voxels - 1)
         values[..., 0] = np.log(np.expm1(np.maximum(depth, 1e-5)))
         self.grid = np.stack([values.astype(np.float32), *np.zeros((2, *values.shape), np.float32)])
-        self._gradient = np.zeros((kernel.PARTS, *values.shape), np.float32)
+        self._gradient, self._touched = kernel.empty_gradient(values.shape)
         self._share = np.ones(values.shape[:3], np.float32)
         self._steps = 0
 
@@ -112,7 +112,7 @@ class Room:
         self._steps += 1
         bias1, bias2 = 1 / (1 - kernel.BETA1**self._steps), 1 / (1 - kernel.BETA2**self._steps)
         weight = self.params.smoothness_weight
-        kernel.adam_step(self.grid, self._gradient, self._share, rate, colour_rate, bias1, bias2, weight)
+        kernel.adam_step(self.grid, self._gradient, self._touched, self._share, rate, colour_rate, bias1, bias2, weight)
 
     def forget_unseen(self, origins: Array, directions: Array, through: Array) -> None:
         """Give voxels that no rays (R, 3) have reached, with transmittances (R,), the colours of their neighbours."""
@@ -121,7 +121,7 @@ class Room:
         seen = self.look(origins, directions, np.full(len(origins), 0.5, np.float32))
         self._splat(seen, np.repeat(through[:, None], 3, 1))
         weight = self._gradient[..., 1].sum(0)
-        self._gradient[:] = 0
+        self._gradient[:], self._touched[:] = 0, False
         colours = self.grid[0, ..., 1:]
         guess = np.broadcast_to(np.average(colours.reshape(-1, 3), 0, weight.ravel() + 1e-9), colours.shape)
         for blur in (16.0, 8.0, 4.0, 2.0):
@@ -146,4 +146,5 @@ class Room:
             seen.far,
             slope.astype(np.float32),
             self._gradient,
+            self._touched,
         )

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+from numba import prange
 
-from facefolds_core.training.volume.kernel import CLEAR, FASTMATH, OPAQUE, _sample, _softplus
+from facefolds_core.jit import inlined, kernel
+from facefolds_core.training.volume.kernel import CLEAR, OPAQUE, _sample, _softplus
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _start(o, d, radius):  # type: ignore[no-untyped-def]
     """Distance at which a ray leaves the ball; its point nearest to the centre, or its own start, if it misses it."""
     nearest = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2])
@@ -24,7 +25,7 @@ def _start(o, d, radius):  # type: ignore[no-untyped-def]
     return max(nearest + math.sqrt(max(inside, 0.0)), 0.0)
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _stride(o, d, s, radius, step):  # type: ignore[no-untyped-def]
     """Units along the ray at distance s that are `step` in the contracted space; and |y|."""
     y0, y1, y2 = (o[0] + s * d[0]) / radius, (o[1] + s * d[1]) / radius, (o[2] + s * d[2]) / radius
@@ -35,7 +36,7 @@ def _stride(o, d, s, radius, step):  # type: ignore[no-untyped-def]
     return step * radius * n * n / math.sqrt(cosine * cosine + across * stretch * stretch), n
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", inline="always")
+@inlined
 def _contracted(o, d, s, radius, voxel, out):  # type: ignore[no-untyped-def]
     """Voxel coordinates of a point of the ray into out[0:3]."""
     y0, y1, y2 = (o[0] + s * d[0]) / radius, (o[1] + s * d[1]) / radius, (o[2] + s * d[2]) / radius
@@ -44,14 +45,14 @@ def _contracted(o, d, s, radius, voxel, out):  # type: ignore[no-untyped-def]
     out[0], out[1], out[2] = (scale * y0 + 2) / voxel, (scale * y1 + 2) / voxel, (scale * y2 + 2) / voxel
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def look(origins, directions, jitter, grid, radius, step, farthest):  # type: ignore[no-untyped-def]
     """(R, 3) rays -> rgb over black (R, 3), transmittance (R,). See `splat` for the arguments."""
     count = origins.shape[0]
     rgb = np.zeros((count, 3), np.float32)
     through = np.ones(count, np.float32)
     voxel = 4.0 / (grid.shape[0] - 1)
-    for r in numba.prange(count):
+    for r in prange(count):
         o, d = origins[r], directions[r]
         value, at = np.empty(4, np.float32), np.empty(3)
         t = np.float32(1.0)
@@ -70,7 +71,7 @@ def look(origins, directions, jitter, grid, radius, step, farthest):  # type: ig
     return rgb, through
 
 
-@numba.njit(fastmath=FASTMATH, error_model="numpy", parallel=True, cache=True)
+@kernel(parallel=True)
 def splat(  # type: ignore[no-untyped-def]
     origins,  # (R, 3) float32
     directions,  # (R, 3) float32, unit
@@ -83,12 +84,13 @@ def splat(  # type: ignore[no-untyped-def]
     beyond,  # (R, 3) float32: colours behind the grid
     slope,  # (R, 3) float32: of the loss in the colour of each ray
     gradient,  # (PARTS, M, M, M, 4), added to
+    touched,  # (PARTS, M, M) bool, set where the gradient is added to
 ):
     """Gradient of sum slope . colour. A sample has alpha = 1 - exp(-softplus(raw) step / voxel)."""
     count, parts = origins.shape[0], gradient.shape[0]
     voxel = 4.0 / (grid.shape[0] - 1)
     density = step / voxel
-    for part in numba.prange(parts):
+    for part in prange(parts):
         own = gradient[part]
         corner = np.empty((samples, 3), np.int32)
         fraction = np.empty((samples, 3), np.float32)
@@ -126,6 +128,8 @@ def splat(  # type: ignore[no-untyped-def]
                 g = light * pull * kept[p, 4]
                 i, j, k = corner[p, 0], corner[p, 1], corner[p, 2]
                 fx, fy, fz = fraction[p, 0], fraction[p, 1], fraction[p, 2]
+                for tap in range(4):
+                    touched[part, i + (tap >> 1), j + (tap & 1)] = True
                 for tap in range(8):
                     di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
                     w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)

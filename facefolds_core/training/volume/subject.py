@@ -51,6 +51,8 @@ def subject_of(volume: Volume, params: ExplicitParams) -> Volume:
     # Before a plain background there is no room to be told from a subject that is cut off by the ball.
     if volume.room.outer:
         body = without_room(volume, body, params.subject)
+    elif body.sum() == (np.logaddexp(0, volume.grid[..., 0]) > params.volume.body_depth).sum():
+        return volume  # there is nothing else: faint hair around it stays, too
     kept = ndimage.binary_dilation(body, iterations=2)
     grid = volume.grid.copy()
     grid[~kept, 0] = np.minimum(grid[~kept, 0], math.log(math.expm1(1e-5)))

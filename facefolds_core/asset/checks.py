@@ -1,0 +1,203 @@
+"""What can be wrong with a manifest or a mesh, in words: what the reader refuses and the validator reports.
+
+Bounds are far beyond what any asset has (the cameras are about 1 unit away; a picture is what codecs allow): they tell
+nonsense from data, and keep a damaged number from asking for all of a machine's memory.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.asset.manifest import MANIFEST_NAME, Coordinates, Level, Manifest, Photo, seal_is_whole
+from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
+from facefolds_core.geometry.meshes import TexturedMesh
+
+FARTHEST = 1e3
+"""Units from the origin."""
+SMALLEST = 1e-6
+"""Units, of a mesh's longest side."""
+FPS_RANGE = (1e-3, 1e3)
+MOST_FRAMES = 1_000_000
+MOST_VERTICES = 1 << 23
+"""Of one mesh; triangles likewise."""
+SCALE_RANGE = (1e-9, 1e9)
+MEASURED = 1e-2
+"""How far from a rotation a photo's camera may be: captures measure theirs, and are given 1e-3."""
+LONGEST_TEXT = 200
+MOST_LAYERS = 256
+"""Of a level; levels and photos likewise."""
+
+
+def layout_of(level: Level) -> AtlasLayout:
+    """Where the manifest says the textures lie."""
+    texture = level.texture
+    return AtlasLayout(
+        width=texture.width,
+        height=texture.height,
+        colour_rect=texture.colour_rect,
+        alpha_rect=texture.alpha_rect,
+        rects=tuple(layer.texture_rect for layer in level.layers),
+    )
+
+
+def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
+    """What is wrong inside a manifest that has all its keys, in words; the files that it names are not looked at."""
+    problems = []
+    if not seal_is_whole(path.read_bytes()):
+        problems.append("manifest_sha256 is not this file's: its content was changed")
+    parts = [manifest.levels, manifest.photos, *(level.layers for level in manifest.levels)]
+    if max(map(len, parts)) > MOST_LAYERS:
+        return [*problems, f"more than {MOST_LAYERS} levels, layers of a level, or photos"]
+    for level in manifest.levels:
+        problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
+    problems += _order_problems(manifest)
+    problems += _coordinate_problems(manifest.coordinates)
+    for photo in manifest.photos:
+        problems += [f"{photo.file}: {problem}" for problem in _photo_problems(photo, manifest.full.texture.frames)]
+    pictures = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
+    problems += [
+        f"{picture.file}: {problem}"
+        for picture in pictures
+        for problem in _size_problems(picture.width, picture.height)
+    ]
+    names = [MANIFEST_NAME, *(name for name, _, _ in manifest.files())]
+    if len({name.lower() for name in names}) != len(names):  # there are file systems that do not tell a from A
+        problems.append("one file is named twice")
+    texts = [manifest.subject, manifest.generator, *(photo.camera for photo in manifest.photos)]
+    texts += [video.mime for level in manifest.levels for video in level.texture.videos]
+    problems += [
+        f"a text that is too long, or has characters that do not print: {text[:40]!r}"
+        for text in texts
+        if len(text) > LONGEST_TEXT or not text.isprintable()
+    ]
+    return problems
+
+
+def _order_problems(manifest: Manifest) -> list[str]:
+    levels = manifest.levels
+    problems = []
+    if len({level.name for level in levels}) != len(levels):
+        problems.append("two levels have one name")
+    if len({(level.texture.frames, level.texture.fps) for level in levels}) != 1:
+        problems.append("the levels differ in frames or fps")
+    for coarse, fine in pairwise(levels):
+        # Finer in one respect may be coarser in another. In none coarser, in bytes, triangles and texels finer: wrong.
+        if all(a > b for a, b in zip(_fineness(coarse), _fineness(fine), strict=True)):
+            problems.append(
+                f"level {coarse.name} comes before {fine.name}, which is coarser: the order is coarsest first"
+            )
+    return problems
+
+
+def _fineness(level: Level) -> tuple[int, int, int]:
+    texels = sum(layer.texture_rect[2] * layer.texture_rect[3] for layer in level.layers)
+    return level.bytes, sum(layer.triangles for layer in level.layers), texels
+
+
+def _coordinate_problems(coordinates: Coordinates) -> list[str]:
+    problems = []
+    to_capture = coordinates.to_capture
+    if not _is_rotation(to_capture.rotation):
+        problems.append("coordinates.to_capture.rotation is not a rotation")
+    low, high = SCALE_RANGE
+    if not low <= to_capture.scale <= high:
+        problems.append(f"coordinates.to_capture.scale is {to_capture.scale:g}, not within {low:g} and {high:g}")
+    if not max(map(abs, to_capture.translation)) <= FARTHEST * high:
+        problems.append(f"coordinates.to_capture.translation is {list(to_capture.translation)}")
+    if not max(map(abs, coordinates.sphere_centre)) <= FARTHEST:
+        problems.append(f"coordinates.sphere_centre is {list(coordinates.sphere_centre)}: the subject is at the origin")
+    return problems
+
+
+def _is_rotation(rows: tuple[tuple[float, ...], ...], tolerance: float = 1e-6) -> bool:
+    rotation = np.array(rows)
+    if not np.abs(rotation).max() <= 2:  # larger numbers might overflow
+        return False
+    return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= tolerance and np.linalg.det(rotation) > 0)
+
+
+def _photo_problems(photo: Photo, frames: int) -> list[str]:
+    problems = []
+    if photo.frame >= frames:
+        problems.append(f"frame {photo.frame} of {frames}")
+    if not _is_rotation(tuple(row[:3] for row in photo.w2c), MEASURED):
+        problems.append("the first three columns of w2c are not a rotation")
+    if not max(abs(row[3]) for row in photo.w2c) <= FARTHEST:
+        problems.append(f"its camera is more than {FARTHEST:g} units away")
+    (fx, _, _), (_, fy, _), last = photo.K
+    if not (min(fx, fy) > 0 and max(fx, fy) <= FARTHEST * MAX_SIDE and np.allclose(last, (0, 0, 1), atol=MEASURED)):
+        problems.append("K is no camera's")
+    return problems
+
+
+def _size_problems(width: int, height: int) -> list[str]:
+    if max(width, height) <= MAX_SIDE and width * height <= 2 * MAX_PIXELS:
+        return []
+    return [f"{width} x {height} pixels: at most {MAX_SIDE} a side and {2 * MAX_PIXELS} in all"]
+
+
+def _level_problems(level: Level) -> list[str]:
+    texture = level.texture
+    problems = _size_problems(texture.width, texture.height)
+    if texture.width % 2 or texture.height % 2:
+        problems.append(f"a video of {texture.width} x {texture.height} pixels: both must be even")
+    low, high = FPS_RANGE
+    if not low <= texture.fps <= high:
+        problems.append(f"{texture.fps:g} frames a second, not within {low:g} and {high:g}")
+    if texture.frames > min(MOST_FRAMES, *(video.bytes for video in texture.videos)):
+        problems.append(f"{texture.frames} frames, more than its videos can hold")
+    problems += layout_of(level).problems()
+    for index, layer in enumerate(level.layers):
+        u0, u1, v0, v1 = layer.uv_window
+        if not (u0 < u1 and v0 < v1):
+            problems.append(f"uv_window {[u0, u1, v0, v1]} of layer {index} is empty")
+        if max(layer.vertices, layer.triangles) > MOST_VERTICES:
+            problems.append(f"{layer.vertices} vertices and {layer.triangles} triangles of layer {index}: too many")
+    if level.bytes != (total := sum(size for _, size, _ in level.files())):
+        problems.append(f"bytes are {level.bytes}, those of its files are {total}")
+    return problems + _effects_problems(level)
+
+
+def _effects_problems(level: Level) -> list[str]:
+    effects = level.view_effects
+    rects = [layer.effects_rect for layer in level.layers if layer.effects_rect is not None]
+    if effects is None:
+        return ["effects_rects without view_effects"] * bool(rects)
+    problems = _size_problems(effects.width, effects.height)
+    if len(rects) != len(level.layers):
+        problems.append("view_effects, but a layer without effects_rect")
+    if effects.scale > FARTHEST:
+        problems.append(f"view_effects.scale is {effects.scale:g}")
+    planes = effects.planes
+    if any(plane[2:] != planes[0][2:] for plane in planes):
+        problems.append("the planes of view_effects differ in size")
+    problems += [
+        f"plane {list(p)} is not inside the effects picture"
+        for p in planes
+        if not inside(p, (effects.width, effects.height))
+    ]
+    problems += [f"effects_rect {list(r)} is not inside its plane" for r in rects if not inside(r, planes[0][2:])]
+    return problems
+
+
+def mesh_problems(mesh: TexturedMesh, vertices: int, triangles: int) -> list[str]:
+    """What makes a decoded mesh unusable or different from its manifest's counts, in words."""
+    problems = []
+    if len(mesh.vertices) != vertices:
+        problems.append(f"{len(mesh.vertices)} vertices, the manifest says {vertices}")
+    if len(mesh.faces) != triangles:
+        problems.append(f"{len(mesh.faces)} triangles, the manifest says {triangles}")
+    if not np.isfinite(mesh.vertices).all():
+        problems.append("vertices that are not finite")
+    elif (farthest := float(np.abs(mesh.vertices).max())) > FARTHEST:
+        problems.append(f"vertices {farthest:g} units from the origin: the capture's cameras are about 1 away")
+    elif float(np.ptp(mesh.vertices, axis=0).max()) < SMALLEST:
+        problems.append("all vertices lie at one point")
+    if not (mesh.st >= -1e-6).all() or not (mesh.st <= 1 + 1e-6).all():
+        problems.append("texture coordinates outside [0, 1]")
+    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+        problems.append("faces that name vertices which are not there")
+    return problems

@@ -1,0 +1,53 @@
+"""What rays add to the texels that they meet, shared out among threads: compiled.
+
+Rays are worked on in chunks. Threads share the rays of a chunk, and note what each ray wants of each layer; then they
+share the layers, and each texel takes what is wanted of it in the order of the rays. So one array of sums serves any
+number of threads, and the result does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from facefolds_core.jit import compiled, inlined
+
+CHUNK = 32768
+"""Rays whose wishes are noted at once: few enough for the cache."""
+
+BLOCK = 256
+"""Rays that a thread takes at once."""
+
+
+@inlined
+def spread(task, tasks):  # type: ignore[no-untyped-def]
+    """A permutation: a thread takes neighbouring tasks, and of neighbouring layers one is met as often as the other."""
+    group, size = task % 4, tasks // 4
+    return group * size + min(group, tasks % 4) + task // 4
+
+
+def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
+    """A compiled function that adds what R rays want of one layer to its sums (H, W, values), bilinear.
+
+    Its arguments: index (R,), the texel before each ray's crossing as row width + column, or -1; wish (R, 2 + values),
+    fractions of row and column and what is to be added; the sums.
+    """
+
+    @compiled
+    def scatter(index: Any, wish: Any, sums: Any) -> None:
+        width = sums.shape[1]
+        one = np.float32(1.0)
+        for k in range(index.shape[0]):
+            if index[k] < 0:
+                continue
+            i, j = index[k] // width, index[k] % width
+            a, b = wish[k, 0], wish[k, 1]
+            for tap in range(4):
+                di, dj = tap >> 1, tap & 1
+                w = (a if di else one - a) * (b if dj else one - b)
+                for q in range(values):
+                    sums[i + di, j + dj, q] += w * wish[k, 2 + q]
+
+    return scatter

@@ -1,0 +1,262 @@
+"""Assets that no writer makes: absurd numbers, wrong order, special files, files that change after the check."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.checks import mesh_problems
+from facefolds_core.asset.draco import DracoError, decode_mesh
+from facefolds_core.asset.manifest import parse_manifest
+from facefolds_core.asset.nesting import lies_within
+from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.validation import validate_asset
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.meshes import TexturedMesh
+from tests.asset.filmed import filmed, packaged
+from tests.assets import CENTRE, cap_mesh
+from tests.hostile.fuzz_assets import seal
+from tests.viewer.fixtures import rich_asset
+
+Value = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rich_asset(tmp_path_factory.mktemp("sound") / "asset")
+
+
+@pytest.fixture
+def asset(sound: Path, tmp_path: Path) -> Path:
+    """A copy to damage."""
+    return Path(shutil.copytree(sound, tmp_path / "asset"))
+
+
+def edit(folder: Path, change: Callable[[Value], object]) -> None:
+    """Change the manifest as JSON, and seal it again."""
+    value = json.loads((folder / "manifest.json").read_text())
+    change(value)
+    seal(folder, value)
+
+
+def refused(folder: Path, word: str) -> None:
+    problems = validate_asset(folder)
+    assert any(word in problem for problem in problems), problems
+    with pytest.raises(UserError):
+        read_asset(folder)
+
+
+def put(*keys: str | int, to: object) -> Callable[[Value], None]:
+    def change(value: Any) -> None:
+        for key in keys[:-1]:
+            value = value[key]
+        value[keys[-1]] = to
+
+    return change
+
+
+LAYER, TEXTURE, PLACE = ("levels", 0, "layers", 0), ("levels", 0, "texture"), ("coordinates", "to_capture")
+ABSURD = {
+    "scale": (put(*PLACE, "scale", to=1e300), "scale"),
+    "rotation": (put(*PLACE, "rotation", to=[[1e300, 0, 0], [0, 1e300, 0], [0, 0, 1e300]]), "rotation"),
+    "translation": (put(*PLACE, "translation", to=[1e300, 0, 0]), "translation"),
+    "centre": (put("coordinates", "sphere_centre", to=[0, 0, 1e300]), "sphere_centre"),
+    "vertices": (put(*LAYER, "vertices", to=10**12), "too many"),
+    "width": (put(*TEXTURE, "width", to=10**9), "pixels"),
+    "poster": (put("poster", "height", to=10**9), "poster.png"),
+    "effects": (put("levels", 1, "view_effects", "width", to=10**9), "pixels"),
+    "effects' scale": (put("levels", 1, "view_effects", "scale", to=1e300), "view_effects.scale"),
+    "name": (put(*LAYER, "mesh", to="a" * 5000), "mesh"),
+    "subject": (put("subject", to="\x1b[31mred"), "text"),
+    "focal length": (put("photos", 0, "K", to=[[1e300, 0, 1], [0, 1, 1], [0, 0, 1]]), "K is no camera's"),
+    "camera": (put("photos", 0, "w2c", to=[[1, 0, 0, 1e300], [0, 1, 0, 0], [0, 0, 1, 0]]), "units away"),
+    "mirrored camera": (put("photos", 0, "w2c", to=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0]]), "not a rotation"),
+    "photo's frame": (put("photos", 0, "frame", to=99), "frame 99 of 6"),
+}
+
+
+@pytest.mark.parametrize("what", ABSURD)
+def test_absurd_numbers(asset: Path, what: str) -> None:
+    change, word = ABSURD[what]
+    edit(asset, change)
+    start = time.monotonic()
+    refused(asset, word)
+    assert time.monotonic() - start < 5
+
+
+@pytest.mark.parametrize(("key", "value"), [("fps", 1e-300), ("fps", 1e300), ("frames", 10**9)])
+def test_absurd_rates_and_lengths(asset: Path, key: str, value: float) -> None:
+    edit(asset, lambda manifest: [level["texture"].update({key: value}) for level in manifest["levels"]])
+    refused(asset, "frames")
+
+
+@pytest.mark.parametrize("value", ["6", True, 6.5, [6], None])
+@pytest.mark.parametrize("key", ["frames", "fps"])
+def test_what_is_no_number_is_not_taken_for_one(asset: Path, key: str, value: object) -> None:
+    if key == "fps" and value == 6.5:
+        return
+    edit(asset, put(*TEXTURE, key, to=value))
+    refused(asset, f"levels.0.texture.{key}")
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "/etc/passwd", "a\\b", "a/b", "file:x", "http://x/", "..", ".", "", ".x", "a\n"]
+)
+def test_names_that_are_not_plain(asset: Path, name: str) -> None:
+    edit(asset, put(*LAYER, "mesh", to=name))
+    refused(asset, "levels.0.layers.0.mesh")
+
+
+def test_names_that_differ_by_case_only(asset: Path) -> None:
+    def change(value: Value) -> None:
+        value["photos"][1]["file"] = value["photos"][0]["file"].upper()
+
+    edit(asset, change)
+    refused(asset, "named twice")
+
+
+def test_ten_thousand_layers(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][0].update(layers=value["levels"][0]["layers"] * 5000))
+    start = time.monotonic()
+    refused(asset, "more than 256")
+    assert time.monotonic() - start < 5
+
+
+def test_levels_in_the_wrong_order(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"].reverse())
+    refused(asset, "coarsest first")
+
+
+def test_levels_in_the_wrong_order_are_not_written(tmp_path: Path) -> None:
+    sides = {"fine": 32, "coarse": 16}
+    levels = [{"name": k, "mesh_resolution": n, "texture_resolution": n, "crf": 30} for k, n in sides.items()]
+    with pytest.raises(UserError, match="wrong order"):
+        packaged(tmp_path / "asset", filmed(tmp_path / "scene"), {"levels": levels})
+
+
+def test_layers_in_the_wrong_order(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][1]["layers"].reverse())
+    assert any("outermost in" in problem for problem in validate_asset(asset))
+
+
+def test_nesting_of_touching_layers_is_not_judged() -> None:
+    a, b = cap_mesh(0.3), cap_mesh(0.2)
+    assert lies_within(b, a, CENTRE)
+    assert not lies_within(a, b, CENTRE)
+    assert not lies_within(a, a, CENTRE)
+
+
+def test_halves_of_the_picture_swapped(asset: Path) -> None:
+    def swap(value: Value) -> None:
+        texture = value["levels"][1]["texture"]
+        texture["colour_rect"], texture["alpha_rect"] = texture["alpha_rect"], texture["colour_rect"]
+
+    edit(asset, swap)
+    assert any("alpha_rect" in problem for problem in validate_asset(asset))
+
+
+@pytest.mark.parametrize(("factor", "word"), [(0.0, "one point"), (1e30, "units from the origin"), (np.nan, "finite")])
+def test_meshes_of_absurd_size(factor: float, word: str) -> None:
+    mesh = cap_mesh(0.3, 4)
+    problems = mesh_problems(TexturedMesh(np.float32(factor) * mesh.vertices, mesh.faces, mesh.st), 16, 18)
+    assert len(problems) == 1 and word in problems[0]
+
+
+def test_a_mesh_that_claims_more_than_there_is(asset: Path) -> None:
+    data = bytearray((asset / "full_00.drc").read_bytes())
+    place = 11 if data[8] == 0 else 12
+    data[place : place + 2] = b"\xff\xff\xff\xff\x07"
+    with pytest.raises(DracoError, match="claims 2147483647"):
+        decode_mesh(bytes(data))
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "full.mp4", "full_00.drc", "poster.png"])
+@pytest.mark.parametrize("kind", ["fifo", "device", "folder", "loop"])
+def test_what_is_no_file_is_not_opened(asset: Path, name: str, kind: str) -> None:
+    path = asset / name
+    path.unlink()
+    if kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.symlink_to("/dev/zero" if kind == "device" else name)
+    refused(asset, name)
+
+
+def test_a_link_that_leads_out(asset: Path) -> None:
+    shutil.move(asset / "full.mp4", asset.parent / "full.mp4")
+    (asset / "full.mp4").symlink_to("../full.mp4")
+    assert validate_asset(asset) == ["full.mp4: a link that leads out of the folder"]
+
+
+def test_folders_that_cannot_be() -> None:
+    for name in ("x" * 5000, "a\0b", "/dev/null"):
+        assert validate_asset(name)[0].endswith("no such folder")
+        with pytest.raises(UserError, match="no such folder"):
+            read_asset(name)
+
+
+def test_a_manifest_of_a_terabyte(asset: Path) -> None:
+    os.truncate(asset / "manifest.json", 1 << 40)
+    refused(asset, "bytes, a manifest at most")
+
+
+def test_strays_are_counted_not_listed_without_end(asset: Path) -> None:
+    for index in range(300):
+        (asset / f"stray{index}").touch()
+    problems = validate_asset(asset)
+    assert len(problems) == 21 and "280 more" in problems[-1]
+
+
+def test_a_picture_larger_than_said_is_not_decoded(asset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Image.new("RGB", (4000, 4000)).save(asset / "poster.png")
+    data = (asset / "poster.png").read_bytes()
+    edit(asset, lambda value: value["poster"].update(bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))
+    decoded = []
+    monkeypatch.setattr("PIL.ImageFile.ImageFile.load", lambda self: decoded.append(self.size))
+    problems = [problem for problem in validate_asset(asset) if problem.startswith("poster.png")]
+    assert problems == ["poster.png: 4000 x 4000 pixels, the manifest says 90 x 60"]
+    assert (64, 64) in decoded and (4000, 4000) not in decoded
+
+
+def test_a_picture_beyond_pillows_limit_is_no_traceback(asset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
+    assert any("poster.png: not a picture" in problem for problem in validate_asset(asset))
+
+
+def test_a_sound_that_is_none(asset: Path) -> None:
+    data = b"#EXTM3U\n/etc/passwd\n"
+    (asset / "audio.wav").write_bytes(data)
+    edit(asset, lambda value: value["audio"].update(bytes=len(data), sha256=hashlib.sha256(data).hexdigest()))
+    assert [problem[:22] for problem in validate_asset(asset)] == ["audio.wav: not a sound"]
+
+
+@pytest.mark.parametrize("name", ["full.mp4", "full_effects.png"])
+def test_what_changes_after_the_check_is_not_decoded(asset: Path, name: str) -> None:
+    found = read_asset(asset)
+    found.frame(0), found.effects()
+    data = bytearray((asset / name).read_bytes())
+    data[len(data) // 2] ^= 1
+    (asset / name).write_bytes(data)
+    os.utime(asset / name, (1, 1))
+    with pytest.raises(UserError, match="damaged asset"):
+        found.frame(0), found.effects()
+
+
+def test_a_level_is_not_decoded_from_other_meshes(asset: Path) -> None:
+    level = parse_manifest(asset / "manifest.json").full
+    shutil.copy(asset / level.layers[1].mesh, asset / level.layers[0].mesh)
+    with pytest.raises(UserError, match="damaged asset"):
+        read_level(asset, level)

@@ -1,0 +1,335 @@
+"""Captures well formed and wrong all the same: calibration beyond sense, odd texts, no files in files' places."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import wave
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from facefolds_core.captures.capture import frame_rate
+from facefolds_core.captures.sound import cut_sound
+from facefolds_core.captures.visibility import check_sight
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.params import Subject
+from facefolds_core.params_file import Params, write_configs
+from facefolds_core.paths import SubjectFolders
+from stages.capture import capture
+from stages.normalize import normalize
+from tests.captures.fixtures import (
+    RING,
+    SEGMENT,
+    VERTICES,
+    MultifaceCapture,
+    edit_transforms,
+    krt_text,
+    opengl_matrix,
+    pose_text,
+    world_camera,
+    write_multiface,
+    write_transforms,
+)
+from tests.captures.test_bad_captures import refused, replace_line, run
+from tests.hostile.watch import within
+
+CAMERAS = tuple(world_camera(*view) for view in RING)
+
+
+def rig(change: Callable[[int, Camera], Camera]) -> tuple[Camera, ...]:
+    return tuple(change(i, camera) for i, camera in enumerate(CAMERAS))
+
+
+def turned(i: int, camera: Camera) -> Camera:
+    """The second camera turned round about its upright axis."""
+    return replace(camera, w2c=np.diag([-1.0, 1, -1]) @ camera.w2c) if i == 1 else camera
+
+
+def inverted(i: int, camera: Camera) -> Camera:
+    """Camera -> world where world -> camera should be.
+
+    The head is moved aside before: on the axis of a camera at the origin, as in Multiface, inverted poses are those of
+    a mirrored rig that looks at the head all the same.
+    """
+    camera = camera.transformed(Similarity(1.0, np.eye(3), np.array([3000.0, 0, -1030])))
+    return replace(camera, w2c=np.concatenate([camera.rotation.T, camera.centre[:, None]], 1))
+
+
+def far(distance: float) -> Callable[[int, Camera], Camera]:
+    """The third camera moved backwards."""
+    back = np.array([[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, distance]])
+    return lambda i, camera: replace(camera, w2c=camera.w2c + back) if i == 2 else camera
+
+
+def focal(f: float) -> Callable[[int, Camera], Camera]:
+    K = np.array([[f, 0, 20], [0, f, 30], [0, 0, 1]])
+    return lambda i, camera: replace(camera, K=K) if i == 2 else camera
+
+
+RIGS: list[tuple[str, Callable[[int, Camera], Camera], str, str]] = [
+    ("one turned away", turned, "look past the subject", "400002"),
+    ("all inverted", inverted, "", ""),
+    ("one at 1e300", far(1e300), "", "400003"),
+    ("one at 1e8", far(1e8), "absurdly near", "400003"),
+    ("f of 1e-12", focal(1e-12), "singular", "400003"),
+    ("f of 1e7", focal(1e7), "focal lengths that no camera has", "400003"),
+    ("one place", lambda i, camera: replace(camera, w2c=CAMERAS[0].w2c), "in one place", ""),
+    ("mirrored", lambda i, c: replace(c, w2c=np.diag([-1.0, 1, 1]) @ c.w2c), "not a rotation", "400001"),
+]
+
+
+@pytest.mark.parametrize(("change", "message", "camera"), [row[1:] for row in RIGS], ids=[row[0] for row in RIGS])
+@pytest.mark.parametrize("source", ["multiface", "transforms"])
+def test_cameras_that_do_not_see_the_subject(
+    tmp_path: Path, source: str, change: Callable[[int, Camera], Camera], message: str, camera: str
+) -> None:
+    cameras = rig(change)
+    if source == "multiface":
+        write_multiface(tmp_path / "c").krt.write_text(krt_text(cameras))
+    else:
+        path, _ = write_transforms(tmp_path / "c")
+        for i, one in enumerate(cameras):
+            place = {"transform_matrix": opengl_matrix(one)} if np.abs(one.w2c).max() < 1e9 else {"cx": 1e300}
+            edit_transforms(path, i, **place, fl_x=one.K[0, 0], fl_y=one.K[1, 1])
+    error = refused(tmp_path / "c", source, front="400001" if source == "transforms" else None)
+    if source == "multiface":
+        assert (message in error.message, camera in str(error)) == (True, True)
+
+
+def test_a_close_up_that_shows_a_part_of_the_head_is_fine(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    close = np.array([[1000.0, 0, 75], [0, 1000, -62], [0, 0, 1]])  # most of the head lies beyond the picture's edge
+    made.krt.write_text(krt_text(rig(lambda i, c: replace(c, K=close) if i == 2 else c)))
+    assert (run(tmp_path / "c", "multiface").scene / "scene.json").exists()
+
+
+def test_a_frame_whose_head_is_nowhere(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c", tuple(f"{k:06d}" for k in range(40)))
+    pose = np.loadtxt(made.mesh("000007", "_transform.txt"))
+    made.mesh("000007", "_transform.txt").write_text(pose_text(pose[:, :3], pose[:, 3] + [3000, 0, 0]))
+    error = refused(tmp_path / "c", "multiface")
+    assert (error.message, error.place) == ("the tracked mesh lies in no camera's picture", "frame 000007")
+
+
+def test_head_poses_that_turn_every_way(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c", turn=120)
+    assert refused(tmp_path / "c", "multiface").message == "the head poses contradict one another"
+
+
+def test_cameras_in_the_centre_are_named() -> None:
+    camera = Camera("a", np.array([[30.0, 0, 20], [0, 30, 20], [0, 0, 1]]), np.eye(3, 4), 40, 40)
+    moved = replace(camera, name="b", w2c=np.eye(3, 4))
+    with pytest.raises(UserError, match="absurdly near"):
+        check_sight([camera, moved], [[0], [0]], ["0"], None, "c")
+
+
+def mesh_file(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[MultifaceCapture], object]:
+    def write(made: MultifaceCapture) -> None:
+        for frame in made.frames:
+            change(VERTICES).astype("<f4").tofile(made.mesh(frame, ".bin"))
+
+    return write
+
+
+MESHES: list[tuple[str, Callable[[MultifaceCapture], object], str]] = [
+    ("zeros", mesh_file(lambda v: 0 * v), "damaged tracked mesh"),
+    ("a tail of zeros", mesh_file(lambda v: np.where(np.arange(8)[:, None] < 5, v, 0)), "damaged tracked mesh"),
+    ("one point", mesh_file(lambda v: 0 * v + 3), "one point or on one line"),
+    ("a line", mesh_file(lambda v: v[:, :1] * [1, 2, 3] + 1), "one point or on one line"),
+    ("huge", mesh_file(lambda v: v * 1e12), "damaged tracked mesh"),
+    ("in metres", mesh_file(lambda v: v / 1e5), "absurdly small or large"),
+    ("no faces", lambda c: c.mesh("000003", ".obj").write_text("v 1 2 3\n" * 8), "garbled mesh"),
+    ("pose of 1e300", lambda c: replace_line(c.mesh("000006", "_transform.txt"), 1, "1 0 0 1e300"), "beyond sense"),
+]
+
+
+@pytest.mark.parametrize(("damage", "message"), [row[1:] for row in MESHES], ids=[row[0] for row in MESHES])
+def test_a_tracked_mesh_that_is_none(
+    tmp_path: Path, damage: Callable[[MultifaceCapture], object], message: str
+) -> None:
+    made = write_multiface(tmp_path / "c")
+    damage(made)
+    assert message in refused(tmp_path / "c", "multiface").message
+
+
+def test_a_byte_order_mark_hides_no_camera(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    for path in (made.krt, tmp_path / "c" / "frame_list.txt", made.mesh("000003", "_transform.txt")):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    folders = run(tmp_path / "c", "multiface")
+    scene = json.loads((folders.scene / "scene.json").read_text())
+    assert [camera["name"] for camera in scene["cameras"]] == [name for name, _, _ in RING]
+    assert not [line for line in scene["left_out"] if not line.startswith("note")]
+
+
+@pytest.mark.parametrize("name", ["KRT", "frame_list.txt", f"tracked_mesh/{SEGMENT}/000003.obj"])
+def test_utf_16_is_named(tmp_path: Path, name: str) -> None:
+    write_multiface(tmp_path / "c")
+    path = tmp_path / "c" / name
+    path.write_text(path.read_text(), encoding="utf-16")
+    error = refused(tmp_path / "c", "multiface")
+    assert (error.file, error.found) == (path, "UTF-16")
+
+
+@pytest.mark.parametrize("line", ["1_50 0 22", "150 0 1e12", "150 0 \u0661\u0662_"])
+def test_numbers_that_only_python_reads(tmp_path: Path, line: str) -> None:
+    made = write_multiface(tmp_path / "c")
+    replace_line(made.krt, 2, line)
+    assert refused(tmp_path / "c", "multiface").place == "line 2 (camera 400001)"
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def unix_socket(path: Path) -> None:
+    beside = Path("/tmp") / f"facefolds-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(beside))
+    shutil.move(beside, path)
+
+
+ODD: dict[str, Callable[[Path], object]] = {
+    "FIFO": fifo,
+    "socket": unix_socket,
+    "device": lambda path: path.symlink_to("/dev/null"),
+    "folder": lambda path: path.mkdir(),
+    "loop": lambda path: path.symlink_to(path.name),
+    "link to nothing": lambda path: path.symlink_to("nowhere"),
+}
+FILES = {
+    "multiface": [
+        "KRT",
+        "frame_list.txt",
+        f"images/{SEGMENT}/400001/000003.png",
+        f"images/{SEGMENT}/400004/000009.png",
+        f"masks/{SEGMENT}/400003/000003.png",
+        f"tracked_mesh/{SEGMENT}/000003.obj",
+        f"tracked_mesh/{SEGMENT}/000006.bin",
+        f"tracked_mesh/{SEGMENT}/000009_transform.txt",
+        f"audio/{SEGMENT}.wav",
+    ],
+    "transforms": ["transforms.json", "images/400002.png"],
+}
+
+
+@pytest.mark.parametrize("make", ODD.values(), ids=ODD)
+@pytest.mark.parametrize(("source", "name"), [(s, n) for s, names in FILES.items() for n in names])
+def test_what_is_no_file_is_refused_and_never_opened(
+    tmp_path: Path, source: str, name: str, make: Callable[[Path], object]
+) -> None:
+    write_multiface(tmp_path / "c") if source == "multiface" else write_transforms(tmp_path / "c")
+    path = tmp_path / "c" / name
+    path.unlink(missing_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    make(path)
+    errors: list[UserError] = []
+    within(10, lambda: errors.append(refused(tmp_path / "c", source, front="400003")))()
+    assert errors[0].file == path
+
+
+@pytest.mark.parametrize("name", ["images", f"images/{SEGMENT}", f"tracked_mesh/{SEGMENT}"])
+def test_a_file_in_a_folders_place(tmp_path: Path, name: str) -> None:
+    write_multiface(tmp_path / "c")
+    shutil.rmtree(tmp_path / "c" / name)
+    (tmp_path / "c" / name).write_text("x")
+    assert refused(tmp_path / "c", "multiface").remedy
+
+
+VALUES: list[tuple[str, dict[str, Any]]] = [
+    ("string", {"fl_x": "150.0"}),
+    ("true", {"cx": True}),
+    ("huge integer", {"cy": 10**18}),
+    ("list", {"k1": [0.1]}),
+    ("object", {"fl_y": {}}),
+    ("string of matrix", {"transform_matrix": [["1", 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}),
+    ("true of matrix", {"transform_matrix": [[True, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}),
+    ("huge in matrix", {"transform_matrix": [[1, 0, 0, 10**18], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}),
+    ("last row", {"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [5, 0, 0, 7]]}),
+    ("fisheye", {"is_fisheye": "false"}),
+    ("path", {"file_path": ["images/400002.png"]}),
+    ("model", {"camera_model": ["OPENCV"]}),
+]
+
+
+@pytest.mark.parametrize("edit", [row[1] for row in VALUES], ids=[row[0] for row in VALUES])
+def test_only_numbers_are_numbers(tmp_path: Path, edit: dict[str, Any]) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    edit_transforms(path, 1, **edit)
+    error = refused(tmp_path / "c", "transforms", front="400003")
+    assert (error.file, "frames[1]" in str(error.place)) == (path, True)
+
+
+@pytest.mark.parametrize("label", ["x" * 300 + ".png", "a\0b.png", "x/" * 3000 + "y.png"])
+def test_names_that_cannot_be_are_missing_images(tmp_path: Path, label: str) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    edit_transforms(path, 1, file_path=label)
+    folders = run(tmp_path / "c", "transforms", front="400003")
+    left_out = json.loads((folders.scene / "scene.json").read_text())["left_out"]
+    assert any("no image" in line for line in left_out)
+
+
+@pytest.mark.parametrize("fps", [1e-300, 1e300, 1e-3])
+def test_a_rate_that_no_capture_has(tmp_path: Path, fps: float) -> None:
+    write_multiface(tmp_path / "c")
+    assert refused(tmp_path / "c", "multiface", fps=fps).place == "fps"
+
+
+def test_usual_rates_are_fine() -> None:
+    subject = Subject(source="actor", path="x", fps=240)
+    assert [frame_rate(subject, 30, count) for count in (1, 2)] == [0, 240]
+
+
+@pytest.mark.parametrize("size", [(0, 0), (-40, 64), (10**12, 3)])
+def test_a_size_that_no_image_has(tmp_path: Path, size: tuple[int, int]) -> None:
+    write_multiface(tmp_path / "c")
+    assert refused(tmp_path / "c", "multiface", krt_size=size).place == "krt_size"
+
+
+@pytest.mark.parametrize("source", ["multiface", "transforms"])
+def test_an_address_of_the_net_must_be_downloaded_first(tmp_path: Path, source: str) -> None:
+    subject = Subject(source=source, path="https://example.org/capture")
+    folders = SubjectFolders(tmp_path / "data" / "head")
+    write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", folders.config)
+    for stage in (capture, normalize):
+        with pytest.raises(UserError, match="not a path") as caught:
+            stage(folders)
+        assert caught.value.place == "subjects.head.path"
+
+
+@pytest.mark.parametrize("path", ["x" * 300, "a\0b", "x" * 300 + ".json", "x/" * 3000])
+@pytest.mark.parametrize("source", ["multiface", "transforms"])
+def test_a_path_that_cannot_be(tmp_path: Path, source: str, path: str) -> None:
+    subject = Subject(source=source, path=path)
+    folders = SubjectFolders(tmp_path / "data" / "head")
+    write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", folders.config)
+    for stage in (capture, normalize):
+        with pytest.raises(UserError) as caught:
+            stage(folders)
+        assert caught.value.remedy
+
+
+def test_a_sound_that_is_shorter_than_it_says(tmp_path: Path) -> None:
+    path = tmp_path / "x.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 8000, 0, "NONE", ""))
+        file.writeframes(bytes(8000))
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(UserError, match="sound cannot be read"):
+        cut_sound(path, tmp_path / "cut.wav", 0, 0.1)
+
+
+def test_a_playlist_that_calls_itself_a_sound_opens_nothing(tmp_path: Path) -> None:
+    playlist = ["#EXTM3U", "#EXT-X-TARGETDURATION:1", "#EXTINF:1,", f"{tmp_path}/other.wav", "#EXT-X-ENDLIST"]
+    (tmp_path / "x.wav").write_text("\n".join(playlist))
+    with pytest.raises(UserError, match="sound cannot be read"):
+        cut_sound(tmp_path / "x.wav", tmp_path / "cut.wav", 0, 0.1)

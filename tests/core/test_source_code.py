@@ -1,0 +1,77 @@
+"""Digests of code: what a stage does counts, words do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import grimp
+import pytest
+
+from facefolds_core.errors import UserError
+from facefolds_core.params import STAGE_SECTIONS
+from facefolds_core.source_code import digest_of_file, digests_of_stages
+
+CODE = '''"""A module."""
+SIZE = 3
+"""A number."""
+
+
+def double(x: int) -> int:
+    """Twice."""
+    return 2 * x
+'''
+
+
+def digest(folder: Path, code: str) -> str:
+    (folder / "code.py").write_text(code)
+    return digest_of_file(folder / "code.py")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("A module.", "Another text."),
+        ('"""A number."""', ""),
+        ('    """Twice."""\n', "    # Twice.\n"),
+        ("2 * x", "(2 * x)  # twice"),
+        ("SIZE = 3\n", "\n\nSIZE =   3\n"),
+    ],
+)
+def test_words_do_not_count(old: str, new: str, tmp_path: Path) -> None:
+    assert digest(tmp_path, CODE.replace(old, new, 1)) == digest(tmp_path, CODE) and old in CODE
+
+
+@pytest.mark.parametrize(("old", "new"), [("SIZE = 3", "SIZE = 4"), ("2 * x", "x * 2"), ("x: int", "x: float")])
+def test_code_does(old: str, new: str, tmp_path: Path) -> None:
+    assert digest(tmp_path, CODE.replace(old, new)) != digest(tmp_path, CODE)
+
+
+def test_texts_that_are_values_do(tmp_path: Path) -> None:
+    assert digest(tmp_path, "f('a')") != digest(tmp_path, "f('b')")
+
+
+@pytest.fixture(scope="module")
+def found(project_root: Path) -> dict[str, dict[str, str]]:
+    return digests_of_stages(project_root, STAGE_SECTIONS)
+
+
+def test_every_stage_has_itself_and_what_it_imports(found: dict[str, dict[str, str]]) -> None:
+    assert list(found) == list(STAGE_SECTIONS)
+    for stage, modules in found.items():
+        assert {f"stages.{stage}", "stages.common", "facefolds_core.params"} <= set(modules)
+    assert "facefolds_core.training.explicit.fit" in found["train"]
+    assert "facefolds_core.reporting.build" not in {module for modules in found.values() for module in modules}
+
+
+def test_every_import_of_every_module_is_there(found: dict[str, dict[str, str]]) -> None:
+    graph = grimp.build_graph("facefolds_core", "stages", cache_dir=None, exclude_type_checking_imports=True)
+    for modules in found.values():
+        for module in modules:
+            assert graph.find_modules_directly_imported_by(module) <= set(modules)
+
+
+def test_a_file_that_is_not_python_is_named(tmp_path: Path) -> None:
+    (tmp_path / "code.py").write_text("def (")
+    with pytest.raises(UserError, match=r"code\.py") as caught:
+        digest_of_file(tmp_path / "code.py")
+    assert caught.value.place == "line 1"

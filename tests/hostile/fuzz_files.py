@@ -1,0 +1,229 @@
+"""Damaged files between the stages, through the readers that the stages use.
+
+npz archives have checksums: what is accepted must be what was written. Frame stores, safetensors and JSON have none: a
+change that makes another valid file is found by DVC, which hashes them, and is no defect here.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import torch
+
+from facefolds_core.captures.scene import Scene, read_scene, write_scene
+from facefolds_core.config import read_subject, read_train
+from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.sheets import grid_sheets
+from facefolds_core.export.stores import (
+    holds_sheets,
+    read_centre,
+    read_grids,
+    read_meshes,
+    read_sheets,
+    read_surfaces,
+    read_windows,
+    write_grids,
+    write_meshes,
+    write_sheets,
+    write_surfaces,
+)
+from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.model.storage import ModelSpec, build_model, load_model, save_model
+from facefolds_core.params import Subject
+from facefolds_core.params_file import Params, write_configs
+from facefolds_core.reporting.facts import read_images
+from tests.ellipsoids import Ellipsoids
+from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
+from tests.hostile.structured import damage_path, damage_values
+from tests.hostile.watch import within
+
+SECONDS = 10
+SPEC = ModelSpec(
+    centre=(-0.25, 0, 0),
+    levels=(0.36, 0.34),
+    radius=0.42,
+    num_frames=2,
+    manifold_layers=1,
+    manifold_width=4,
+    search_samples=8,
+    texture_layers=1,
+    texture_width=4,
+    latent_dim=2,
+    uv_frequencies=1,
+    level_frequencies=1,
+    view_frequencies=1,
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Files of one kind.
+
+    Attributes:
+        names: in data/head; one of them is damaged.
+        read: all of them; returns what is in them, or None where nothing can be compared.
+    """
+
+    names: tuple[str, ...]
+    read: Callable[[Path], Any]
+
+
+def _store(folder: Path) -> None:
+    store = FrameStore(folder / "scene" / "frames.arrow")
+    for key in [(0, 0), (0, 1), (1, 0)]:
+        np.array(store.image(*key))
+
+
+def _scene(folder: Path) -> None:
+    scene = read_scene(folder / "scene")
+    scene.open_frames()
+    for camera in scene.cameras:
+        camera.rays(np.zeros((1, 2)))
+        camera.transformed(scene.from_capture.inverse())
+
+
+def _surface(folder: Path) -> Any:
+    made = _written_scene(folder / "scene")
+    return made.load_surface()
+
+
+def _grids(folder: Path) -> Any:
+    path = folder / "samples" / "grids.npz"
+    return [*astuple(read_grids(path)), np.array(read_windows(path)), np.array(read_centre(path))]
+
+
+def _sheets(folder: Path) -> Any:
+    path = folder / "surfaces" / "sheets.npz"
+    return [*astuple(read_sheets(path)), np.array(holds_sheets(path))]
+
+
+def _surfaces(folder: Path) -> Any:
+    return [part for s in read_surfaces(folder / "surfaces" / "surfaces.npz") for part in (s.vertices, s.faces)]
+
+
+def _meshes(folder: Path) -> Any:
+    return [part for m in read_meshes(folder / "meshes" / "meshes.npz") for part in (m.vertices, m.faces, m.st)]
+
+
+def _quiet(read: Callable[[Path], object]) -> Callable[[Path], None]:
+    """A reader whose result nothing is compared with."""
+
+    def quiet(folder: Path) -> None:
+        read(folder)
+
+    return quiet
+
+
+KINDS = (
+    Kind(("scene/frames.arrow",), _store),
+    Kind(("scene/scene.json",), _scene),
+    Kind(("scene/surface.npz",), _surface),
+    Kind(("samples/grids.npz",), _grids),
+    Kind(("surfaces/sheets.npz",), _sheets),
+    Kind(("surfaces/surfaces.npz",), _surfaces),
+    Kind(("meshes/meshes.npz",), _meshes),
+    Kind(("model/model.safetensors", "model/model.json"), _quiet(lambda folder: load_model(folder / "model"))),
+    Kind(("config/train.json",), _quiet(lambda folder: read_train(folder / "config"))),
+    Kind(("config/subject.json",), _quiet(lambda folder: read_subject(folder / "config"))),
+    Kind(
+        ("evaluation/per_image.parquet",), _quiet(lambda folder: read_images(folder / "evaluation/per_image.parquet"))
+    ),
+)
+
+
+def _written_scene(folder: Path) -> Scene:
+    K = np.array([[30.0, 0, 5], [0, 30, 4], [0, 0, 1]])
+    cameras = tuple(Camera(name, K, np.eye(3, 4) + [[0, 0, 0, i]] * 3, 10, 8) for i, name in enumerate("ab"))
+    similarity = Similarity(0.5, np.eye(3), np.ones(3))
+    return Scene("head", cameras, ("train", "holdout"), ("1", "2"), np.array([0, 0.1]), 10.0, similarity, (), folder)
+
+
+def make(root: Path) -> None:
+    """One file of each kind."""
+    for kind in KINDS:
+        for name in kind.names:
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+    random = np.random.default_rng(0)
+    rows = [(c, f, random.integers(0, 256, (8, 10, 3), dtype=np.uint8)) for c in range(2) for f in range(2)]
+    write_frames(root / "scene" / "frames.arrow", (8, 10, 3), rows)
+    write_scene(_written_scene(root / "scene"), root / "scene")
+    vertices, faces = random.normal(size=(2, 5, 3)).astype(np.float32), np.array([[0, 1, 2], [2, 3, 4]], np.int32)
+    np.savez(root / "scene" / "surface.npz", vertices=vertices, faces=faces)
+    grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5), progress=False)
+    write_grids(root / "samples" / "grids.npz", grids)
+    write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None).sheets)
+    mesh = TexturedMesh(vertices[0], faces, random.random((5, 2)).astype(np.float32))
+    write_surfaces(root / "surfaces" / "surfaces.npz", [mesh, mesh])
+    write_meshes(root / "meshes" / "meshes.npz", [mesh, mesh])
+    torch.manual_seed(0)
+    save_model(build_model(SPEC), SPEC, root / "model")
+    subject = Subject(source="actor", path="x")
+    write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", root / "config")
+    columns = {"camera": ["a", "b"], "frame": ["1", "1"], "variant": ["asset"] * 2, "psnr": [30.0, 31.0]}
+    pq.write_table(pa.table({**columns, "psnr_subject": [20.0, None]}), root / "evaluation" / "per_image.parquet")
+
+
+def damage(path: Path, random: np.random.Generator) -> str:
+    """Damage a file's bytes, its values, or what stands in its place."""
+    choice = random.random()
+    if choice < 0.15:
+        return damage_path(path, random)
+    if path.suffix == ".json" and choice < 0.8:
+        value = json.loads(path.read_text())
+        words = damage_values(value, random)
+        path.write_text(json.dumps(value))
+        return words
+    mutation = MUTATIONS[int(random.integers(len(MUTATIONS)))]
+    path.write_bytes(mutation(path.read_bytes(), random))
+    return mutation.__name__
+
+
+def same(one: Any, other: Any) -> bool:
+    return len(one) == len(other) and all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+def run(count: int, seed: int, folder: Path) -> Counts:
+    """`count` damaged files, one at a time, of all kinds by turns."""
+    counts = Counts()
+    whole, root = folder / "whole", folder / "data" / "head"
+    make(whole)
+    sound = [kind.read(whole) for kind in KINDS]
+    shutil.copytree(whole, root)
+    for i in range(count):
+        random = np.random.default_rng([seed, i])
+        number = i % len(KINDS)
+        path = root / str(random.choice(KINDS[number].names))
+        what = f"files, seed {seed}, case {i}, {path.relative_to(root)}, {damage(path, random)}"
+        before = fingerprint(root)
+        try_one(counts, what, KINDS[number], root, sound[number])
+        if fingerprint(root) != before:
+            counts.harmed.append(what)
+        shutil.rmtree(root)
+        shutil.copytree(whole, root)
+    return counts
+
+
+def try_one(counts: Counts, what: str, kind: Kind, root: Path, sound: Any) -> None:
+    """Read one damaged file, and count what became of it."""
+    found: list[Any] = []
+    result = outcome(within(SECONDS, lambda: found.append(kind.read(root))))
+    if "TimeoutError" in result.text:
+        counts.tried += 1
+        counts.hung.append(what)
+        return
+    counts.add(what, result)
+    if found and found[0] is not None and not same(found[0], sound):
+        counts.kept_wrong.append(f"{what}: not what was written")
+    if result.kind == "refused" and "remedy:" not in result.text:
+        counts.kept_wrong.append(f"{what}: no remedy: {result.text}")

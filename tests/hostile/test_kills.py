@@ -1,0 +1,13 @@
+"""A few kills (many: `python -m tests.hostile --only kills --count 60`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.hostile.fuzz_kills import run
+
+
+def test_killed_runs_are_recovered(tmp_path: Path) -> None:
+    counts = run(3, 0, tmp_path)
+    assert counts.tried == 3
+    assert counts.defects == []

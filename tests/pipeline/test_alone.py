@@ -1,0 +1,123 @@
+"""A stage keeps a second run of it out, and ends with the DVC that started it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+import stages.common
+from facefolds_core.errors import UserError
+from facefolds_core.paths import SubjectFolders
+from stages.common import alone
+
+STAGE = """
+import os, sys, time
+from pathlib import Path
+from facefolds_core.files import atomic_folder
+from stages.common import run_stage
+
+def work(folders):
+    with atomic_folder(folders.model) as temporary:
+        (temporary / "half").write_text("1")
+        Path("ready").write_text(str(os.getpid()))
+        time.sleep(float(Path("seconds").read_text()))
+    return "made"
+
+run_stage("train", work, "A stage.")
+"""
+
+DVC_YAML = "stages:\n  train:\n    cmd: {}\n    outs: [data/x/model]\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "stage.py").write_text(STAGE)
+    (tmp_path / "seconds").write_text("60")
+    return tmp_path
+
+
+def start(folder: Path, root: Path, *command: str, **more: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "PYTHONPATH": str(root), "DVC_NO_ANALYTICS": "1", **more}
+    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
+    return subprocess.Popen(
+        command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+def wait_for(path: Path) -> int:
+    deadline = time.monotonic() + 30
+    while not (path.exists() and path.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return int(path.read_text())
+
+
+def has_ended(pid: int, within: float) -> bool:
+    deadline = time.monotonic() + within
+    while time.monotonic() < deadline:
+        if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_a_second_run_is_told_who_is_at_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stages.common, "LOCK_WAIT", 0.2)
+    folders = SubjectFolders(tmp_path / "x")
+    says = f"another run of train is at work: process {os.getpid()}"
+    with (
+        alone("train", folders.root / "locks"),
+        alone("sample", folders.root / "locks"),
+        pytest.raises(UserError, match=says),
+    ):
+        alone("train", folders.root / "locks").__enter__()
+    with alone("train", folders.root / "locks"):
+        pass
+
+
+def test_a_killed_run_keeps_nobody_out(folder: Path, project_root: Path) -> None:
+    process = start(folder, project_root, sys.executable, "stage.py", "--subject", "x")
+    wait_for(folder / "ready")
+    process.kill()
+    process.communicate()
+    (folder / "seconds").write_text("0")
+    process = start(folder, project_root, sys.executable, "stage.py", "--subject", "x")
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, output
+    assert sorted(p.name for p in (folder / "data" / "x").iterdir()) == ["locks", "model", "timings"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("shell", ["", "true; "])
+def test_a_stage_ends_with_its_dvc(number: signal.Signals, shell: str, folder: Path, project_root: Path) -> None:
+    """With `true;` the shell that DVC starts stays between DVC and the stage."""
+    (folder / ".dvc").mkdir()
+    (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
+    (folder / "dvc.yaml").write_text(DVC_YAML.format(f"{shell}python stage.py --subject x"))
+    process = start(folder, project_root, sys.executable, "-m", "dvc", "repro", SHELL="/bin/bash")
+    stage = wait_for(folder / "ready")
+    process.send_signal(number)
+    try:
+        assert has_ended(stage, 5)
+    finally:
+        if psutil.pid_exists(stage):
+            os.kill(stage, signal.SIGKILL)
+        process.communicate()
+    assert [p.name for p in (folder / "data" / "x").iterdir()] == ["locks"]
+
+
+def test_a_stage_started_by_hand_outlives_its_terminal(folder: Path, project_root: Path) -> None:
+    command = f"nohup {sys.executable} stage.py --subject x > log.txt 2>&1 & wait"
+    process = start(folder, project_root, "bash", "-c", command)
+    stage = wait_for(folder / "ready")
+    process.kill()
+    process.communicate()
+    assert not has_ended(stage, 1)
+    os.kill(stage, signal.SIGKILL)

@@ -1,0 +1,102 @@
+"""A fresh machine's first run equals every later one, bit for bit, however many threads compute.
+
+Each group of kernels runs on small inputs in two processes: the first compiles them, the second loads them from the
+cache and has another number of threads.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+SCRIPTS = {
+    "capture": """
+        from facefolds_core.captures.actor import make_rig, render, tracked_mesh
+        from facefolds_core.params import CaptureParams
+
+        camera = make_rig(CaptureParams(cameras=8, frames=1, height=24, width=16)).cameras[0]
+        picture = render(camera, 0.3)
+        show(picture.rgb, picture.opacity, picture.depth, tracked_mesh(0.3).vertices)
+    """,
+    "train": """
+        from facefolds_core.params import ExplicitParams
+        from facefolds_core.training.explicit.loop import train_explicit
+        from tests.scenes import OPAQUE, make_scene
+
+        scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius)
+        params = ExplicitParams(device="cpu", layers=4, iterations=183)
+        train_explicit(scene, params, folder / "model", folder / "log")
+        show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
+    """,
+    "decimate": """
+        from facefolds_core.export.collapse import decimate_sheets
+        from facefolds_core.export.sampling import sample_grids
+        from facefolds_core.export.sheets import grid_sheets
+        from tests.ellipsoids import Ellipsoids
+
+        grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
+        for mesh in decimate_sheets(grid_sheets(grids, None).sheets, 64):
+            show(mesh.vertices, mesh.faces, mesh.st)
+    """,
+    "bake": """
+        from facefolds_core.export.bake_kernel import accumulate, render, update
+        from facefolds_core.export.hold_kernel import add_weights, hold
+
+        rng = np.random.default_rng(0)
+        codes = rng.integers(1, 65536, (70_000, 3, 2)).astype(np.uint16)
+        codes[rng.random((70_000, 3)) < 0.2] = 0
+        texture = rng.random((3, 32, 32, 4), np.float32)
+        target = np.empty((70_000, 4), np.float32)
+        render(codes, texture * 200, target)
+        sums, shown = np.zeros((3, 32, 32, 6), np.float32), texture.copy()
+        show(target, np.float64(accumulate(codes, target, texture, sums)), sums)
+        update(texture.reshape(-1, 4), sums.reshape(-1, 6), 0.05, shown.reshape(-1, 4))
+        weights = np.zeros((3, 32, 32, 2), np.float32)
+        add_weights(codes, texture * 255, weights)
+        images = rng.integers(90, 110, (6, 32, 32, 4)).astype(np.uint8)
+        hold(images, weights[0], 0.5)
+        show(texture, shown, weights, images)
+    """,
+}
+"""By stage; `show` adds arrays to the digest, `folder` is empty."""
+
+FRAME = """
+import hashlib, sys
+from pathlib import Path
+import numpy as np
+
+folder, digest = Path(sys.argv[1]), hashlib.sha256()
+
+
+def show(*arrays):
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+
+{body}
+print(digest.hexdigest())
+"""
+
+
+@pytest.mark.parametrize("stage", SCRIPTS)
+def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path, project_root: Path) -> None:
+    code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))
+    found = []
+    for run, threads in (("cold", 2), ("warm", 1)):
+        (tmp_path / run).mkdir()
+        settings = {
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+            "PYTHONPATH": str(project_root),
+            "NUMBA_NUM_THREADS": str(threads),
+            "OMP_NUM_THREADS": str(threads),
+        }
+        command = [sys.executable, "-c", code, str(tmp_path / run)]
+        done = subprocess.run(command, env={**os.environ, **settings}, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        found.append(done.stdout.strip().splitlines()[-1])
+    assert found[0] == found[1]
+    assert list((tmp_path / "cache").rglob("*.nbc"))

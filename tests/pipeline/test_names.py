@@ -1,0 +1,111 @@
+"""Subjects' names and paths through the real `dvc repro`: none is run by a shell, none leads anywhere else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.params import STAGE_SECTIONS
+from tests.hostile.damage import fingerprint
+from tests.pipeline.tiny import TinyProject
+
+SHELL = ["a;touch X;echo", "$(touch X)", "`touch X`", "'; touch X; '", '"; touch X; "', "a\ntouch X\n", "a b", "-x"]
+PATHS = ["../precious", "../../outside", "..", ".", "a/b", "/etc", "a/../../precious"]
+
+
+@pytest.fixture(scope="module")
+def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
+    """Beside folders that names might lead to."""
+    root = tmp_path_factory.mktemp("names")
+    for folder in ("outside", "project/precious", "project"):
+        for name in ("capture", "config", "timings"):
+            path = root / folder / name / "kept.txt"
+            path.parent.mkdir(parents=True)
+            path.write_text("precious")
+    return TinyProject(project_root, root / "project")
+
+
+def with_subject(project: TinyProject, name: str, path: str = "facefolds_core/captures/actor") -> None:
+    sections: dict[str, object] = {section: {} for section in STAGE_SECTIONS}
+    source = "actor" if path.startswith("facefolds_core") else "multiface"
+    project.write_params(json.dumps({"subjects": {name: {"source": source, "path": path}}, **sections}))
+
+
+def kept(project: TinyProject) -> dict[str, str]:
+    """All but what DVC and `configure` write for themselves, and compiled code."""
+    skip = ("project/.dvc/", "project/data", "project/dvc.lock", "project/params.yaml")
+    found = fingerprint(project.root.parent)
+    return {n: d for n, d in found.items() if not n.startswith(skip) and "__pycache__" not in n}
+
+
+@pytest.mark.parametrize("command", [["repro"], ["repro", "capture@{}"]])
+@pytest.mark.parametrize("name", [*SHELL[:2], PATHS[0], PATHS[1]])
+def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, command: list[str]) -> None:
+    with_subject(project, name)
+    before = kept(project)
+    status, output = project.run("dvc", *(part.format(name) for part in command))
+    assert status != 0
+    assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
+    assert kept(project) == before
+
+
+@pytest.mark.parametrize("name", [*SHELL[2:], *PATHS[2:]])
+def test_no_other_name_does(project: TinyProject, name: str) -> None:
+    with_subject(project, name)
+    before = kept(project)
+    status, output = project.repro()
+    assert status != 0
+    assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
+    assert kept(project) == before
+
+
+@pytest.mark.parametrize("name", ["../precious", "a/b", ".."])
+def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str) -> None:
+    """DVC deletes the outputs of a stage before it runs it: .dvcignore keeps them from being outputs."""
+    with_subject(project, name)
+    before = kept(project)
+    project.repro("--ignore-errors")
+    project.repro("--single-item", f"capture@{name}")
+    assert kept(project) == before
+
+
+@pytest.mark.parametrize(
+    "change", ["+subjects={../../outside:{source:actor,path:x}}", "+subjects={a$\\(touch\\ X\\):{source:actor,path:x}}"]
+)
+def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str) -> None:
+    for folder in ("outside/capture", "project"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "outside" / "capture" / "kept.txt").write_text("precious")
+    tiny = TinyProject(project_root, tmp_path / "project")
+    (tiny.root / ".dvc" / "config").write_text("[core]\n    analytics = false\n")
+    (tiny.root / ".gitignore").write_text("/data/*\n__pycache__\n")
+    commit = ("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")
+    for command in (("git", "init", "--quiet"), ("git", "add", "--all"), commit):
+        assert tiny.run(*command)[0] == 0
+    before = kept(tiny)
+    status, output = tiny.run("dvc", "exp", "run", "-S", change)
+    assert status != 0
+    assert "not a name for a subject" in output
+    after = {name: digest for name, digest in kept(tiny).items() if ".git/" not in name}
+    assert after == {name: digest for name, digest in before.items() if ".git/" not in name}
+
+
+@pytest.mark.parametrize("path", ["https://example.invalid/capture", "-rf", "~/capture", "a\x01b", "data/good"])
+def test_paths_that_are_none(project: TinyProject, path: str) -> None:
+    with_subject(project, "good", path)
+    status, output = project.repro()
+    assert status != 0
+    assert "subjects.good.path" in output or "as both a dependency and an output" in output
+    assert "Traceback" not in output
+
+
+def test_the_name_reaches_the_stage(project: TinyProject) -> None:
+    project.write_params(
+        "subjects: {good_1: {source: actor, path: facefolds_core/captures/actor}}\n"
+        "capture: {cameras: 3, frames: 1, height: 16, width: 16}\n"
+    )
+    status, output = project.repro("capture@good_1")
+    assert status == 0, output
+    assert (project.root / "data" / "good_1" / "capture" / "KRT").exists()
