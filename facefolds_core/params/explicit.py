@@ -137,10 +137,16 @@ class ExplicitParams(Section):
     """The starting volume."""
 
     room: RoomParams = RoomParams()
+    """What stands around the subject, with parallax."""
+
     subject: SubjectParams = SubjectParams()
+    """Which part of the volume is the subject."""
+
     environment: EnvironmentParams = EnvironmentParams()
+    """What lies behind volume and room."""
+
     warnings: WarningParams = WarningParams()
-    """What lies behind it."""
+    """When it is said that something is not well."""
 
     cameras: CameraParams = CameraParams()
     """What single cameras do differently."""
