@@ -53,14 +53,11 @@ wheel: $(READY) $(PLAYER)
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 bench: $(READY)
-	$(BIN)/facefolds doctor
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro normalize@actor
 	$(BIN)/python -m bench.speed_accuracy
 
 charts: repro
-	$(BIN)/python bench/export_waterfall.py $(foreach subject,$(notdir $(patsubst %/asset.glb,%,$(wildcard data/*/asset.glb))),--subjects $(subject)) \
-	  --chart docs/images/export_waterfall.png --plot bench/results/waterfall.json
-	$(BIN)/python -m bench.rate_distortion --work data/rate --chart docs/images/rate_distortion.png --plot bench/results/rate_distortion.json
+	$(BIN)/python -m bench.export_waterfall --chart
+	$(BIN)/python -m bench.sweeps rate
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'

@@ -12,20 +12,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+import yaml
 
-ROOT = Path(__file__).resolve().parents[1]
-STAGES = (
-    *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
-    *("decimate", "texture", "bake", "compress", "evaluate"),
-)
+from bench.run import STAGES, Project, own_params
+from facefolds_core.errors import report_user_errors
+
 UNTIMED = ("timings", "training", "config", "checkpoints", "locks")
 """Folders that hold times, processes, or what was asked for."""
 
@@ -52,17 +49,6 @@ bake: {}
 compress: {}
 evaluate: {}
 """
-
-
-def run_pipeline(folder: Path, subject: str) -> None:
-    """All stages of one subject of `folder`/params.yaml, with this checkout's code."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for stage in STAGES:
-        command = [sys.executable, "-m", f"stages.{stage}", "--subject", subject]
-        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-        if done.returncode:
-            sys.exit(f"{stage} of {subject} failed:\n{done.stdout}{done.stderr}")
-        typer.echo(done.stdout.strip().splitlines()[-1], err=True)
 
 
 def without_times(value: Any) -> Any:
@@ -115,16 +101,15 @@ def main(
 ) -> None:
     """Hash what the pipeline makes; compare with an earlier run."""
     found = {}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        (folder / "params.yaml").write_text(TINY)
-        for subject in ("tiny", "tiny_quick"):
-            run_pipeline(folder, subject)
-            found[subject] = digests(folder / "data" / subject)
-        if not tiny:
-            (folder / "params.yaml").write_text((ROOT / "params.yaml").read_text())
-            run_pipeline(folder, "actor")
-            found["actor"] = digests(folder / "data" / "actor")
+    with tempfile.TemporaryDirectory() as temporary, report_user_errors("golden"):
+        wanted = {"tiny": yaml.safe_load(TINY), "tiny_quick": yaml.safe_load(TINY)}
+        for subject, params in (wanted if tiny else {**wanted, "actor": own_params("actor", {})}).items():
+            project = Project(Path(temporary), subject)
+            project.write(params)
+            for stage in STAGES:
+                project.run(stage)
+                typer.echo(f"{stage} of {subject}", err=True)
+            found[subject] = digests(project.folders.root)
     if out is not None:
         out.write_text(json.dumps(found, indent=1))
     if against is not None:

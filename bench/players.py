@@ -1,8 +1,9 @@
 """Pictures a second in a browser: `python -m bench.players data/actor/asset`.
 
-Ours at few and at many triangles, a Gaussian-splat player from npm with splats of the same head, and one opaque mesh as
-the floor: in the same browser, one after the other, from the same cameras. A picture's time runs until its pixels can
-be read back; nothing waits for a screen. Also: time and bytes to the first picture, and memory.
+Assets as they ship (coarser or finer ones: `python -m bench.sweeps mesh --values 16,512`), a Gaussian-splat player from
+npm with splats of the first one's head, and one opaque mesh as the floor: in the same browser, one after the other,
+from the same cameras. A picture's time runs until its pixels can be read back; nothing waits for a screen. Also: time
+and bytes to the first picture, and memory. Needs Chromium, npm, and the player that `make view` builds.
 """
 
 from __future__ import annotations
@@ -10,29 +11,32 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
-from playwright.sync_api import Browser, Page
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, sync_playwright
 
-from bench.chromium import Processes, chromium
-from bench.heads import sample_splats, write_single
-from bench.results import commit_name, machine_name
-from facefolds_core.asset import read_asset
+from bench.results import ROOT, commit_name, machine_name, now
+from bench.tables import markdown
+from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.glb import write_glb
-from facefolds_core.asset.reader import Asset
-from facefolds_core.cli.render import parse_size, pick_level
+from facefolds_core.cli.render import parse_size
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_json
 from facefolds_core.player import find_player
+from facefolds_core.rendering.reference import sample_texture
 from facefolds_core.serving import serving
 
-PAGES = Path(__file__).parent / "browser"
+PAGES = ROOT / "bench" / "browser"
+BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
+# The graphics card, or Mesa's llvmpipe where there is none; containers run as root.
+FLAGS = "--use-angle=gl-egl --ignore-gpu-blocklist --no-sandbox --disable-gpu-vsync"
+FLAGS += " --autoplay-policy=no-user-gesture-required"
 PATIENCE = 300_000
 """Milliseconds for one page to load or one picture's row to be drawn: software rendering takes its time."""
 WARM_UP = 2
@@ -40,82 +44,49 @@ WARM_UP = 2
 HTML = """<!doctype html><meta charset="utf-8"><link rel="icon" href="data:,">
 <style>html, body {{ margin: 0; height: 100%; background: #000; overflow: hidden }}</style>
 <body><script type="module" src="/{0}.js"></script></body>"""
+VISIBLE = 13 / 255
+"""Splats of less opacity are not worth one."""
+SPREAD = 0.6
+"""Standard deviation of a splat over the mean distance of its neighbours: they close, and hardly blur."""
+SPLAT = np.dtype([("centre", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rotation", "u1", 4)])
+"""A record of a .splat file; rotation 128 + 128 w, x, y, z."""
+Entry = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Row:
-    """What is drawn.
+def sample_splats(asset: Asset, count: int) -> NDArray[np.void]:
+    """(count,) splats of the first frame, in the asset's axes: points spread evenly over what is seen of all layers.
 
-    Attributes:
-        name: as the table says it.
-        page: bench/browser/src/<page>.js.
-        query: its settings.
-        kinds: ways to draw a picture: "draw" moves the camera, "play" shows the next frame of the video as well.
+    Nothing is fitted: centre, colour and opacity are the layer's at that place, all have one isotropic size.
     """
-
-    name: str
-    page: str
-    query: str
-    kinds: tuple[str, ...] = ("draw",)
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Of one row at one size.
-
-    Attributes:
-        milliseconds: of a picture, median.
-        processor_milliseconds: of all processes of the browser, mean.
-    """
-
-    row: str
-    kind: str
-    width: int
-    height: int
-    pictures: int
-    milliseconds: float
-    processor_milliseconds: float
-
-
-@dataclass(frozen=True)
-class Loading:
-    """Of one row: milliseconds since the page was asked for, and bytes.
-
-    Attributes:
-        device: what draws, in the browser's words.
-        loaded: by event (`poster`, `first`, `all`, or `picture`, which waits for pixels): ms, and bytes of the asset.
-        bytes: all that was fetched, scripts included, unpacked sizes.
-        code_bytes: scripts and decoders thereof.
-        computed_gpu_bytes: what the player says it keeps; None for others.
-        measured_bytes: of the drawing process after a few pictures; None where it cannot be known. Most of it is the
-            browser's own: the difference to the floor's is what counts.
-    """
-
-    row: str
-    device: str
-    loaded: dict[str, dict[str, float]]
-    bytes: int
-    code_bytes: int
-    computed_gpu_bytes: int | None
-    measured_bytes: int | None
-
-
-@dataclass(frozen=True)
-class Measured:
-    """All rows.
-
-    Attributes:
-        device: what drew, in the browser's words.
-    """
-
-    browser: str
-    device: str
-    loadings: list[Loading]
-    timings: list[Timing]
+    rng = np.random.default_rng(0)
+    corners = [mesh.vertices[mesh.faces].astype(np.float64) for mesh in asset.layers]
+    areas = [np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1) / 2 for c in corners]
+    total = sum(float(area.sum()) for area in areas)
+    found: list[tuple[NDArray[np.float64], NDArray[np.float32]]] = []
+    drawn = kept = 0
+    textures = asset.frame(0)
+    while kept < count:
+        shares = rng.multinomial(2 * count, [area.sum() / total for area in areas])
+        for mesh, texture, c, area, share in zip(asset.layers, textures, corners, areas, shares, strict=True):
+            chosen = rng.choice(len(area), share, p=area / area.sum())
+            weights = rng.dirichlet((1, 1, 1), share)
+            st = np.einsum("nk,nkc->nc", weights, mesh.st[mesh.faces[chosen]]).astype(np.float32)
+            rgba = sample_texture(texture, st)
+            seen = rgba[:, 3] >= VISIBLE
+            found.append((np.einsum("nk,nkc->nc", weights, c[chosen])[seen], rgba[seen]))
+            kept += int(seen.sum())
+        drawn += 2 * count
+    centres, colours = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    pick = rng.permutation(kept)[:count]
+    splats = np.zeros(count, SPLAT)
+    splats["centre"], splats["scale"] = centres[pick], SPREAD * np.sqrt(total * (kept / drawn) / count)
+    splats["rgba"] = np.rint(255 * colours[pick])
+    splats["rotation"] = (255, 128, 128, 128)
+    return splats
 
 
 def build_pages(out: Path) -> None:
-    """The pages, bundled, with the player that stands in viewer/dist; npm installs what is missing, once.
+    """The pages, bundled, with the player; npm installs what is missing, once.
 
     Raises:
         UserError: if there is no npm, or the player has not been built.
@@ -127,183 +98,141 @@ def build_pages(out: Path) -> None:
         subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=PAGES, check=True)
     subprocess.run([npm, "run", "--silent", "build", "--", f"--outdir={out}"], cwd=PAGES, check=True)
     shutil.copytree(find_player(), out / "player", ignore=shutil.ignore_patterns("*.map"))
-    for name in ("ours", "splats", "mesh"):
-        (out / f"{name}.html").write_text(HTML.format(name))
-    shutil.copyfile(out / "mesh.html", out / "index.html")
+    for name in ("ours", "splats", "mesh", "index"):
+        (out / f"{name}.html").write_text(HTML.format("mesh" if name == "index" else name))
 
 
-def prepare(
-    asset: Asset, few: str, subdivisions: int, splats: Sequence[int], place: Path
-) -> tuple[list[Row], dict[str, Path]]:
-    """The rows, and the folders that their pages fetch from."""
-    level, heads = pick_level(asset, few), place / "site" / "heads"  # no assets: the pages' own files
-    folders = {"default": asset.folder, "few": place / "few", "many": place / "many"}
+def prepare(assets: Sequence[Asset], splats: Sequence[int], heads: Path) -> tuple[list[Entry], dict[str, Path]]:
+    """Rows (name, page, query, ways to draw: "play" shows the next frame too), and the folders of the assets.
+
+    Args:
+        heads: folder of the pages' own files, which is made.
+    """
     heads.mkdir()
-    counts = [write_single(folders[name], level, times) for name, times in (("few", 0), ("many", subdivisions))]
-    layers, full = level.num_layers, asset.full
-    write_glb(heads / "head.glb", level, "head")
-    middle = layers // 2
-    flat = len(level.layers[layers - 1 - middle].faces)  # innermost first in the GLB
-    rows = [Row(f"one opaque mesh, {flat:,} triangles", "mesh", f"layer={middle}")]
-    for folder, count in zip(("few", "many"), counts, strict=True):
-        rows.append(Row(f"ours, {layers} x {count // layers:,} triangles", "ours", f"asset={folder}"))
-    triangles = sum(len(mesh.faces) for mesh in full.layers)
-    text = f"ours as it ships, {full.num_layers} x {triangles // full.num_layers:,} triangles"
-    rows.append(Row(text, "ours", "asset=default", ("draw", "play")))
+    first = assets[0]
+    write_glb(heads / "head.glb", first.full, "head")
+    middle = first.num_layers // 2
+    flat = len(first.layers[first.num_layers - 1 - middle].faces)  # innermost first in the GLB
+    rows: list[Entry] = [{"name": f"one opaque mesh, {flat:,} triangles", "page": "mesh", "query": f"layer={middle}"}]
+    for i, asset in enumerate(assets):
+        triangles = sum(len(mesh.faces) for mesh in asset.layers) // asset.num_layers
+        name = f"ours, {asset.num_layers} x {triangles:,} triangles"
+        rows.append({"name": name, "page": "ours", "query": f"asset=asset{i}", "kinds": ["draw", "play"]})
     for count in splats:
-        (heads / f"{count}.splat").write_bytes(sample_splats(full, count).tobytes())
-        rows.append(Row(f"{count:,} splats", "splats", f"file={count}.splat"))
-    return rows, folders
+        (heads / f"{count}.splat").write_bytes(sample_splats(first, count).tobytes())
+        rows.append({"name": f"{count:,} splats", "page": "splats", "query": f"file={count}.splat"})
+    return rows, {f"asset{i}": asset.folder for i, asset in enumerate(assets)}
 
 
-def measure(
-    address: str, rows: Sequence[Row], sizes: Sequence[tuple[int, int]], pictures: int, shots: Path | None
-) -> Measured:
-    """All rows, one after the other, each in a browser started anew: what one leaves in memory is not the next's."""
-    timings: list[Timing] = []
-    loadings: list[Loading] = []
-    version = device = ""
-    for row in rows:
-        with chromium() as browser:
-            loading, more = measure_row(browser, address, row, sizes, pictures, shots)
-            version, device = browser.version, loading.device
-        loadings.append(loading)
-        timings += more
-        for t in more:
-            typer.echo(f"players: {t.row}, {t.kind}, {t.width}x{t.height}: {t.milliseconds:.0f} ms")
-    return Measured(version, device, loadings, timings)
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A headless one.
+
+    Raises:
+        UserError: if there is none.
+    """
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS.split())
+        try:
+            yield browser
+        finally:
+            browser.close()
 
 
-def measure_row(
-    browser: Browser, address: str, row: Row, sizes: Sequence[tuple[int, int]], pictures: int, shots: Path | None
-) -> tuple[Loading, list[Timing]]:
+def processes(browser: Browser) -> tuple[float, int | None]:
+    """Processor seconds of all of the browser's processes so far; resident bytes of the one that draws, on Linux
+    (without a graphics card textures lie there; most of it is the browser's own)."""
+    listed = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+    memory = None
+    for status in (Path(f"/proc/{process['id']}/status") for process in listed if process["type"] == "GPU"):
+        lines = status.read_text().splitlines() if status.exists() else []
+        memory = next((1024 * int(line.split()[1]) for line in lines if line.startswith("VmRSS")), None)
+    return sum(float(process["cpuTime"]) for process in listed), memory
+
+
+def measure_row(browser: Browser, address: str, row: Entry, sizes: Sequence[tuple[int, int]], pictures: int) -> Entry:
     """Load a page in a fresh context (nothing is cached) and draw."""
-    processes = Processes(browser)
-    context = browser.new_context(viewport={"width": sizes[0][0], "height": sizes[0][1]})
-    page = context.new_page()
+    page = browser.new_context(viewport={"width": sizes[0][0], "height": sizes[0][1]}).new_page()
     page.set_default_timeout(PATIENCE)
     said: list[str] = []
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
-    page.goto(f"{address}{row.page}.html?{row.query}")
+    page.goto(f"{address}{row['page']}.html?{row['query']}")
     try:
         page.wait_for_function("() => window.loaded", timeout=PATIENCE)
     except Exception as error:
-        raise UserError(f"the page of {row.name} did not come up", found="; ".join([*said, str(error)])[:600]) from None
-    timings = [measure_size(page, processes, row, kind, size, pictures) for size in sizes for kind in row.kinds]
-    loading = describe_loading(page, row, processes.gpu_memory())
-    if shots:
-        page.set_viewport_size({"width": sizes[0][0], "height": sizes[0][1]})
-        page.evaluate("measure('draw', 2)")
-        page.screenshot(path=shots / f"{row.page}_{row.query.split('=')[1]}.png")
-    context.close()
-    return loading, timings
-
-
-def measure_size(page: Page, processes: Processes, row: Row, kind: str, size: tuple[int, int], pictures: int) -> Timing:
-    page.set_viewport_size({"width": size[0], "height": size[1]})
-    page.wait_for_function(
-        "size => document.querySelector('canvas, facefolds-player') && innerWidth === size", arg=size[0]
-    )
-    page.evaluate(f"measure('{kind}', {WARM_UP})")
-    before = processes.seconds()
-    times = page.evaluate(f"measure('{kind}', {pictures})")
-    spent = 1000 * (processes.seconds() - before) / pictures
-    return Timing(row.name, kind, *size, pictures, float(np.median(times)), spent)
-
-
-def describe_loading(page: Page, row: Row, memory: int | None) -> Loading:
-    entries: list[dict[str, Any]] = page.evaluate(
+        found = "; ".join([*said, str(error)])[:600]
+        raise UserError(f"the page of {row['name']} did not come up", found=found) from None
+    timings = []
+    for width, height in sizes:
+        for kind in row.get("kinds", ["draw"]):
+            page.set_viewport_size({"width": width, "height": height})
+            there = "width => document.querySelector('canvas, facefolds-player') && innerWidth === width"
+            page.wait_for_function(there, arg=width)
+            page.evaluate(f"measure('{kind}', {WARM_UP})")
+            before = processes(browser)[0]
+            times = page.evaluate(f"measure('{kind}', {pictures})")
+            spent = 1000 * (processes(browser)[0] - before) / pictures
+            size = {"size": f"{width}x{height}", "milliseconds": float(np.median(times)), "processor": spent}
+            timings.append({"row": row["name"] + (", playing" if kind == "play" else ""), **size})
+    fetched: list[Entry] = page.evaluate(
         "performance.getEntriesByType('resource').map((e) => ({ name: e.name, bytes: e.decodedBodySize }))"
     )
-    code = sum(entry["bytes"] for entry in entries if entry["name"].endswith((".js", ".wasm")))
-    events = page.evaluate("window.loaded")
-    picture = events.pop("picture")
-    computed = page.evaluate("document.querySelector('facefolds-player')?.statistics.gpuBytes ?? null")
-    return Loading(
-        row.name,
-        page.evaluate("window.device"),
-        {**events, "picture": {"ms": picture}},
-        sum(entry["bytes"] for entry in entries),
-        code,
-        computed,
-        memory,
-    )
+    return {
+        "row": row["name"],
+        "device": page.evaluate("window.device"),
+        "timings": timings,
+        "loaded": page.evaluate("window.loaded"),
+        "bytes": sum(entry["bytes"] for entry in fetched),
+        "code": sum(entry["bytes"] for entry in fetched if entry["name"].endswith((".js", ".wasm"))),
+        "computed": page.evaluate("document.querySelector('facefolds-player')?.statistics.gpuBytes ?? null"),
+        "resident": processes(browser)[1],
+    }
 
 
-def timing_table(timings: Sequence[Timing]) -> str:
-    """Markdown: milliseconds a picture, and how many times the floor's."""
-    sizes = sorted({(t.width, t.height) for t in timings})
-    kinds = list(dict.fromkeys((t.row, t.kind) for t in timings))
-    floor = {(t.width, t.height): t for t in timings if t.row == timings[0].row}
-    heads = [f"{w}x{h}: ms a picture | pictures a second | processor ms | x floor" for w, h in sizes]
-    lines = ["| | " + " | ".join(heads) + " |", "|---" * (1 + 4 * len(sizes)) + "|"]
-    for row, kind in kinds:
-        cells = [row + (", playing" if kind == "play" else "")]
+def timing_table(timings: Sequence[Mapping[str, Any]]) -> str:
+    """Milliseconds a picture, pictures a second, processor milliseconds, and how many times the first row's."""
+    sizes = list(dict.fromkeys(t["size"] for t in timings))
+    found = {(t["row"], t["size"]): t for t in timings}
+    head, rows = [""], []
+    for size in sizes:
+        head += [f"{size}: ms", "pictures a second", "processor ms", "x floor"]
+    for name in dict.fromkeys(t["row"] for t in timings):
+        row = [name]
         for size in sizes:
-            (t,) = [t for t in timings if (t.row, t.kind, t.width, t.height) == (row, kind, *size)]
-            ratio = t.processor_milliseconds / floor[size].processor_milliseconds
-            cells += [
-                f"{t.milliseconds:.0f}",
-                f"{1000 / t.milliseconds:.1f}",
-                f"{t.processor_milliseconds:.0f}",
-                f"{ratio:.1f}",
-            ]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
-def loading_table(loadings: Sequence[Loading]) -> str:
-    """Markdown: milliseconds and bytes to each event; memory."""
-
-    def mebibytes(count: float | None) -> str:
-        return "" if count is None else f"{count / 2**20:.1f}"
-
-    heads = [
-        "poster",
-        "first picture",
-        "full level",
-        "its pixels",
-        "asset MiB at first picture",
-        "all MiB",
-        "scripts MiB",
-    ]
-    memory = ["GPU MiB, computed", "drawing process, MiB"]
-    lines = ["| | " + " | ".join([*heads, *memory]) + " |", "|---" * (1 + len(heads) + len(memory)) + "|"]
-    for entry in loadings:
-        times = [
-            f"{entry.loaded[k]['ms']:.0f} ms" if k in entry.loaded else ""
-            for k in ("poster", "first", "all", "picture")
-        ]
-        first = entry.loaded.get("first", {}).get("bytes")
-        sizes = [first, entry.bytes, entry.code_bytes, entry.computed_gpu_bytes, entry.measured_bytes]
-        lines.append("| " + " | ".join([entry.row, *times, *map(mebibytes, sizes)]) + " |")
-    return "\n".join(lines)
+            t, floor = found[name, size], found[timings[0]["row"], size]
+            ms, spent = t["milliseconds"], t["processor"]
+            row += [f"{ms:.0f}", f"{1000 / ms:.1f}", f"{spent:.0f}", f"{spent / floor['processor']:.1f}"]
+        rows.append(row)
+    return markdown(head, rows)
 
 
 def main(
-    asset: Annotated[Path, typer.Argument(help="Folder of an asset with several levels of detail.")],
-    few: Annotated[str, typer.Option(help="Level whose meshes are drawn as they are, and subdivided.")] = "medium",
-    subdivisions: Annotated[int, typer.Option(help="Each cuts a triangle into 4.", min=1)] = 4,
+    assets: Annotated[list[Path], typer.Argument(help="Folders of assets; splats and mesh are of the first.")],
     splats: Annotated[str, typer.Option(help="Numbers of splats.")] = "100000,300000",
     sizes: Annotated[str, typer.Option(help="Of the pictures.")] = "1280x720,2560x1440",
     pictures: Annotated[int, typer.Option(help="Pictures a measurement.", min=1)] = 8,
-    shots: Annotated[Path | None, typer.Option(help="Folder for a picture of each page, to look at.")] = None,
     out: Annotated[Path, typer.Option(help="JSON to write.")] = Path("data/players.json"),
 ) -> None:
-    """Compare players of the same head in one browser."""
+    """Compare players of the same head, each in a browser started anew; what loading took is in the JSON."""
     with report_user_errors("players"), tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
         build_pages(place / "site")
         counts = [int(count) for count in splats.split(",") if count]
-        rows, folders = prepare(read_asset(asset), few, subdivisions, counts, place)
+        rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "site" / "heads")
         wanted = [parse_size(text, film=False) for text in sizes.split(",")]
+        found = []
         with serving(place / "site", folders) as address:
-            measured = measure(address, rows, wanted, pictures, shots)
-        typer.echo(timing_table(measured.timings))
-        typer.echo(loading_table(measured.loadings))
-        conditions = {"commit": commit_name(Path(__file__).parent), "machine": machine_name(measured.device)}
-        write_json(out, conditions | {"date": datetime.now(UTC).isoformat(timespec="seconds")} | asdict(measured))
+            for row in rows:
+                with chromium() as browser:
+                    found.append(measure_row(browser, address, row, wanted, pictures))
+                typer.echo(f"players: {row['name']}: {found[-1]['timings'][0]['milliseconds']:.0f} ms")
+        typer.echo(timing_table([t for entry in found for t in entry["timings"]]))
+        conditions = {"commit": commit_name(), "machine": machine_name(found[0]["device"]), "date": now()}
+        write_json(out, conditions | {"pictures": pictures, "rows": found})
 
 
 if __name__ == "__main__":

@@ -1,127 +1,95 @@
-"""One training step of a perceptron preset, taken apart: seconds, multiply-adds and operators; for docs/performance.md.
+"""One training step of a perceptron preset, taken apart: seconds and multiply-adds; for docs/performance.md.
 
-The limit that it is held against is what this machine's matrix product reaches on large matrices.
+The parts are called one after the other on the rays of one step. The limit that they are held against is what this
+machine's matrix product reaches on large matrices.
 """
 
 from __future__ import annotations
 
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
-from unittest.mock import patch
+from typing import Annotated, Any, NamedTuple
 
 import torch
 import typer
-from torch.profiler import ProfilerActivity, profile
 from torch.utils.flop_counter import FlopCounterMode
 
-from bench.common import find_scenes
 from bench.results import machine_name
+from bench.tables import markdown
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.model import intersection, textures
-from facefolds_core.params import MlpParams, train_params
+from facefolds_core.geometry.sphere_uv import points_to_uv
+from facefolds_core.model.intersection import bracket_crossings
+from facefolds_core.params import train_params
+from facefolds_core.paths import SubjectFolders
 from facefolds_core.training import loop
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.report import device_name
 
-SECTIONS = ("draw rays", "search", "refine", "shade", "other forward", "backward", "optimiser")
 GEMM_SIZE = 2048
-KINDS = {
-    "matrix products": "mm addmm bmm baddbmm",
-    "activations and their gradients": "silu silu_ silu_backward relu threshold_backward sigmoid sigmoid_backward",
-    "sines and cosines": "sin cos",
-    "copies, gathering and scattering": "copy_ cat index index_put_ _index_put_impl_ index_select nonzero gather fill_ "
-    "embedding_dense_backward",
-    "sums": "sum mean cumprod linalg_vector_norm max min",
-}
-"""Operators by what they do; the others go into a row of their own."""
+SECTIONS = ("draw rays", "search", "refine", "shade", "other forward", "backward", "optimiser")
+Clock = Callable[[], float]
 
 
-@dataclass
-class Step:
-    """What a step costs.
+class Step(NamedTuple):
+    """What a step costs: seconds, and multiply-adds in matrix products, of each of SECTIONS; crossings of all rays."""
 
-    Attributes:
-        seconds, products: of each of SECTIONS: seconds, and multiply-adds in matrix products.
-        operators: name -> seconds of its own, by torch.profiler.
-        hits: crossings of all rays.
-    """
-
-    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    products: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    operators: dict[str, float] = field(default_factory=dict)
-    hits: int = 0
-
-    @contextmanager
-    def section(self, name: str, clock: Callable[[], float], count: bool) -> Iterator[None]:
-        """Add what happens inside to a section; either multiply-adds or time, for counting costs time."""
-        if count:
-            with FlopCounterMode(display=False) as counter:
-                yield
-            self.products[name] += counter.get_total_flops() / 2
-            return
-        began = clock()
-        yield
-        self.seconds[name] += clock() - began
+    seconds: dict[str, float]
+    products: dict[str, float]
+    hits: int
 
 
-def take_apart(run: loop.TrainingRun, params: Any, clock: Callable[[], float]) -> Step:
-    """The same step timed, counted, and seen by torch.profiler; only the last of the three moves the parameters."""
-    step = Step()
-    generator = run.state.generator
-    draws = generator.get_state()
-    for count in (False, True):
-        generator.set_state(draws)
-        _sectioned(run, params, step, clock, count)
-    generator.set_state(draws)
-    for values in (step.seconds, step.products):
-        values["other forward"] -= sum(values[name] for name in ("search", "refine", "shade"))
-    with profile(activities=[ProfilerActivity.CPU]) as profiler:
-        loop.train_step(run.state, run.sampler, params)
-    for event in profiler.key_averages():
-        if event.key.startswith("aten::"):
-            step.operators[event.key.removeprefix("aten::")] = event.self_cpu_time_total / 1e6
-    return step
+def take_apart(run: loop.TrainingRun, params: Any, clock: Clock) -> Step:
+    """The same step timed, and counted (which costs time); no parameter moves."""
+    found: list[dict[str, float]] = [{}, {}]
+    draws, hits = run.state.generator.get_state(), 0
+    for values, counted in zip(found, (False, True), strict=True):
+        run.state.generator.set_state(draws)
+        hits = _walk(run, params, partial(_measured, values, clock, counted))
+        whole = values.pop("crossings")
+        values["refine"] = whole - values["search"]
+        values["other forward"] = values.pop("forward") - whole - values["shade"]
+    return Step(found[0], found[1], hits)
 
 
-def _sectioned(run: loop.TrainingRun, params: Any, step: Step, clock: Callable[[], float], count: bool) -> None:
-    def timed(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def wrapped(*arguments: Any, **named: Any) -> Any:
-            with step.section(name, clock, count):
-                result = function(*arguments, **named)
-            if name == "search":
-                step.hits = len(result.ray)
-            return result
+def _measured(values: dict[str, float], clock: Clock, counted: bool, name: str, call: Callable[[], Any]) -> Any:
+    if counted:
+        with FlopCounterMode(display=False) as counter:
+            result = call()
+        values[name] = counter.get_total_flops() / 2
+        return result
+    began = clock()
+    result = call()
+    values[name] = clock() - began
+    return result
 
-        return wrapped
 
-    state = run.state
-    with (
-        patch.object(intersection, "bracket_crossings", timed("search", intersection.bracket_crossings)),
-        patch.object(intersection, "refine", timed("refine", intersection.refine)),
-        patch.object(textures.MlpTextures, "shade", _method(timed, textures.MlpTextures.shade)),
-    ):
-        rays = timed("draw rays", run.sampler.draw)(params.rays, state.generator)
-        losses = timed("other forward", batch_losses)(state.model, rays, params.lambda_view, params.lambda_reg)
+def _walk(run: loop.TrainingRun, params: Any, measured: Callable[[str, Callable[[], Any]], Any]) -> int:
+    """The parts of a step, those within others once by themselves. Returns the number of crossings."""
+    state, model = run.state, run.state.model
+    field, textures = model.manifolds, model.textures
+    rays = measured("draw rays", lambda: run.sampler.draw(params.rays, state.generator))
+    lines = rays.origins, rays.directions
+    samples = params.search_samples
+    found: Any = field
+    measured("search", lambda: bracket_crossings(found, found.levels, *lines, field.centre, field.radius, samples))
+    crossings = measured("crossings", lambda: field.crossings(*lines))
+    ray, layer = crossings.hit.nonzero(as_tuple=True)
+    uv, _ = points_to_uv(crossings.points[ray, layer], field.centre)
+    measured("shade", lambda: textures.shade(uv, layer, rays.time[ray], rays.directions[ray]))
+    losses = measured("forward", lambda: batch_losses(model, rays, params.lambda_view, params.lambda_reg))
     state.optimiser.zero_grad()
     for group in state.optimiser.param_groups:
         group["lr"] = 0.0
-    timed("backward", losses.total.backward)()
-    timed("optimiser", state.optimiser.step)()
+    measured("backward", losses.total.backward)
+    measured("optimiser", state.optimiser.step)
+    return len(ray)
 
 
-def _method(timed: Callable[[str, Callable[..., Any]], Callable[..., Any]], function: Callable[..., Any]) -> Any:
-    wrapped = timed("shade", function)
-    return lambda self, *arguments: wrapped(self, *arguments)
-
-
-def gemm_peak(device: torch.device, clock: Callable[[], float], repeats: int = 3) -> float:
+def gemm_peak(device: torch.device, clock: Clock, repeats: int = 3) -> float:
     """Multiply-adds a second of a product of two square float32 matrices of GEMM_SIZE: the best of some."""
     a, b = torch.rand(2, GEMM_SIZE, GEMM_SIZE, device=device)
     best = float("inf")
@@ -133,29 +101,18 @@ def gemm_peak(device: torch.device, clock: Callable[[], float], repeats: int = 3
 
 
 def report(step: Step, rays: int, peak: float) -> str:
-    """Markdown: sections against the limit, and kinds of operators."""
-    total = sum(step.seconds.values())
-    lines = [
-        f"{step.hits / rays:.2f} crossings a ray; {rays / total:.0f} rays a second; matrix products of the machine: "
-        f"{peak / 1e9:.0f} G multiply-adds a second.",
-        "",
-        "| part of a step | microseconds a ray | share | M multiply-adds a ray | of the machine's peak |",
-        "|---|---|---|---|---|",
-    ]
+    """Markdown: sections against the limit."""
+    total, rows = sum(step.seconds.values()), []
     for name in (*SECTIONS, "all"):
-        seconds = total if name == "all" else step.seconds[name]
-        products = sum(step.products.values()) if name == "all" else step.products[name]
+        seconds, products = (sum(v.values()) if name == "all" else v[name] for v in (step.seconds, step.products))
         reached = f"{products / seconds / peak:.0%}" if products and seconds else ""
-        lines.append(
-            f"| {name} | {seconds / rays * 1e6:.1f} | {seconds / total:.0%} | {products / rays / 1e6:.2f} | {reached} |"
-        )
-    lines += ["", "| operators | share |", "|---|---|"]
-    everything = sum(step.operators.values())
-    rest = dict(step.operators)
-    shares = {kind: sum(rest.pop(name, 0.0) for name in names.split()) for kind, names in KINDS.items()}
-    shares["all others"] = sum(rest.values())
-    lines += [f"| {kind} | {seconds / everything:.0%} |" for kind, seconds in shares.items()]
-    return "\n".join(lines)
+        share = f"{seconds / total:.0%}"
+        rows.append([name, f"{seconds / rays * 1e6:.1f}", share, f"{products / rays / 1e6:.2f}", reached])
+    head = ["part of a step", "microseconds a ray", "share", "M multiply-adds a ray", "of the machine's peak"]
+    return (
+        f"{step.hits / rays:.2f} crossings a ray; {rays / total:.0f} rays a second; matrix products of the machine: "
+        f"{peak / 1e9:.0f} G multiply-adds a second.\n\n{markdown(head, rows)}"
+    )
 
 
 def main(
@@ -167,10 +124,11 @@ def main(
 ) -> None:
     """Print a profile of one training step as Markdown."""
     with report_user_errors("profile_step"):
-        params = train_params({"preset": preset, "device": device, **({"rays": rays} if rays else {})})
-        if not isinstance(params, MlpParams):
+        values: dict[str, Any] = {"preset": preset, "device": device, **({"rays": rays} if rays else {})}
+        params = train_params(values)
+        if params.model != "mlp":
             raise UserError("not a perceptron preset", place="--preset", expected="paper or quick", found=preset)
-        scene = read_scene(find_scenes([subject], data)[subject])
+        scene = read_scene(SubjectFolders(data / subject).scene)
         with TemporaryDirectory() as folder:
             run = loop.begin(scene, params, Path(folder))
         at = run.sampler.device

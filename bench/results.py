@@ -1,55 +1,57 @@
-"""What was measured: one JSON file that grows by one entry a measurement and is never left half written."""
+"""What was measured: JSON files that grow by an entry a measurement and are never left half written."""
 
 from __future__ import annotations
 
 import os
 import platform
 import subprocess
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 
-VERSION = 1
-ClockKind = Literal["wall", "processor"]
-Positive = Annotated[float, Field(gt=0)]
-Entry = TypeVar("Entry", bound=BaseModel)
+ROOT = Path(__file__).resolve().parents[1]
+Clock = Literal["wall", "processor"]
+Name = Literal["layers", "mesh", "texture"]
+Means = dict[str, float | None]
 
 
-class Conditions(BaseModel):
-    """Where and how a measurement was made.
-
-    Attributes:
-        commit: first 12 digits, and "+" if tracked files had been changed since.
-        clock: "wall", or "processor": processor time of the process divided by `threads`.
-        threads: of the clock. Under "wall" the number that worked; under "processor" the number that is assumed to
-            share the work evenly, which flatters code that does not.
-        machine: processors, and what torch ran on.
-        frames: frames of each held-out camera that were scored, evenly spaced.
-    """
+class Record(BaseModel):
+    """Base of all that is kept: unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+
+class Entry(Record):
+    """One measurement; those of equal `key` replace each other. `failure`: an error's first line, or ""."""
+
+    failure: str = ""
+    date: str = ""
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        raise NotImplementedError
+
+
+class Conditions(Record):
+    """Where and how a training was measured. `clock` "processor": processor time divided by `threads`, which flatters
+    code that does not share it. `frames`: of each held-out camera that were scored, evenly spaced."""
+
     commit: str
-    clock: ClockKind
+    clock: Clock
     threads: Annotated[int, Field(ge=1)]
     machine: str
     frames: Annotated[int, Field(ge=1)]
 
 
-class Scores(BaseModel):
-    """Means over the scored images, of the model without its view branch (docs/metrics.md, `diffuse`).
-
-    Attributes:
-        region: "subject", or "frame" where the capture has no masks.
-        images: how many.
-        lpips, st_lpips: None where their weights are not on the machine.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Scores(Record):
+    """Means over `images` images of the model without its view branch (docs/metrics.md, `diffuse`), of the subject,
+    or of the whole frame where the capture has no masks."""
 
     region: Literal["subject", "frame"]
     images: int
@@ -59,131 +61,163 @@ class Scores(BaseModel):
     st_lpips: float | None
 
 
-class Measurement(BaseModel):
-    """One training, or one moment of it.
-
-    Attributes:
-        variant: what differs from the preset; "" for nothing.
-        budget: seconds asked for.
-        seconds: of training, start included, evaluation not.
-        peak_memory_bytes: of the process, before anything was evaluated.
-        scores: None if training failed.
-        failure: the first line of the error, or "".
-        date: UTC, ISO 8601.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Measurement(Entry):
+    """A training: its seconds, start included, scoring not. `budget`: seconds that were asked for, if any were."""
 
     subject: str
     preset: str
-    variant: str = ""
-    budget: Positive
-    seconds: float
+    budget: float = 0.0
+    seconds: float = 0.0
     iterations: int
-    peak_memory_bytes: int
-    scores: Scores | None
-    failure: str = ""
-    date: str
+    peak_memory_bytes: int = 0
+    scores: Scores | None = None
     conditions: Conditions
 
-    def same_as(self, other: Measurement) -> bool:
-        """Whether one of the two makes the other superfluous."""
-        return (*self.key(), self.budget) == (*other.key(), other.budget)
-
-    def key(self) -> tuple[str, ...]:
-        """All that must agree for two measurements to be one series; the machine may differ."""
-        c = self.conditions
-        return self.subject, self.preset, self.variant, c.commit, c.clock, str(c.threads), str(c.frames)
+    @property
+    def key(self) -> tuple[object, ...]:
+        c, asked = self.conditions, self.budget or self.iterations
+        return self.subject, self.preset, bool(self.budget), asked, c.commit, c.clock, c.threads, c.frames
 
 
-def read_entries(path: Path, name: str, version: int, kind: type[Entry]) -> list[Entry]:
-    """The list `name` in a file of `{"version": ..., name: [...]}`; empty if there is no file.
+class Cell(Entry):
+    """A training under a hazard (bench/hazards.py); what was not kept is 0 or empty.
 
-    Raises:
-        UserError: if the file is not one of these.
-    """
-    if not path.exists():
-        return []
-    remedy = "restore it (`git checkout`), or delete it to measure again"
-    value = read_json(path, remedy=remedy)
-    try:
-        if value["version"] != version:
-            raise UserError(
-                "results of another version",
-                file=path,
-                expected=f"version {version}",
-                found=value["version"],
-                remedy=remedy,
-            )
-        return [kind.model_validate(entry) for entry in value[name]]
-    except (KeyError, TypeError, ValidationError) as error:
-        raise UserError("garbled results", file=path, found=str(error)[:300], remedy=remedy) from None
-
-
-class Results:
-    """The measurements of one file.
-
-    Args:
-        path: of the JSON file, which need not exist.
+    Attributes:
+        subject: "film", small and with a cut budget, or a subject with all of its preset's.
+        psnr: of the subject, dB: mean of the held-out cameras (of the film: those inside its rig) and frames.
+        views: held-out camera -> dB.
+        flat: PSNR of a silhouette of the subject's true shape in one colour, dB: a model below it shows nothing.
+        restarts: times that a level of training diverged and was begun again.
+        seconds: processor time of training.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    subject: str = "film"
+    hazard: str
+    strength: float
+    preset: str
+    seed: int
+    psnr: float | None = None
+    views: dict[str, float] = {}
+    scores: Means = {}
+    flat: float = 0.0
+    restarts: int = 0
+    iterations: int = 0
+    seconds: float = 0.0
+    peak_memory_bytes: int = 0
+    commit: str = ""
 
-    def read(self) -> list[Measurement]:
-        """All measurements, in the order in which they were made.
+    @property
+    def key(self) -> tuple[object, ...]:
+        return self.subject, self.hazard, self.strength, self.preset, self.seed
+
+    @property
+    def converged(self) -> bool:
+        """It ended without an error or a new start, and shows more than a flat silhouette would."""
+        return not self.failure and not self.restarts and self.psnr is not None and self.psnr > self.flat
+
+
+class Row(Entry):
+    """An asset with one value of its subject's configuration changed (bench/sweeps.py).
+
+    Attributes:
+        params: "section.key" -> value of what differs.
+        digest: of configuration, code and data, where it was measured without DVC.
+        scores, cost: of metrics.json; empty if it failed.
+        pictures_a_second: that the OpenGL renderer draws; 0 where not measured.
+        train_seconds, export_seconds: of the stages that the change concerns, on `clock` ("processor": all threads
+            together); 0 where they were not run for it.
+    """
+
+    sweep: Name
+    subject: str
+    value: Annotated[int, Field(ge=1)]
+    params: dict[str, int]
+    digest: str = ""
+    commit: str
+    machine: str
+    scores: Means = {}
+    cost: dict[str, int] = {}
+    pictures_a_second: float = 0.0
+    renderer: str = ""
+    clock: Clock = "wall"
+    train_seconds: float = 0.0
+    export_seconds: float = 0.0
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        return self.sweep, self.subject, self.value
+
+    @property
+    def bytes(self) -> int:
+        return self.cost["mesh_bytes"] + self.cost["texture_bytes"]
+
+    @property
+    def psnr(self) -> float | None:
+        """Of the subject, where the capture has masks; else of the whole frame."""
+        subject = self.scores.get("psnr_subject")
+        return self.scores.get("psnr") if subject is None else subject
+
+
+Kind = TypeVar("Kind", bound=Entry)
+
+
+class Store(Generic[Kind]):
+    """A file of `{"version": 1, name: [...]}`, which need not exist."""
+
+    def __init__(self, path: Path, name: str, kind: type[Kind]) -> None:
+        self.path, self._name, self._kind = path, name, kind
+
+    def read(self) -> list[Kind]:
+        """All entries, in the order in which they were made.
 
         Raises:
             UserError: if the file is not one of these.
         """
-        return read_entries(self.path, "measurements", VERSION, Measurement)
+        remedy = "restore it (`git checkout`), or delete it to measure again"
+        if not self.path.exists():
+            return []
+        value = read_json(self.path, remedy=remedy)
+        try:
+            if value["version"] != 1:
+                raise ValueError(f"version {value['version']}, not 1")
+            return [self._kind.model_validate(entry) for entry in value[self._name]]
+        except (KeyError, TypeError, ValueError) as error:
+            raise UserError("garbled results", file=self.path, found=str(error)[:300], remedy=remedy) from None
 
-    def add(self, measurement: Measurement) -> None:
-        """Keep it, in place of the same one measured before. The file is read again: others may have added to it."""
-        kept = [m for m in self.read() if not m.same_as(measurement)]
-        entries = [m.model_dump(mode="json") for m in [*kept, measurement]]
-        write_json(self.path, {"version": VERSION, "measurements": entries})
-
-    def measured(self, wanted: Measurement) -> bool:
-        return any(m.same_as(wanted) for m in self.read())
-
-
-def describe(measurement: Measurement) -> str:
-    """One line for the terminal."""
-    m, s = measurement, measurement.scores
-    what = ", ".join(part for part in (m.subject, m.preset, m.variant) if part)
-    cost = f"{m.seconds:.1f} s ({m.iterations} iterations, {m.peak_memory_bytes / 2**30:.2f} GiB)"
-    if s is None:
-        return f"{what}: failed after {cost}: {m.failure}"
-    distance = "" if s.st_lpips is None else f", ST-LPIPS {s.st_lpips:.3f}"
-    return f"{what}: {s.psnr:.2f} dB, SSIM {s.ssim:.3f}{distance} on the {s.region} after {cost}"
+    def add(self, entry: Kind) -> None:
+        """Keep it in place of the same one measured before. The file is read again: others may have added to it."""
+        kept = [other for other in self.read() if other.key != entry.key]
+        write_json(self.path, {"version": 1, self._name: [one.model_dump(mode="json") for one in [*kept, entry]]})
 
 
-def commit_name(folder: Path) -> str:
+def now() -> str:
+    """UTC, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def mean(values: list[float | None]) -> float | None:
+    """Of those that are there, 5 decimals."""
+    known = [value for value in values if value is not None]
+    return round(float(np.mean(known)), 5) if known else None
+
+
+def commit_name(folder: Path = ROOT) -> str:
     """First 12 digits of the commit, "+" if tracked files differ from it; "unknown" outside a git checkout."""
 
-    def git(*arguments: str) -> str | None:
-        try:
-            done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True)
-        except (OSError, subprocess.CalledProcessError):
-            return None
+    def git(*arguments: str) -> str:
+        done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, check=False)
         return done.stdout.strip()
 
     commit = git("rev-parse", "--short=12", "HEAD")
-    if commit is None:
-        return "unknown"
     # Results themselves are tracked: they must not make their own commit look changed.
     own = [f":(top,exclude){path}" for path in ("bench/results", "docs/images")]
-    return commit + ("+" if git("status", "--porcelain", "-uno", "--", ":/", *own) else "")
+    changed = "+" if git("status", "--porcelain", "-uno", "--", ":/", *own) else ""
+    return commit + changed or "unknown"
 
 
 def machine_name(device: str) -> str:
     """Processors and device, e.g. "2 x Intel(R) Xeon(R), cpu (2 threads)"."""
-    model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
-    if info.exists():
-        lines = [
-            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
-        ]
-        model = lines[0] if lines else model
-    return f"{os.cpu_count()} x {model}, {device}"
+    lines = info.read_text().splitlines() if info.exists() else []
+    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{os.cpu_count()} x {[*models, platform.processor() or platform.machine()][0]}, {device}"

@@ -1,104 +1,97 @@
 """Speed against accuracy of the trainers: `make bench`.
 
-Trains the presets on prepared scenes (data/<subject>/scene), scores the view-independent model on the held-out cameras
-after each of --seconds, keeps every measurement in bench/results/speed_accuracy.json, and draws the chart. What is
-already there for this commit is not measured again; an interrupted run goes on from its checkpoint.
+Trains presets with several numbers of iterations, scores the view-independent model on the held-out cameras, keeps each
+measurement in bench/results/speed_accuracy.json, and draws the chart. What is there for this commit is not measured
+again. Training runs by DVC in data/bench/<subject>, with the subject's own capture.
 """
 
 from __future__ import annotations
 
-import shutil
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
+import torch
 import typer
 
-from bench.chart import draw, write_plot_data
-from bench.common import conditions_now, find_scenes, keep, numbers, words
-from bench.processes import in_a_process
-from bench.results import ClockKind, Measurement, Results, describe
-from bench.runs import Job, explicit_of, measure_on_the_way, measure_whole
+from bench import charts
+from bench.results import Clock, Conditions, Measurement, Scores, Store, commit_name, machine_name, mean, now
+from bench.run import Project, own_params, score_model, training_of
+from facefolds_core.captures.scene import read_scene
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.params import train_params
+from facefolds_core.files import read_json
+from facefolds_core.model.device import pick_device
+from facefolds_core.packaging.views import spread
+from facefolds_core.scoring.panels import METRICS
+from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.training.report import device_name
 
-SECONDS = "10,30,60,120,300,900"
-PRESETS = "fast,quick,paper"
 RESULTS = Path("bench/results/speed_accuracy.json")
 PICTURE = Path("docs/images/speed_accuracy.png")
-NEAR = 0.25
-"""An explicit run that misses its budget by more than this fraction is run once more with better iterations."""
+ITERATIONS = {
+    "fast": (183, 460, 1000, 2400, 5000, 18000),
+    "quick": (100, 300, 600, 1200, 3000, 9000),
+    "paper": (1, 2, 4, 8, 20, 60),
+}
+"""Of each preset: some 10 s to 15 minutes of training on two cores."""
 
 
-def next_iterations(budget: float, known: list[tuple[int, float]], start: int) -> int:
-    """Iterations that take about `budget` seconds.
+def score(project: Project, frames: int) -> Scores:
+    """The model on `frames` of each held-out camera, evenly spaced.
 
-    Args:
-        known: (iterations, seconds) of runs so far: the line through the last one and, of the others, the one nearest
-            to the budget; without such a line in proportion to the last one.
-        start: if there is none.
+    Raises:
+        UserError: if there is no held-out camera.
     """
-    if not known:
-        return start
-    n, t = known[-1]
-    rate = t / n
-    others = [run for run in known if (run[0] - n) * (run[1] - t) > 0]
-    if others:
-        m, s = min(others, key=lambda run: abs(run[1] - budget))
-        rate = (s - t) / (m - n)
-    return max(1, round(n + (budget - t) / rate))
+    scene = read_scene(project.folders.scene)
+    times = {k: float(k) for k in spread(scene.num_frames, frames)}
+    device = pick_device(read_json(project.folders.config / "train.json")["device"])
+    found = [v for _, _, v in score_model(project.folders.model, scene, times, find_perceptual(device), device)]
+    if not found:
+        raise UserError("no held-out camera: there is nothing to score on", file=scene.folder / "scene.json")
+    masked = [v for v in found if v["psnr_subject"] is not None]
+    suffix = "_subject" if masked else ""
+    values = {name: mean([v[name + suffix] for v in masked or found]) for name in METRICS}
+    region = {"region": "subject" if masked else "frame", "images": len(masked or found)}
+    return Scores.model_validate(region | values)
 
 
-def measure_explicit(job: Job, budgets: list[float], results: Results) -> None:
-    """Runs of about `budgets` seconds each. If none is known yet, a first one, not kept, warms caches and is timed."""
-    like = job.measurement(1.0, 0.0, 0, 0, None)
-    known = [(m.iterations, m.seconds) for m in results.read() if m.key() == like.key() and m.scores is not None]
-    guess, least = job.params.iterations, explicit_of(job.params).least_iterations
-    if not known:
-        first = in_a_process(measure_whole, job, budgets[0], ignore)
-        guess = next_iterations(budgets[0], [(first.iterations, first.seconds)], guess)
-    for budget in budgets:
-        for _ in range(2):
-            iterations = max(least, next_iterations(budget, known, guess))
-            shorter = replace(job, params=job.params.model_copy(update={"iterations": iterations}))
-            made = in_a_process(measure_whole, shorter, budget, partial(keep, results.path))
-            known = [run for run in known if run[0] != iterations] + [(iterations, made.seconds)]
-            better = max(least, next_iterations(budget, known, guess))
-            if abs(made.seconds - budget) <= NEAR * budget or better == iterations:
-                break
+def measure(project: Project, preset: str, iterations: int, conditions: Conditions) -> Measurement:
+    """One training, timed anew, and scored; a failed one is a result."""
+    blank = Measurement(
+        subject=project.subject, preset=preset, iterations=iterations, conditions=conditions, date=now()
+    )
+    try:
+        project.write(own_params(project.subject, {"train": {"preset": preset, "iterations": iterations}}))
+        project.repro("train", force=True)
+        report = training_of(project.folders)
+        processor = report["processor_seconds"] / conditions.threads
+        found = {
+            "seconds": report["seconds"] if conditions.clock == "wall" else processor,
+            "peak_memory_bytes": report["peak_memory_bytes"],
+            "scores": score(project, conditions.frames),
+        }
+    except UserError as error:
+        found = {"failure": error.message}
+    return blank.model_copy(update=found)
 
 
-def ignore(measurement: Measurement) -> None:
-    typer.echo(f"bench: (warm-up, not kept) {describe(measurement)}")
-
-
-def measure(job: Job, budgets: list[float], results: Results, force: bool) -> None:
-    """Measure what is missing of one preset on one subject."""
-    wanted = [b for b in budgets if force or not results.measured(job.measurement(b, 0.0, 0, 0, None))]
-    if not wanted:
-        typer.echo(f"bench: {job.subject}, {job.params.preset}: nothing to do, all is measured at this commit")
-        return
-    if force:
-        shutil.rmtree(job.scratch, ignore_errors=True)
-    if job.params.model == "explicit":
-        measure_explicit(job, wanted, results)
-    else:
-        in_a_process(measure_on_the_way, job, wanted, partial(keep, results.path))
+def describe(m: Measurement) -> str:
+    """One line for the terminal."""
+    cost = f"{m.seconds:.1f} s ({m.iterations} iterations, {m.peak_memory_bytes / 2**30:.2f} GiB)"
+    if m.scores is None:
+        return f"{m.subject}, {m.preset}: failed: {m.failure}"
+    return f"{m.subject}, {m.preset}: {m.scores.psnr:.2f} dB on the {m.scores.region} after {cost}"
 
 
 def main(
-    subjects: Annotated[str, typer.Option(help="Comma-separated; by default actor, and mugsy where present.")] = "",
-    presets: Annotated[str, typer.Option(help="Comma-separated.")] = PRESETS,
-    seconds: Annotated[str, typer.Option(help="Comma-separated training times.")] = SECONDS,
+    subjects: Annotated[str, typer.Option(help="Comma-separated names in params.yaml.")] = "actor",
+    presets: Annotated[str, typer.Option(help="Comma-separated.")] = "fast,quick,paper",
+    iterations: Annotated[str, typer.Option(help="Comma-separated; by default some 10 s to 15 minutes' worth.")] = "",
     clock: Annotated[
-        ClockKind,
-        typer.Option(help="`processor`: processor time / --threads, for a machine that is not idle."),
+        Clock, typer.Option(help="`processor`: processor time / --threads, where others work too.")
     ] = "wall",
     threads: Annotated[int, typer.Option(help="That share the work; 0 is what torch takes.")] = 0,
     frames: Annotated[int, typer.Option(help="Of each held-out camera that are scored, evenly spaced.")] = 3,
-    device: Annotated[str, typer.Option(help="auto, cpu or cuda.")] = "auto",
-    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    work: Annotated[Path, typer.Option(help="Folder for the trainings.")] = Path("data/bench"),
     results: Annotated[Path, typer.Option(help="File that measurements are added to.")] = RESULTS,
     picture: Annotated[Path, typer.Option(help="The chart.")] = PICTURE,
     force: Annotated[bool, typer.Option("--force", help="Measure again what is there.")] = False,
@@ -106,26 +99,19 @@ def main(
 ) -> None:
     """Measure and draw speed against accuracy."""
     with report_user_errors("bench"):
-        budgets = numbers(seconds, "--seconds")
-        file = Results(results)
-        failures = []
-        if not draw_only:
-            conditions = conditions_now(clock, threads, frames, device)
-            scenes = find_scenes(words(subjects), data)
-            for preset in words(presets):
-                for subject, scene in scenes.items():
-                    params = train_params({"preset": preset, "device": device})
-                    scratch = data / subject / "bench" / f"{conditions.commit}-{clock}{conditions.threads}"
-                    try:
-                        measure(Job(subject, scene, params, "", conditions, scratch), budgets, file, force)
-                    except UserError as error:
-                        failures.append(f"{subject}, {preset}: {error}")
-        measurements = file.read()
-        draw(measurements, picture)
-        write_plot_data(measurements, results.with_name(f"{results.stem}_plot.json"))
+        store, machine = Store(results, "measurements", Measurement), machine_name(device_name(pick_device("auto")))
+        count = threads or torch.get_num_threads()
+        conditions = Conditions(commit=commit_name(), clock=clock, threads=count, machine=machine, frames=frames)
+        for subject in [] if draw_only else subjects.split(","):
+            for preset in presets.split(","):
+                for wanted in [int(n) for n in iterations.split(",")] if iterations else ITERATIONS[preset]:
+                    place = {"subject": subject, "preset": preset, "iterations": wanted, "conditions": conditions}
+                    blank = Measurement.model_validate({**place, "date": now()})
+                    if force or all(m.key != blank.key for m in store.read()):
+                        store.add(measure(Project(work / subject, subject), preset, wanted, conditions))
+                        typer.echo(f"bench: {describe(store.read()[-1])}")
+        charts.speed(store.read(), picture)
         typer.echo(f"bench: {picture} drawn from {results}")
-        if failures:
-            raise UserError("not everything could be measured:\n" + "\n".join(failures))
 
 
 if __name__ == "__main__":

@@ -1,251 +1,172 @@
-"""The paper's three ablations on our own subjects: number of layers, mesh resolution R^m, texture resolution R^t.
+"""Sweeps over the parameters of an export, each cell an asset that DVC makes and `evaluate` scores.
 
 python -m bench.sweeps layers          N = 12, 8, 4, 1: trains again
 python -m bench.sweeps mesh            R^m = 512 ... 8, from the trained model
 python -m bench.sweeps texture         R^t = 1024 ... 128, from the trained model
+python -m bench.sweeps rate            the paper's export and ours at five rates, 60 frames: bytes against accuracy
 python -m bench.sweeps draw            the tables of docs/results.md and the charts, from what is there
 
-A cell is the subject's own configuration with one value changed. It is kept in bench/results/sweeps.json and not
-measured again while configuration, code and data are the same; stages that cells share run once (bench/sweep_cells.py).
-A cell that fails is recorded and the others go on.
+A cell is the subject's own configuration with a value changed, run by `dvc repro` in a copy of the project that shares
+its cache: stages that cells share run once, and a cell that has not changed costs nothing. A cell that fails is kept as
+such, and the others go on.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from datetime import UTC, datetime
+import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 import typer
 
-from bench.common import OWN_SUBJECTS, words
-from bench.drawing_speed import pictures_a_second
-from bench.processes import in_a_process
-from bench.results import commit_name, machine_name
-from bench.sweep_cells import Cell, measure, own_metrics, plan, run_stages
-from bench.sweep_chart import draw, write_plot_data
-from bench.sweep_rows import Name, Row, add_row, read_rows, with_tables
-from facefolds_core.config import read_stage
+from bench import charts
+from bench.results import Name, Row, Store, commit_name, machine_name, now
+from bench.run import Project, Sections, own_params
+from bench.tables import AXES, Point, rate_tables, replace_between, sweep_table
+from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import write_text
-from facefolds_core.model.device import pick_device
-from facefolds_core.params import SampleParams
+from facefolds_core.files import read_json, write_json
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
+from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.sweeps.table import Run, write_runs
-from facefolds_core.training.report import device_name
 
-PROJECT = Path(__file__).resolve().parents[1]
 RESULTS = Path("bench/results/sweeps.json")
-PICTURE = Path("docs/images/sweeps.png")
+RATE = Path("bench/results/rate_distortion.json")
+IMAGES = Path("docs/images")
 DOCUMENT = Path("docs/results.md")
+WORK = Path("data/bench")
+SIZES = (
+    "vertices",
+    "triangles",
+    "mesh_bytes",
+    "texture_bytes",
+    "video_bits_per_second",
+    "view_effects_bytes",
+    "gpu_bytes",
+)
+"""Keys of `cost` in metrics.json that are about the asset."""
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """One ablation.
+class Sweep(NamedTuple):
+    """One ablation: a parameter, the paper's values (and 8 layers), and the export stages that a change reruns."""
 
-    Attributes:
-        stage, key: of the parameter whose values are compared.
-        values: the paper's, and 8 layers.
-        timed: export stages that a change of the parameter reruns.
-    """
-
-    name: Name
-    stage: str
+    section: str
     key: str
     values: tuple[int, ...]
     timed: tuple[str, ...]
 
-    def cell(self, value: int, subject: Path, work: Path) -> Cell:
-        """The subject's own configuration with the value; a coarser level of detail is not measured and left out.
 
-        Textures finer than the subject's samples would show no more: then it is sampled as finely, once, and its
-        surfaces keep the vertices that they had.
-        """
-        overrides: dict[str, dict[str, Any]] = {self.stage: {self.key: value}, "compress": {"levels": []}}
-        first = self.stage
-        if self.name == "texture":
-            samples = read_stage(SampleParams, SubjectFolders(subject).config).resolution
-            if value > samples:
-                overrides |= {"sample": {"resolution": value}, "reconstruct": {"resolution": samples}}
-                first = "sample"
-        return Cell(subject, work, overrides, first, PROJECT)
-
-
-SWEEPS: dict[str, Sweep] = {
+SWEEPS: dict[Name, Sweep] = {
     "layers": Sweep(
-        "layers", "train", "layers", (12, 8, 4, 1),
-        ("sample", "reconstruct", "decimate", "texture", "bake", "compress"),
+        "train", "layers", (12, 8, 4, 1), ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
     ),
-    "mesh": Sweep(
-        "mesh", "decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ("decimate", "bake", "compress"),
-    ),
-    "texture": Sweep("texture", "texture", "resolution", (1024, 512, 256, 128), ("texture", "bake", "compress")),
-}  # fmt: skip
+    "mesh": Sweep("decimate", "resolution", (512, 256, 128, 64, 32, 16, 8), ("decimate", "bake", "compress")),
+    "texture": Sweep("texture", "resolution", (1024, 512, 256, 128), ("texture", "bake", "compress")),
+}
+RATE_FRAMES = 60
+"""Of the actor: codecs are compared honestly only on sequences of real length."""
+FACTORS = (17, 22, 27, 32, 38)
+"""Constant rate factors, on x264's scale."""
+PAPER_EXPORT: Sections = {
+    "sample": {"resolution": 1024, "window": "full"},
+    "reconstruct": {"method": "poisson", "resolution": 512},
+    "decimate": {"resolution": 32, "uv": "nearest"},
+    "texture": {"resolution": 1024},
+    "bake": {"iterations": 0},
+}
+LOSSLESS = {"max_error_pixels": None, "quantization_bits": 0, "compression_level": 0}
+QUANTISED = {"max_error_pixels": 0.2, "compression_level": 10}
 
 
-def run_cell(sweep: Sweep, value: int, cell: Cell) -> Row:
-    """Measure one cell, whatever it takes; called in a process of its own.
+def changes(name: Name, value: int, samples: int) -> dict[str, dict[str, Any]]:
+    """Sections of a cell; coarser levels of detail are not measured and left out.
 
-    The subject's own configuration is not run again: its figures are those of `dvc repro`, without our seconds.
+    Textures finer than the subject's `samples` would show no more: then it is sampled as finely, and its surfaces keep
+    the vertices that they had.
     """
-    key = plan(cell)["evaluate"]
-    own = own_metrics(cell)
-    if own is not None:
-        drawn = speed(SubjectFolders(cell.subject))
-        return Row(**identity(sweep, value, cell, key), scores=own[0], cost=own[1], **drawn)
-    folders, seconds = run_stages(cell, lambda line: typer.echo(f"  {line}"))
-    scores, cost = measure(folders)
-    return Row(
-        **identity(sweep, value, cell, key),
-        scores=scores,
-        cost=cost,
-        **speed(folders),
-        train_seconds=seconds.get("train", 0.0),
-        export_seconds=round(sum(seconds[stage] for stage in sweep.timed), 3),
-    )
+    sweep = SWEEPS[name]
+    found: dict[str, dict[str, Any]] = {sweep.section: {sweep.key: value}, "compress": {"levels": []}}
+    if name == "texture" and value > samples:
+        found |= {"sample": {"resolution": value}, "reconstruct": {"resolution": samples}}
+    return found
 
 
-def speed(folders: SubjectFolders) -> dict[str, Any]:
-    """How fast the asset is drawn; nothing where there is no OpenGL."""
+def run_cell(name: Name, value: int, subject: str, work: Path) -> Row:
+    """One asset of a sweep, scored; a failure is a result."""
+    project = Project(work / subject, subject)
+    params = own_params(subject, {})
+    samples = {**params["sample"], **params["subjects"][subject].get("sample", {})}.get("resolution", 512)
+    sections = changes(name, value, samples)
+    given = {f"{section}.{k}": v for section, keys in sections.items() for k, v in keys.items()}
+    identity: dict[str, Any] = {
+        "sweep": name, "subject": subject, "value": value, "commit": commit_name(), "date": now(),
+        "params": {key: v for key, v in given.items() if isinstance(v, int)},
+    }  # fmt: skip
     try:
-        pictures, renderer = pictures_a_second(folders)
+        project.write(own_params(subject, sections))
+        project.repro("evaluate")
+        metrics = read_json(project.folders.metrics)
+        device = metrics["cost"]["device"]
+        timed = [read_json(project.folders.timing(stage))["seconds"] for stage in SWEEPS[name].timed]
+        trained = metrics["cost"]["train_seconds"] if name == "layers" else 0.0
+        return Row(
+            **identity, machine=machine_name(device), scores=metrics["asset"], **drawing_speed(project.folders),
+            cost={key: metrics["cost"][key] for key in SIZES}, train_seconds=trained, export_seconds=sum(timed),
+        )  # fmt: skip
     except UserError as error:
-        typer.echo(f"  not drawn: {error}")
-        return {}
-    return {"pictures_a_second": round(pictures, 3), "renderer": renderer}
+        return Row(**identity, machine=machine_name(""), failure=error.message)
 
 
-def identity(sweep: Sweep, value: int, cell: Cell, key: str) -> dict[str, Any]:
-    """Of a row: which cell, and where and when it was measured."""
-    changed = {f"{stage}.{k}": v for stage, keys in cell.overrides.items() for k, v in keys.items()}
-    return {
-        "sweep": sweep.name,
-        "subject": cell.subject.name,
-        "value": value,
-        "params": {name: v for name, v in changed.items() if isinstance(v, int)},
-        "key": key,
-        "commit": commit_name(PROJECT),
-        "machine": machine_name(device_name(pick_device("auto"))),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def run_sweep(sweep: Sweep, subject: Path, values: list[int], work: Path, results: Path, force: bool) -> list[str]:
-    """Measure what is missing of a sweep on one subject, telling of each cell.
-
-    Returns:
-        the failed cells, in words.
-    """
-    failed = []
-    for i, value in enumerate(values):
-        title = f"[{i + 1}/{len(values)}] {sweep.name} {value}, {subject.name}"
-        cell = sweep.cell(value, subject, work)
-        key = plan(cell)["evaluate"]
-        if not force and any(r.key == key and r.value == value and not r.failure for r in read_rows(results)):
-            typer.echo(f"{title}: measured already")
-            continue
-        typer.echo(f"{title}: ...")
-        try:
-            row: Row = in_a_process(run_cell, sweep, value, cell)
-        except Exception as error:  # whatever it is, it concerns this cell alone
-            first = (str(error) or repr(error)).splitlines()[0]
-            row = Row(**identity(sweep, value, cell, key), failure=f"{type(error).__name__}: {first}"[:300])
-            failed.append(f"{title}: {error}")
-        add_row(results, row)
-        typer.echo(f"{title}: {describe(row)}")
-    return failed
-
-
-def describe(row: Row) -> str:
-    if row.failure:
-        return f"failed: {row.failure}"
-    psnr, ssim, st_lpips = (row.score(name) for name in ("psnr", "ssim", "st_lpips"))
-    shown = [f"{psnr:.2f} dB" if psnr is not None else "", f"SSIM {ssim:.3f}" if ssim is not None else ""]
-    shown += [f"ST-LPIPS {st_lpips:.3f}" if st_lpips is not None else "", f"{row.cost['triangles']} triangles"]
-    shown += [f"{row.cost['mesh_bytes']} + {row.cost['texture_bytes']} bytes"]
-    seconds = row.train_seconds + row.export_seconds
-    shown += [f"{seconds:.0f} s of processor time" if seconds else "the subject's own, as `dvc repro` left it"]
-    shown += [f"{row.pictures_a_second:.1f} pictures/s" if row.pictures_a_second else ""]
-    return ", ".join(part for part in shown if part)
-
-
-def chosen_subjects(names: str, data: Path) -> list[Path]:
-    """Folders of the subjects; without names, `actor`, and `mugsy` where it is there."""
-    found = words(names) or [name for name in OWN_SUBJECTS if (data / name / "model").exists()] or [OWN_SUBJECTS[0]]
-    for name in found:
-        if not (data / name / "model").exists():
-            raise UserError("no trained model", file=data / name, remedy=f"run `dvc repro evaluate@{name}` first")
-    return [data / name for name in found]
-
-
-def chosen_values(text: str, sweep: Sweep) -> list[int]:
+def drawing_speed(folders: SubjectFolders) -> dict[str, Any]:
+    """Pictures a second of frame 0 at 1280 x 720 by the OpenGL renderer, the median of nine from in front, until its
+    pixels are read back; nothing where there is no OpenGL."""
+    taken = []
     try:
-        values = [int(part) for part in words(text)] or list(sweep.values)
-    except ValueError:
-        values = [0]
-    if min(values) < 1:
-        raise UserError("not a list of whole numbers", place="--values", expected="such as 64,32,16", found=text)
-    return values
+        with OpenGLRenderer(read_asset(folders.asset)) as renderer:
+            for eye in turntable(Eye(), 11, 30.0):
+                camera = camera_of(eye, 1280, 720, 35.0)
+                start = time.perf_counter()
+                renderer.render(camera, 0)
+                taken.append(time.perf_counter() - start)
+            return {"pictures_a_second": round(float(1 / np.median(taken[2:])), 3), "renderer": renderer.device}
+    except UserError as error:
+        typer.echo(f"  not drawn: {error.message}")
+        return {}
 
 
-Subjects = Annotated[str, typer.Option(help="Comma-separated names; by default actor, and mugsy where it is there.")]
-Values = Annotated[str, typer.Option(help="Comma-separated, in place of the paper's.")]
-Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject, as `dvc repro` left it.")]
-Work = Annotated[Path | None, typer.Option(help="Folder for the cells; <data>/<subject>/sweeps if left out.")]
-ResultsFile = Annotated[Path, typer.Option(help="File that the rows are added to.")]
-Force = Annotated[bool, typer.Option("--force", help="Score again what is there (stages that ran are not run again).")]
+def rate_series() -> Iterator[tuple[str, Sections]]:
+    """Name and sections of each series of bytes against accuracy, but for its rates.
 
-HELP = (__doc__ or "").replace("\n\n", "\n\n\b\n")
-
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, help=HELP)
-
-
-def add_command(sweep: Sweep, text: str) -> None:
-    """A command of the sweep's name."""
-
-    @app.command(sweep.name, help=text)
-    def command(
-        subjects: Subjects = "",
-        values: Values = "",
-        data: Data = Path("data"),
-        work: Work = None,
-        results: ResultsFile = RESULTS,
-        force: Force = False,
-    ) -> None:
-        with report_user_errors("sweeps"):
-            chosen = chosen_values(values, sweep)
-            failed = []
-            for subject in chosen_subjects(subjects, data):
-                failed += run_sweep(sweep, subject, chosen, work or subject / "sweeps", results, force)
-            typer.echo(f"sweeps: rows in {results}; `python -m bench.sweeps draw` makes tables and charts of them")
-            if failed:
-                raise UserError("cells that failed:\n" + "\n".join(failed))
+    `paper`: the whole hemisphere, Poisson, the nearest sample's texture coordinates, Draco without loss. All go through
+    the same writer, which crops layers and leaves out what shows nothing: that flatters the paper's.
+    """
+    yield "paper", {**PAPER_EXPORT, "compress": {"mesh": LOSSLESS, "video": {"codec": "h264", "preset": "medium"}}}
+    for codec in ("h264", "vp9", "av1"):
+        yield f"ours, {codec}", {"compress": {"mesh": QUANTISED, "video": {"codec": codec}}}
+    video = {"codec": "h264"}
+    yield "ours32, h264", {"decimate": {"resolution": 32}, "compress": {"mesh": QUANTISED, "video": video}}
 
 
-add_command(SWEEPS["layers"], "Number of layers N: 12, 8, 4, 1. Trains a model for each, with the subject's preset.")
-add_command(SWEEPS["mesh"], "Mesh resolution R^m: 512, 256, 128, 64, 32, 16, 8. Decimate, bake and compress for each.")
-add_command(SWEEPS["texture"], "Texture resolution R^t: 1024, 512, 256, 128. Texture, bake and compress for each.")
-
-
-@app.command("draw")
-def draw_all(
-    results: ResultsFile = RESULTS,
-    picture: Annotated[Path, typer.Option(help="The chart; an SVG is written beside it.")] = PICTURE,
-    document: Annotated[Path, typer.Option(help="Its tables are replaced, between their markers.")] = DOCUMENT,
-) -> None:
-    """Tables, charts, points for `dvc plots`, and a table for `facefolds recommend`, from what has been measured."""
-    with report_user_errors("sweeps"):
-        rows = read_rows(results)
-        draw(rows, picture)
-        draw(rows, picture.with_suffix(".svg"))
-        write_plot_data(rows, results.parent)
-        write_runs(results.with_suffix(".csv"), [as_run(row) for row in rows])
-        write_text(document, with_tables(document.read_text(encoding="utf-8"), rows))
-        typer.echo(
-            f"sweeps: {picture}, {picture.with_suffix('.svg')}, tables in {document}, {results.with_suffix('.csv')}"
-        )
+def measure_rates(subject: str, work: Path, frames: int) -> list[Point]:
+    """A point for each series and factor: bytes, and PSNR on the held-out cameras (of the subject, where known)."""
+    project, found = Project(work / f"{subject}-rate", subject), []
+    for name, sections in rate_series():
+        for factor in FACTORS:
+            own = sections["compress"]
+            video = {**own["video"], "crf": factor, "target_psnr": None}
+            compress = {"compress": {**own, "video": video, "levels": []}}
+            film = {"capture": {"frames": frames}} if subject == "actor" else {}
+            project.write(own_params(subject, {**sections, **compress, **film}))
+            project.repro("evaluate")
+            metrics = read_json(project.folders.metrics)
+            sizes = {"mesh_bytes": metrics["cost"]["mesh_bytes"], "video_bytes": metrics["cost"]["texture_bytes"]}
+            psnr = metrics["asset"]["psnr_subject"] or metrics["asset"]["psnr"]
+            found.append({"series": name, "crf": factor, **sizes, "psnr": psnr, "bytes": sum(sizes.values())})
+            typer.echo(f"{name}, crf {factor}: {found[-1]['bytes']} bytes, {psnr:.3f} dB")
+    return found
 
 
 def as_run(row: Row) -> Run:
@@ -258,5 +179,66 @@ def as_run(row: Row) -> Run:
     return Run(f"{row.sweep} {row.value}", row.subject, row.commit, row.params, figures, row.failure)
 
 
+def draw(results: Path, document: Path, images: Path) -> None:
+    """Tables, charts, and the table for `facefolds recommend`, from what has been measured."""
+    rows = sorted(Store(results, "rows", Row).read(), key=lambda row: (row.sweep, row.subject, -row.value))
+    charts.sweeps(rows, images / "sweeps.png")
+    write_runs(results.with_suffix(".csv"), [as_run(row) for row in rows])
+    for sweep in AXES:
+        subjects = sorted({row.subject for row in rows if row.sweep == sweep})
+        text = "\n\n".join(f"`{subject}`:\n\n{sweep_table(rows, sweep, subject)}" for subject in subjects)
+        replace_between(
+            document, f"<!-- {sweep}: written by bench/sweeps.py draw -->", f"<!-- end of {sweep} -->", text
+        )
+
+
+def main(
+    what: Annotated[str, typer.Argument(help="layers, mesh, texture, rate or draw.")],
+    subjects: Annotated[str, typer.Option(help="Comma-separated names in params.yaml.")] = "actor",
+    values: Annotated[str, typer.Option(help="Comma-separated, in place of the paper's.")] = "",
+    work: Annotated[Path, typer.Option(help="Folder for the cells.")] = WORK,
+    results: Annotated[Path, typer.Option(help="File that the rows are added to.")] = RESULTS,
+) -> None:
+    """Measure the paper's ablations on our own subjects, or bytes against accuracy; or draw what is there."""
+    with report_user_errors("sweeps"):
+        if what == "draw":
+            draw(results, DOCUMENT, IMAGES)
+        elif what == "rate":
+            points = measure_rates(subjects, work, RATE_FRAMES)
+            write_json(RATE, points)
+            charts.rate(points, IMAGES / "rate_distortion.png", f"{subjects}, {RATE_FRAMES} frames")
+            typer.echo(rate_tables(points))
+        elif what in SWEEPS:
+            run_sweep(what, subjects.split(","), values, work, results)
+        else:
+            raise UserError("no such sweep", found=what, expected=", ".join([*SWEEPS, "rate", "draw"]))
+
+
+def run_sweep(what: str, subjects: list[str], values: str, work: Path, results: Path) -> None:
+    """Every cell of a sweep, each kept as soon as it is there.
+
+    Raises:
+        UserError: if values are none, or cells failed.
+    """
+    (name,) = (sweep for sweep in SWEEPS if sweep == what)
+    try:
+        chosen = [int(part) for part in values.split(",")] if values else list(SWEEPS[name].values)
+    except ValueError:
+        chosen = [0]
+    if min(chosen) < 1:
+        raise UserError("not a list of whole numbers", place="--values", expected="such as 64,32,16", found=values)
+    failed, store = [], Store(results, "rows", Row)
+    for subject in subjects:
+        for value in chosen:
+            row = run_cell(name, value, subject, work)
+            store.add(row)
+            psnr = row.psnr
+            title = f"{name} {value}, {subject}"
+            typer.echo(f"{title}: {f'failed: {row.failure}' if psnr is None else f'{psnr:.2f} dB, {row.bytes} bytes'}")
+            failed += [f"{title}: {row.failure}"] if row.failure else []
+    if failed:
+        raise UserError("cells that failed:\n" + "\n".join(failed))
+
+
 if __name__ == "__main__":
-    app()
+    typer.run(main)

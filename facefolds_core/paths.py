@@ -91,7 +91,7 @@ class SubjectFolders:
 
     @property
     def evaluation(self) -> Path:
-        """evaluate: `per_image.parquet`, `contact_sheet.png`."""
+        """evaluate: `per_image.parquet`, `contact_sheet.png`, `analysis.json` and its `pictures`."""
         return self.root / "evaluation"
 
     @property

@@ -12,8 +12,10 @@ from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.analysis import shape_of
 from facefolds_core.scoring.evaluation import evaluate, frame_rate_factor
 from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.scoring.record import write_record
 from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from stages.common import run_stage
@@ -32,6 +34,7 @@ def evaluate_subject(folders: SubjectFolders) -> str:
     with atomic_folder(folders.evaluation) as temporary:
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
+        write_record(temporary, result.panels, result.worst, result.seen, shape_of(asset), asset)
     write_json(folders.metrics, metrics)
     sys.stdout.write(text_table(metrics) + "\n")
     factor = frame_rate_factor(scene, asset)

@@ -1,4 +1,4 @@
-"""Put the page together: facts from files, measurements of the asset, pictures, and the template."""
+"""Put the page together: facts from files, what `evaluate` saw, pictures, and the template. Nothing is rendered."""
 
 from __future__ import annotations
 
@@ -7,42 +7,40 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.config import read_stage
 from facefolds_core.files import write_text
-from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
-from facefolds_core.packaging.views import spread
-from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.facts import Facts, read_facts
-from facefolds_core.reporting.measure import Measured, measure, radii, spacings
-from facefolds_core.scoring.evaluation import frame_rate_factor
+from facefolds_core.scoring.record import Record, View, read_record
 from facefolds_core.scoring.sheets import MAX_ERROR
 
 REPORT_NAME = "report.html"
 MOST_PIXELS = 2_500_000
-"""Of all compared pictures together: keeps the page below 5 MB."""
+"""Of all compared pictures together, but for the worst: keeps the page below 5 MB."""
 MOST_VIEWS = 24
 TEXTURE_SIDE = 320
-SPACING_GRID = 48
-"""Rays a side through which the layers' spacing is measured."""
-SECTION_RAYS = 181
 
 
 @dataclass(frozen=True)
 class Subject:
-    """All that the page is made of; `scene` and `measured` are None where the normalised scene is not there."""
+    """All that the page is made of.
+
+    Attributes:
+        scene: None where the normalised scene is not there.
+        record: what `evaluate` saw; None where that is not there.
+        views: the pictures of it that are shown.
+    """
 
     facts: Facts
     asset: Asset
     scene: Scene | None
-    measured: Measured | None
+    record: Record | None
+    views: tuple[View, ...]
 
 
 def make_report(folders: SubjectFolders) -> Path:
@@ -60,22 +58,18 @@ def make_report(folders: SubjectFolders) -> Path:
 def gather(folders: SubjectFolders) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
-    if not (folders.scene / "scene.json").is_file():
-        return Subject(facts, asset, None, None)
-    scene = read_scene(folders.scene)
-    frame_rate_factor(scene, asset)
-    params = read_stage(EvaluateParams, folders.config) if "evaluate" in facts.config else EvaluateParams()
-    pairs = chosen_pairs(scene, params.sheet_frames)
-    return Subject(facts, asset, scene, measure(scene, asset, pairs, params.background) if pairs else None)
+    scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
+    record = read_record(folders.evaluation, asset)
+    return Subject(facts, asset, scene, record, chosen_views(record) if record else ())
 
 
-def chosen_pairs(scene: Scene, wanted: int, most_pixels: int = MOST_PIXELS) -> list[tuple[int, int]]:
-    """(camera, frame) of the held-out pictures that are shown: `wanted` frames a camera, fewer if they are large."""
-    photos = scene.open_frames()
-    frames = spread(scene.num_frames, wanted)
-    pairs = [(index, k) for index in scene.indices("holdout") for k in frames if (index, k) in photos]
-    most = max(1, min(MOST_VIEWS, most_pixels // (scene.width * scene.height)))
-    return [pairs[i] for i in spread(len(pairs), most)] if pairs else []
+def chosen_views(record: Record) -> tuple[View, ...]:
+    """As many as the page has room for, evenly spread, the worst one always."""
+    views = record.views
+    most = max(1, min(MOST_VIEWS, MOST_PIXELS // views[0].truth[..., 0].size))
+    fewer = min(len(views), most)
+    shown = {round(i * (len(views) - 1) / max(1, fewer - 1)) for i in range(fewer)} | {record.worst}
+    return tuple(view for i, view in enumerate(views) if i in shown)
 
 
 def render_page(subject: Subject, folder: str) -> str:
@@ -104,28 +98,27 @@ def _source(environment: Environment, name: str) -> str:
 
 def context(subject: Subject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
-    facts, manifest, scene, measured = subject.facts, subject.asset.manifest, subject.scene, subject.measured
+    facts, manifest, scene, record = subject.facts, subject.asset.manifest, subject.scene, subject.record
     key = words.quality_key(facts.metrics)
     places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
-    views = measured.views if measured else ()
-    pairs = {(view.camera, view.frame): i for i, view in enumerate(views)}
+    pairs = {(view.camera, view.frame): i for i, view in enumerate(subject.views)}
+    seen = record.seen if record else None
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "generator": manifest.generator,
         "of_subject": key == "psnr_subject",
         "tiles": tiles(subject, key),
-        "summary": words.summary(facts, manifest, scene, measured),
+        "summary": words.summary(facts, manifest, scene, seen),
         "scores": tables.scores(facts.metrics),
         "comparisons": comparisons(subject, places),
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
         "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
-        "has_scene": scene is not None,
         "camera_map": camera_map(scene) if scene else None,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
-        "angles": tables.angles(measured) if measured else [],
-        "views": len(views),
-        "masked": measured is not None and measured.masked,
+        "angles": tables.angles(seen) if seen else [],
+        "views": record.on_sheet if record else 0,
+        "masked": seen is not None and seen.masked,
         **layers(subject),
         "textures": textures(subject.asset),
         "curves": curves(facts),
@@ -169,13 +162,14 @@ def manifest_layers(subject: Subject) -> str:
 def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
     """Truth, asset and error of each view."""
     result = []
-    for view in subject.measured.views if subject.measured else ():
-        values = [f"{words.number(view.psnr)} dB over the whole frame", f"{places[view.camera].angle:.0f}° from front"]
+    for view in subject.views:
+        values = [f"{words.number(view.psnr)} dB over the whole frame", *place_words(places.get(view.camera))]
         if view.psnr_subject is not None:
             values.insert(0, f"{words.number(view.psnr_subject)} dB of the subject")
+        worst = subject.record is not None and view is subject.record.views[subject.record.worst]
         result.append(
             {
-                "name": f"{view.camera}, frame {view.frame}",
+                "name": f"{view.camera}, frame {view.frame}{' (the worst)' if worst else ''}",
                 "scores": ", ".join(values),
                 "height": view.truth.shape[0],
                 "width": view.truth.shape[1],
@@ -185,6 +179,10 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
             }
         )
     return result
+
+
+def place_words(place: tables.Place | None) -> list[str]:
+    return [f"{place.angle:.0f}° from front"] if place else []
 
 
 def curves(facts: Facts) -> list[dict[str, Any]]:
@@ -209,27 +207,14 @@ def camera_map(scene: Scene) -> Markup:
 
 
 def layers(subject: Subject) -> dict[str, Any]:
-    """The layers' table and their sections, by rays from the sphere centre."""
-    manifest, shipped = subject.asset.manifest, subject.asset.layers
-    centre = np.array(manifest.coordinates.sphere_centre)
-    windows = np.array([layer.uv_window for layer in manifest.full.layers])
-    window = windows[:, 0].min(), windows[:, 1].max(), windows[:, 2].min(), windows[:, 3].max()
-    steps = (np.arange(SPACING_GRID) + 0.5) / SPACING_GRID
-    grid = uv_to_directions(st_to_uv(np.stack(np.meshgrid(steps, steps), -1), window))
-    line, zero = np.linspace(0, 1, SECTION_RAYS), np.zeros(SECTION_RAYS)
-    upright = uv_to_directions(np.stack([window[0] + line * (window[1] - window[0]), zero], -1))
-    level = uv_to_directions(np.stack([zero, window[2] + line * (window[3] - window[2])], -1))
+    """The layers' table and their sections."""
+    manifest, record = subject.asset.manifest, subject.record
     scale = manifest.coordinates.to_capture.scale
-    cut = [
-        (name, axes, centre + radii(shipped, centre, directions)[..., None] * directions[:, None])
-        for name, axes, directions in (("from the side", (0, 2), upright), ("from above", (1, 0), level))
-    ]
+    spacing = record.shape.spacing if record else ()
+    sections = record.shape.sections if record else {}
     return {
-        "layers": tables.layers(manifest.full, spacings(radii(shipped, centre, grid)), scale, subject.measured),
-        "sections": [
-            {"name": name, "svg": charts.section([points[:, i][:, list(axes)] for i in range(len(shipped))], name)}
-            for name, axes, points in cut
-        ],
+        "layers": tables.layers(manifest.full, spacing, scale, record.seen if record else None),
+        "sections": [{"name": name, "svg": charts.section(list(cut), name)} for name, cut in sections.items()],
         "scale": words.number(scale, 3),
     }
 

@@ -14,9 +14,9 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
 from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
-from facefolds_core.reporting.measure import Measured, Spacing
 from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS
+from facefolds_core.scoring.record import Seen, Spacing
 
 Row = dict[str, Any]
 
@@ -132,10 +132,10 @@ def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
     return rows
 
 
-def angles(measured: Measured) -> list[Row]:
+def angles(seen: Seen) -> list[Row]:
     """By angle; pixels without a surface where masks show that there should be one."""
-    bins = [(span(one), one) for one in measured.angles]
-    bins += [("no layer met", measured.bare)] if measured.masked else []
+    bins = [(span(one), one) for one in seen.angles]
+    bins += [("no layer met", seen.bare)] if seen.masked else []
     most = max((one.rms for _, one in bins if one.rms is not None), default=0.0)
     return [
         {
@@ -149,24 +149,24 @@ def angles(measured: Measured) -> list[Row]:
     ]
 
 
-def layers(level: Level, spacing: Sequence[Spacing], scale: float, measured: Measured | None) -> list[Row]:
+def layers(level: Level, spacing: Sequence[Spacing], scale: float, seen: Seen | None) -> list[Row]:
     """One row a layer, outermost first.
 
     Args:
         spacing: from each layer to the next inwards, N - 1 of them.
         scale: capture units a unit of the normalised world.
     """
-    most = max(measured.contribution) if measured else 0.0
+    most = max(seen.contribution) if seen else 0.0
     rows = []
     for i, layer in enumerate(level.layers):
         gap = spacing[i] if i < len(spacing) else Spacing(None, None)
         rows.append(
             {
                 "name": str(i + 1),
-                "contribution": percent(measured.contribution[i]) if measured else NONE,
-                "bar": share(measured.contribution[i], most) if measured else 0.0,
-                "reach": percent(measured.reach[i], 0) if measured else NONE,
-                "greatest": number(measured.greatest[i]) if measured else NONE,
+                "contribution": percent(seen.contribution[i]) if seen else NONE,
+                "bar": share(seen.contribution[i], most) if seen else 0.0,
+                "reach": percent(seen.reach[i], 0) if seen else NONE,
+                "greatest": number(seen.greatest[i]) if seen else NONE,
                 "gap": number(None if gap.mean is None else 1000 * gap.mean),
                 "gap_capture": number(None if gap.mean is None else gap.mean * scale),
                 "least": number(None if gap.least is None else 1000 * gap.least),

@@ -10,7 +10,7 @@ import numpy as np
 from facefolds_core.asset.manifest import Manifest
 from facefolds_core.captures.scene import Scene
 from facefolds_core.reporting.facts import Facts, ImageScores, StageCost, finite
-from facefolds_core.reporting.measure import AngleBin, Measured
+from facefolds_core.scoring.record import AngleBin, Seen
 
 NONE = "–"
 """Stands for a value that is not there."""
@@ -139,9 +139,9 @@ def extremes_words(images: tuple[ImageScores, ...], key: str) -> str | None:
     )
 
 
-def angle_words(measured: Measured) -> str | None:
+def angle_words(seen: Seen) -> str | None:
     """Where the error is least and greatest, of the angles that matter; holes, where masks show them."""
-    known = [(one.rms, one) for one in measured.angles if one.rms is not None and one.share >= LEAST_SHARE]
+    known = [(one.rms, one) for one in seen.angles if one.rms is not None and one.share >= LEAST_SHARE]
     if len(known) < 2:
         return None
     least, most = min(known, key=lambda one: one[0]), max(known, key=lambda one: one[0])
@@ -150,9 +150,9 @@ def angle_words(measured: Measured) -> str | None:
         f"{span(least[1])} ({number(least[0], 3)} of the full range) and greatest at {span(most[1])} "
         f"({number(most[0], 3)})."
     )
-    if not measured.masked:
+    if not seen.masked:
         return text
-    bare = measured.bare.share
+    bare = seen.bare.share
     holes = "None" if bare == 0 else "Less than 0.1\u00a0%" if bare < 0.001 else percent(bare)
     return f"{text} {holes} of the subject's pixels {'meets' if holes == 'None' else 'meet'} no layer."
 
@@ -161,9 +161,9 @@ def span(one: AngleBin) -> str:
     return f"{one.low:.0f}°–{one.high:.0f}°"
 
 
-def layer_words(measured: Measured) -> str:
+def layer_words(seen: Seen) -> str:
     """The fewest layers that make up half of what is seen, and the weakest one."""
-    shares = np.array(measured.contribution)
+    shares = np.array(seen.contribution)
     order = np.argsort(-shares, kind="stable")
     needed = int(np.searchsorted(np.cumsum(shares[order]), 0.5)) + 1
     strongest = sorted(int(i) + 1 for i in order[:needed])
@@ -172,7 +172,7 @@ def layer_words(measured: Measured) -> str:
         f"{percent(shares[order[:needed]].sum(), 0)} of what is seen comes from "
         f"{'layer' if needed == 1 else 'layers'} {listed([str(i) for i in strongest])}, counted from outside; "
         f"layer {weakest + 1} adds least, {percent(shares[weakest])}, and to no pixel more than "
-        f"{number(measured.greatest[weakest])}."
+        f"{number(seen.greatest[weakest])}."
     )
 
 
@@ -209,16 +209,14 @@ def time_words(metrics: dict[str, Any], training: dict[str, Any] | None, stages:
     return text
 
 
-def summary(
-    facts: Facts, manifest: Manifest, scene: Scene | None, measured: Measured | None
-) -> list[tuple[str, list[str]]]:
+def summary(facts: Facts, manifest: Manifest, scene: Scene | None, seen: Seen | None) -> list[tuple[str, list[str]]]:
     """Headings and their sentences; what is not known is left out."""
     groups = [
         ("What it is", [capture_words(scene) if scene else None, asset_words(manifest)]),
         ("How near it comes", [quality_words(facts.metrics), extremes_words(facts.images, quality_key(facts.metrics))]),
         (
             "What is seen",
-            [angle_words(measured), layer_words(measured)] if measured else [],
+            [angle_words(seen), layer_words(seen)] if seen else [],
         ),
         ("What it took", [time_words(facts.metrics, facts.training, facts.stages), export_words(facts.waterfall)]),
     ]

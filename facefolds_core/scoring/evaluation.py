@@ -22,17 +22,14 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.scoring.analysis import Sums
 from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
 from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, WITH_EFFECTS, ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
-
-VARIANTS = ("model", "diffuse", "asset")
-WITH_EFFECTS = "asset_view"
-"""A further variant, where the asset has view effects: the asset with them."""
-METRICS = ("psnr", "ssim", "lpips", "st_lpips")
-SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
+from facefolds_core.scoring.record import Seen
 
 MASK_EDGE = 0.1
 """The subject is where its opacity exceeds this: for the box of the perceptual metrics, and to tell an empty mask."""
@@ -41,44 +38,20 @@ MASK_MARGIN = 8
 
 
 @dataclass(frozen=True)
-class ImageScore:
-    """One rendered image against the truth.
+class Evaluation:
+    """What was found.
 
     Attributes:
-        camera, frame: their names in the capture.
-        variant: one of VARIANTS, or WITH_EFFECTS.
-        values: METRICS and SUBJECT_METRICS; None where a value cannot be had.
+        scores: all of them.
+        panels: of the contact sheet.
+        worst: the picture on which the asset's PSNR is lowest (of the subject, where that is known).
+        seen: what the asset's layers do in the pictures of the contact sheet.
     """
-
-    camera: str
-    frame: str
-    variant: str
-    values: dict[str, float | None]
-
-
-@dataclass(frozen=True)
-class Panel:
-    """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores.
-
-    `mask` is the subject's opacity (H, W), or None where the capture has none.
-    """
-
-    camera: str
-    frame: str
-    truth: Array
-    model: Array
-    asset: Array
-    model_score: ImageScore
-    asset_score: ImageScore
-    mask: Array | None = None
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """All scores, and the panels of the contact sheet."""
 
     scores: list[ImageScore]
     panels: list[Panel]
+    worst: Panel
+    seen: Seen
 
 
 def evaluate(
@@ -97,12 +70,15 @@ def evaluate(
     caster = AssetCaster(asset)
     scores: list[ImageScore] = []
     panels: list[Panel] = []
+    worst: Panel | None = None
+    sums = Sums(asset.layers)
     count = sum(camera in held_out for camera, _ in truths)
     with progress(total=count, desc="evaluate", unit="image") as bar:
         for index in held_out:
             camera = scene.cameras[index]
             frames = [k for k in range(scene.num_frames) if (index, k) in truths]
-            for k, images in _rendered(model, asset, caster, camera, frames, params.background, step):
+            hits = caster.cast(camera)
+            for k, textures, images in _rendered(model, asset, hits, camera, frames, params.background, step):
                 frame = scene.frame_ids[k]
                 _check_finite(images, camera.name, frame)
                 pictures = {variant: shown(image) for variant, image in images.items()}
@@ -112,11 +88,20 @@ def evaluate(
                 found = score_images(pictures, truth, mask, perceptual)
                 group = {v: ImageScore(camera.name, frame, v, values) for v, values in found.items()}
                 scores += group.values()
+                shot = (truth, pictures["model"], pictures["asset"])
+                panel = Panel(camera.name, frame, *shot, group["model"], group["asset"], mask)
+                worst = panel if worst is None else min(worst, panel, key=lambda one: one.rank)
                 if k in on_sheet:
-                    shot = (truth, pictures["model"], pictures["asset"])
-                    panels.append(Panel(camera.name, frame, *shot, group["model"], group["asset"], mask))
+                    panels.append(panel)
+                    sums.add_picture(camera, hits, textures, pictures["asset"] - truth, mask)
                 bar.update()
-    return Evaluation(scores, panels)
+    if worst is None:
+        raise UserError(
+            "no held-out camera has a photo: there is nothing to score on",
+            file=scene.folder / "frames.arrow",
+            remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
+        )
+    return Evaluation(scores, panels, worst, sums.result())
 
 
 def score_images(
@@ -162,14 +147,14 @@ def subject_box(mask: Array) -> tuple[slice, slice] | None:
 def _rendered(
     model: RadianceManifolds,
     asset: Asset,
-    caster: AssetCaster,
+    hits: Hits,
     camera: Camera,
     frames: list[int],
     background: tuple[float, float, float],
     step: int,
-) -> Iterator[tuple[int, dict[str, NDArray[np.float32]]]]:
-    """The variants' images (H, W, 3) over `background`, for each of the scene's `frames`."""
-    view, hits = ModelView(model, camera), caster.cast(camera)
+) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, NDArray[np.float32]]]]:
+    """The asset's textures, and the variants' images (H, W, 3) over `background`, of each of the scene's `frames`."""
+    view = ModelView(model, camera)
     maps = asset.effects()
     added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
@@ -179,7 +164,7 @@ def _rendered(
         images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": picture}
         if added is not None:
             images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
-        yield k, images
+        yield k, textures, images
 
 
 def shipped(asset: Asset, frames: list[int], step: int) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]]]]:

@@ -14,7 +14,7 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file, read_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS, ImageScore
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS, ImageScore
 
 METRICS_VERSION = 1
 EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")

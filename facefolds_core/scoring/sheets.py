@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from facefolds_core.files import atomic_file
-from facefolds_core.scoring.evaluation import ImageScore, Panel
 from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.panels import ImageScore, Panel
 
 MAX_ERROR = 0.25
 """The same end of the error scale on every sheet, so that sheets can be compared."""

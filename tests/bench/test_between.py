@@ -16,7 +16,7 @@ from tests.assets import write_store
 
 
 def entry(method: str, frame: int, moving: float, share: float) -> Score:
-    return Score(method, 0, frame, subject=0.01 * 100, subject_weight=100, moving=moving, moving_weight=100 * share)
+    return Score(method, frame, subject=0.01 * 100, subject_weight=100, moving=moving, moving_weight=100 * share)
 
 
 def test_errors_count_where_the_subject_is_and_where_it_moves() -> None:
@@ -27,7 +27,7 @@ def test_errors_count_where_the_subject_is_and_where_it_moves() -> None:
     opacity = np.full((3, 2, 2), 255, np.uint8)
     opacity[:, 1, 0] = 0
     black = np.zeros((2, 2, 3), np.float32)
-    found = score("ours", 0, 0, black, Truth(pictures, opacity), 1, 2)
+    found = score("ours", 0, black, Truth(pictures, opacity), 1, 2)
     still, moving = (100 / 255) ** 2, (151 / 255) ** 2
     assert (found.subject_weight, found.moving_weight) == (3, 2)
     assert found.subject == pytest.approx(moving + 2 * still)
@@ -59,6 +59,7 @@ def test_every_method_gives_all_times_between(tmp_path: Path, factor: int) -> No
     store = write_store(tmp_path / "textures.arrow", textures)
     wanted = [k for k in range(2 * factor) if k % factor]
     found = {name: dict(method(store, factor)) for name, method in METHODS.items()}
+    assert list(found.pop("frames")) == [0, factor, 2 * factor]
     assert all(list(frames) == wanted for frames in found.values())
     rows = {(layer, frame): image for layer, frame, image in between_rows(store, factor, progress=False)}
     for k in wanted:
@@ -71,4 +72,4 @@ def test_only_the_actor_has_a_truth(tmp_path: Path) -> None:
     folders = SubjectFolders(tmp_path)
     write_json(folders.config / "subject.json", {"source": "multiface", "path": "somewhere"})
     with pytest.raises(UserError, match="no truth between the frames"):
-        measure(folders, tmp_path / "work", "holdout", 2)
+        list(measure(folders, 2))

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 import torch
 
-from bench.profile_step import SECTIONS, gemm_peak, report, take_apart
+from bench import profile_step
+from bench.profile_step import SECTIONS, report, take_apart
 from facefolds_core.params import train_params
 from facefolds_core.training import loop
 from tests.scenes import OPAQUE, make_scene
@@ -32,8 +33,10 @@ def test_multiply_adds_of_a_step(tmp_path: Path) -> None:
     assert step.products["backward"] > 0
     assert set(step.seconds) == set(SECTIONS)
     text = report(step, 64, 1e9)
-    assert "| search |" in text and "| matrix products |" in text
+    assert "| search |" in text
 
 
-def test_a_matrix_product_has_a_speed() -> None:
-    assert gemm_peak(torch.device("cpu"), time.perf_counter, repeats=1) == pytest.approx(1e11, rel=10)
+def test_a_matrix_product_has_a_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(profile_step, "GEMM_SIZE", 64)
+    ticks = iter([0.0, 0.5])
+    assert profile_step.gemm_peak(torch.device("cpu"), lambda: next(ticks), repeats=1) == 64**3 / 0.5

@@ -14,8 +14,9 @@ from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, tables, words
 from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts
-from facefolds_core.reporting.measure import AngleBin, Measured
+from facefolds_core.scoring.record import AngleBin, Seen
 from tests.reporting.tiny import make_subject
+from tests.scenes import look_at_origin
 
 
 @pytest.fixture(scope="module")
@@ -122,17 +123,17 @@ def test_the_summary_without_masks_speaks_of_the_whole_frame() -> None:
 
 
 def test_the_summary_names_the_layers_that_make_up_half() -> None:
-    measured = Measured((), (), AngleBin(0, 90, 0, None, None), (0.1, 0.4, 0.3, 0.2), (1,) * 4, (0.5,) * 4, True)
-    text = words.layer_words(measured)
+    seen = Seen((), AngleBin(0, 90, 0, None, None), (0.1, 0.4, 0.3, 0.2), (1,) * 4, (0.5,) * 4, True)
+    text = words.layer_words(seen)
     assert text.startswith("70\u00a0% of what is seen comes from layers 2 and 3, counted from outside; layer 1 adds")
 
 
 def test_the_summary_names_the_angles_of_least_and_greatest_error() -> None:
     bins = (AngleBin(0, 15, 0.5, 0.1, 0.2), AngleBin(15, 30, 0.4, 0.1, 0.1), AngleBin(30, 45, 0.001, 0.9, 0.9))
-    measured = Measured((), bins, AngleBin(0, 90, 0.0, None, None), (1.0,), (1,), (1,), True)
-    text = str(words.angle_words(measured))
+    seen = Seen(bins, AngleBin(0, 90, 0.0, None, None), (1.0,), (1,), (1,), True)
+    text = str(words.angle_words(seen))
     assert "least at 15°–30° (0.100 of the full range) and greatest at 0°–15° (0.200). None of" in text
-    assert "pixels" not in str(words.angle_words(replace(measured, masked=False)))
+    assert "pixels" not in str(words.angle_words(replace(seen, masked=False)))
 
 
 def test_the_summary_names_the_step_that_loses_most() -> None:
@@ -182,3 +183,9 @@ def test_a_section_breaks_where_a_layer_is_not_met() -> None:
 
 def test_ink_is_read_on_any_colour() -> None:
     assert (charts.ink_on(0.0), charts.ink_on(1.0)) == ("#ffffff", "#000000")
+
+
+def test_the_place_of_a_camera() -> None:
+    found = tables.place_of(look_at_origin("left", 30, 20, 8))
+    expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
+    assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))

@@ -13,9 +13,11 @@ from typer.testing import CliRunner
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.report import command, evaluated_subjects
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
+from facefolds_core.files import read_json, write_json
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.reporting import build
 from facefolds_core.reporting.build import make_report
+from facefolds_core.scoring.record import NAME
 from tests.assets import make_asset
 from tests.reporting.tiny import FRAMES, LAYERS, make_subject
 
@@ -84,7 +86,7 @@ def test_with_scores_and_asset_alone_there_is_a_page(copy: SubjectFolders) -> No
         if path.is_dir() and path != copy.asset:
             shutil.rmtree(path)
     shutil.rmtree(copy.config)
-    assert page_of(copy).count('class="missing"') == 6
+    assert page_of(copy).count('class="missing"') == 7
 
 
 def test_without_masks_the_whole_frame_is_spoken_of(tmp_path: Path) -> None:
@@ -97,7 +99,7 @@ def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:
     shutil.rmtree(copy.asset)
     make_asset(copy.asset, layers=2, frames=FRAMES + 1, resolution=32)
     assert read_asset(copy.asset).num_frames == FRAMES + 1
-    with pytest.raises(UserError, match="different numbers of frames"):
+    with pytest.raises(UserError, match="another asset"):
         make_report(copy)
 
 
@@ -108,10 +110,15 @@ def test_a_missing_asset_is_named(copy: SubjectFolders) -> None:
     assert error.value.file == copy.asset
 
 
-def test_no_held_out_camera_is_said(copy: SubjectFolders) -> None:
-    path = copy.scene / "scene.json"
-    path.write_text(path.read_text().replace('"holdout"', '"train"'))
-    assert page_of(copy).count("No camera is held out") == 2
+def test_the_worst_picture_is_shown_where_there_is_no_room_for_all(
+    copy: SubjectFolders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "MOST_VIEWS", 1)
+    path = copy.evaluation / NAME
+    write_json(path, read_json(path) | {"worst": 2})
+    page = page_of(copy)
+    assert page.count("data:image/png") == 2
+    assert page.count("(the worst)") >= 1
 
 
 def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None:

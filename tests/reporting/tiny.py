@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from facefolds_core.asset import read_asset
+from facefolds_core.captures.scene import read_scene
 from facefolds_core.files import write_json, write_text
 from facefolds_core.params import section_of
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.scoring.analysis import Sums, shape_of
+from facefolds_core.scoring.metrics import shown
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
+from facefolds_core.scoring.record import write_record
 from facefolds_core.scoring.report import metrics_json, write_per_image
 from tests.assets import make_asset
 from tests.scenes import make_scene
@@ -30,6 +36,23 @@ def scores(subject: bool) -> list[ImageScore]:
     return found
 
 
+def write_seen(folders: SubjectFolders, masks: bool) -> None:
+    """The record of the held-out camera's pictures, all of them on the contact sheet; the first one is the worst."""
+    scene, asset = read_scene(folders.scene), read_asset(folders.asset)
+    (index,) = scene.indices("holdout")
+    truths, opacity = scene.open_frames(), scene.open_masks()
+    hits, sums, panels = AssetCaster(asset).cast(scene.cameras[index]), Sums(asset.layers), []
+    found = {(s.frame, s.variant): s for s in scores(masks)}
+    for k, textures in enumerate(asset.frames()):
+        frame = scene.frame_ids[k]
+        picture, truth = shown(composite(hits, textures)[0]), truths.image(index, k) / 255.0
+        mask = None if opacity is None else opacity.image(index, k)[..., 0] / 255.0
+        sums.add_picture(scene.cameras[index], hits, textures, picture - truth, mask)
+        both = found[frame, "model"], found[frame, "asset"]
+        panels.append(Panel(scene.cameras[index].name, frame, truth, picture, picture, *both, mask))
+    write_record(folders.evaluation, panels, panels[0], sums.result(), shape_of(asset), asset)
+
+
 def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     """Write all that `dvc repro` and the measurement of the export would leave, as far as the report reads it."""
     folders = SubjectFolders(root)
@@ -41,6 +64,7 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     write_json(folders.metrics, metrics_json("spheres", scores(masks), cost))
     folders.evaluation.mkdir()
     write_per_image(scores(masks), folders.evaluation / "per_image.parquet")
+    write_seen(folders, masks)
     write_json(folders.model / "training.json", {"preset": "fast", "seconds": 12.5})
     write_json(folders.model / "fit.json", {"reasons": ["centre: <the middle>"], "events": []})
     write_text(folders.training_log / "plots" / "metrics" / "psnr.tsv", "step\tpsnr\n0\t10\n1\tnan\n2\t20\n")

@@ -11,19 +11,12 @@ import torch
 
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
 from facefolds_core.params import EvaluateParams
-from facefolds_core.scoring.evaluation import (
-    MASK_MARGIN,
-    METRICS,
-    SUBJECT_METRICS,
-    VARIANTS,
-    Evaluation,
-    evaluate,
-    score_images,
-    subject_box,
-)
+from facefolds_core.scoring.evaluation import MASK_MARGIN, Evaluation, evaluate, score_images, subject_box
 from facefolds_core.scoring.metrics import MAX_PSNR
 from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
@@ -148,3 +141,27 @@ def test_the_subjects_box_has_a_margin_within_the_frame() -> None:
 
 def test_a_faint_mask_is_empty() -> None:
     assert subject_box(np.full((9, 9), 0.05)) is None
+
+
+def test_the_worst_picture_is_kept_though_it_is_not_on_the_sheet(tmp_path: Path) -> None:
+    shown = pictures()
+    shown[1] = 255 - shown[1]
+    scene = flat_scene(tmp_path, masks={k: half_mask() for k in range(FRAMES)})
+    found = evaluate(scene, tiny_model(), flat_asset(shown), EvaluateParams(sheet_frames=2), NO_PERCEPTUAL)
+    assert [panel.frame for panel in found.panels] == ["000000", "000002"]
+    assert found.worst.frame == "000001"
+    np.testing.assert_array_equal(found.worst.asset, shown[1] / 255)
+
+
+def test_one_opaque_layer_is_all_that_is_seen(tmp_path: Path) -> None:
+    seen = run(tmp_path, masks={k: half_mask() for k in range(FRAMES)}).seen
+    assert (seen.contribution, seen.reach, seen.greatest, seen.masked) == ((1.0,), (1.0,), (1.0,), True)
+    assert sum(one.share for one in seen.angles) == pytest.approx(1)
+
+
+def test_without_a_photo_there_is_nothing_to_score(tmp_path: Path) -> None:
+    scene = flat_scene(tmp_path)
+    picture = np.zeros((SIZE, SIZE, 3), np.uint8)
+    write_frames(tmp_path / "frames.arrow", (SIZE, SIZE, 3), [(1, 0, picture)])
+    with pytest.raises(UserError, match="has a photo"):
+        evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)

@@ -12,7 +12,7 @@ from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import (
     EXPORT_STAGES,
     METRICS_VERSION,

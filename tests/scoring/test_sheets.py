@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.scoring.evaluation import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
+from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
 from facefolds_core.scoring.sheets import (
     BLOCK_HEAD,
     FRAME_LABEL,

@@ -1,107 +1,29 @@
-"""What no file holds: measured by rendering the asset, as shipped, from held-out cameras."""
+"""What the layers of an asset do in its pictures: angles at which they are seen, shares of each, where they lie."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
-from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
+from facefolds_core.rendering import Hits
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 from facefolds_core.rendering.reference import Mesh, Texture, sample_texture
-from facefolds_core.scoring.evaluation import frame_rate_factor
-from facefolds_core.scoring.metrics import Array, psnr, shown
+from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.record import AngleBin, Seen, Shape, Spacing
 
 VISIBLE = 1 / 255
 """The least weight that can change a pixel of 8 bits."""
 ANGLE_EDGES = (0, 15, 30, 45, 60, 75, 90)
 """Degrees between the view and the surface's normal."""
-
-
-@dataclass(frozen=True)
-class View:
-    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/metrics.md."""
-
-    camera: str
-    frame: str
-    truth: Array
-    asset: Array
-    mask: Array | None
-    psnr: float | None
-    psnr_subject: float | None
-
-
-@dataclass(frozen=True)
-class AngleBin:
-    """Pixels of the subject whose surface is seen at `low` to `high` degrees from its normal.
-
-    Attributes:
-        share: of all pixels of the subject.
-        mean, rms: absolute and root mean square error of R, G and B in [0, 1]; None where there are no such pixels.
-    """
-
-    low: float
-    high: float
-    share: float
-    mean: float | None
-    rms: float | None
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Sums over the views.
-
-    Attributes:
-        angles: by ANGLE_EDGES.
-        bare: pixels of the subject that meet no visible layer, as a bin of all angles.
-        contribution: (N,) share of each layer in what is seen of the subject, sums to 1.
-        reach: (N,) share of the subject's pixels to which the layer adds at least VISIBLE.
-        greatest: (N,) largest weight in any pixel: leaving the layer out changes no colour by more.
-        masked: whether the subject is known from masks; else it is where the asset is opaque.
-    """
-
-    views: tuple[View, ...]
-    angles: tuple[AngleBin, ...]
-    bare: AngleBin
-    contribution: tuple[float, ...]
-    reach: tuple[float, ...]
-    greatest: tuple[float, ...]
-    masked: bool
-
-
-def measure(
-    scene: Scene, asset: Asset, pairs: Sequence[tuple[int, int]], background: tuple[float, float, float]
-) -> Measured:
-    """Render and measure.
-
-    Args:
-        pairs: (camera index, frame index) of the pictures; the scene has a photo of each.
-        background: RGB behind the asset, as in `evaluate`.
-    """
-    truths, masks = scene.open_frames(), scene.open_masks()
-    caster, meshes = AssetCaster(asset), [EmbreeMesh(layer.vertices, layer.faces) for layer in asset.layers]
-    factor = frame_rate_factor(scene, asset)
-    textures = {k: asset.frame(k * factor) for k in sorted({k for _, k in pairs})}
-    sums, views = Sums(asset.num_layers), []
-    for index in dict.fromkeys(camera for camera, _ in pairs):
-        camera = scene.cameras[index]
-        hits = caster.cast(camera)
-        for k in [frame for i, frame in pairs if i == index]:
-            truth = truths.image(index, k) / 255.0
-            mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
-            rgb, alpha = composite(hits, textures[k], background)
-            image, layer_weights = shown(rgb), weights(hits, textures[k])
-            scores = psnr(image, truth), None if mask is None else psnr(image, truth, mask)
-            views.append(View(camera.name, scene.frame_ids[k], truth, image, mask, *scores))
-            region = np.asarray(alpha, np.float64) if mask is None else mask
-            sums.add(region, image - truth, layer_weights, view_angles(camera, meshes, layer_weights))
-    return sums.result(views)
+SPACING_GRID = 48
+"""Rays a side through which the layers' spacing is measured."""
+SECTION_RAYS = 181
 
 
 def weights(hits: Hits, textures: Sequence[Texture]) -> NDArray[np.float32]:
@@ -149,10 +71,21 @@ def face_normals(triangles: Array) -> Array:
 class Sums:
     """Running sums over pixels, weighted with the subject's opacity."""
 
-    def __init__(self, layers: int) -> None:
+    def __init__(self, layers: Sequence[Mesh]) -> None:
+        self._meshes = [EmbreeMesh(layer.vertices, layer.faces) for layer in layers]
         # One more than the bins: pixels without a surface. Columns: weight, |error|, error squared.
         self._angles = np.zeros((len(ANGLE_EDGES), 3))
-        self._seen, self._reached, self._greatest = np.zeros(layers), np.zeros(layers), np.zeros(layers)
+        self._seen, self._reached, self._greatest = np.zeros((3, len(layers)))
+        self._masked = True
+
+    def add_picture(
+        self, camera: Camera, hits: Hits, textures: Sequence[Texture], error: Array, mask: Array | None
+    ) -> None:
+        """A rendering of the asset: its hits and textures, its error (H, W, 3), the subject's opacity (H, W)."""
+        layer_weights = weights(hits, textures)
+        region = layer_weights.sum(-1, dtype=np.float64) if mask is None else mask
+        self._masked &= mask is not None
+        self.add(region, error, layer_weights, view_angles(camera, self._meshes, layer_weights))
 
     def add(self, region: Array, error: Array, layer_weights: NDArray[np.float32], angles: Array) -> None:
         """A picture: region (H, W), error (H, W, 3), layer_weights (H, W, N), angles (H, W) with NaN."""
@@ -164,18 +97,17 @@ class Sums:
         self._reached += np.einsum("hw,hwn->n", region, layer_weights >= VISIBLE)
         self._greatest = np.maximum(self._greatest, layer_weights.max((0, 1)))
 
-    def result(self, views: Sequence[View]) -> Measured:
+    def result(self) -> Seen:
         total = max(float(self._angles[:, 0].sum()), 1e-12)
         edges = [*pairwise(ANGLE_EDGES), (0, 90)]
         bins = [_bin(low, high, row, total) for (low, high), row in zip(edges, self._angles, strict=True)]
-        return Measured(
-            views=tuple(views),
+        return Seen(
             angles=tuple(bins[:-1]),
             bare=bins[-1],
             contribution=tuple((self._seen / max(float(self._seen.sum()), 1e-12)).tolist()),
             reach=tuple((self._reached / total).tolist()),
             greatest=tuple(self._greatest.tolist()),
-            masked=all(view.mask is not None for view in views),
+            masked=self._masked,
         )
 
 
@@ -199,18 +131,6 @@ def radii(layers: Sequence[Mesh], centre: Array, directions: Array) -> Array:
     return result.reshape(*np.shape(directions)[:-1], len(layers))
 
 
-@dataclass(frozen=True)
-class Spacing:
-    """From a layer to the next one inwards, along rays from the sphere centre; units of the normalised world.
-
-    Attributes:
-        mean, least: None where the two are never met by one ray. A negative `least` means that they cross.
-    """
-
-    mean: float | None
-    least: float | None
-
-
 def spacings(radius: Array) -> list[Spacing]:
     """Between neighbours, outermost first: N - 1 of them.
 
@@ -220,3 +140,20 @@ def spacings(radius: Array) -> list[Spacing]:
     gaps = -np.diff(radius.reshape(-1, radius.shape[-1]), axis=-1)
     known = [column[np.isfinite(column)] for column in gaps.T]
     return [Spacing(float(g.mean()), float(g.min())) if len(g) else Spacing(None, None) for g in known]
+
+
+def shape_of(asset: Asset) -> Shape:
+    """By rays from the sphere centre: a grid over the layers' common window, and two arcs through its middle."""
+    centre = np.array(asset.manifest.coordinates.sphere_centre)
+    windows = np.array([layer.uv_window for layer in asset.manifest.full.layers])
+    window = windows[:, 0].min(), windows[:, 1].max(), windows[:, 2].min(), windows[:, 3].max()
+    steps = (np.arange(SPACING_GRID) + 0.5) / SPACING_GRID
+    grid = uv_to_directions(st_to_uv(np.stack(np.meshgrid(steps, steps), -1), window))
+    line, zero = np.linspace(0, 1, SECTION_RAYS), np.zeros(SECTION_RAYS)
+    upright = uv_to_directions(np.stack([window[0] + line * (window[1] - window[0]), zero], -1))
+    level = uv_to_directions(np.stack([zero, window[2] + line * (window[3] - window[2])], -1))
+    sections = {}
+    for name, axes, directions in (("from the side", (0, 2), upright), ("from above", (1, 0), level)):
+        points = centre + radii(asset.layers, centre, directions)[..., None] * directions[:, None]
+        sections[name] = points[..., list(axes)].transpose(1, 0, 2)
+    return Shape(tuple(spacings(radii(asset.layers, centre, grid))), sections)

@@ -1,31 +1,25 @@
-"""What can be wrong with a capture, each in three strengths: changes of the film, of the pictures, of the training."""
+"""What can be wrong with a capture or a start, each in three strengths; and what a hazard costs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.stress_film import Film, Shots, keep_cameras, keep_frames, map_cameras, map_images
+from bench.hazard_film import EXTREMES, Film, Shots, keep_cameras, keep_frames, map_cameras, map_images
+from bench.results import Cell
 from facefolds_core.captures.actor import ActorOptions
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.frame_store import Image
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import TrainParams, nested, value_at
 
 Random = np.random.Generator
 Disturb = Callable[[Shots, float, Random], Shots]
-
-GEOMETRY_RATE = {"mlp": "lr_manifold", "explicit": "volume.learning_rate"}
-"""The key of `train` that is the learning rate of the geometry, for each model."""
-
-SPACING = {"mlp": "level_halfwidth", "explicit": "geometry.halfwidth"}
-"""The key that is half the distance between the outermost and the innermost layer."""
-
+FILM = "film"
+"""In place of a subject's name: the small film with a cut budget."""
 WHITE_BALANCE = 0.25
 """Stops of white balance for each stop of exposure, in red and, independently, in blue."""
 
@@ -36,38 +30,27 @@ class Hazard:
 
     Attributes:
         key: for `--only` and the records.
-        title: for people.
         strengths: weak, middle, strong.
         unit: of a strength, as text with {} for the number.
-        film: what the training cameras film at a strength.
+        film: what the training cameras film at a strength; None: what is there anyway.
         truth: what the held-out cameras film: the same subject, cleanly.
         world: moves the whole world, held-out cameras too.
         disturb: changes the training pictures or cameras.
-        rate: whether the strength is a factor on the geometry's learning rate.
-        spacing: whether the strength is a factor on the distance between layers.
+        scaled: model and key of `train` on which the strength is a factor; keys that are not there do not count.
     """
 
     key: str
     title: str
     strengths: tuple[float, float, float]
     unit: str
-    film: Callable[[float], Film] = lambda _: Film()
-    truth: Callable[[float], Film] = lambda _: Film()
-    world: Callable[[Shots, float, Random], Shots] = lambda shots, *_: shots
+    film: Callable[[float], Film] | None = None
+    truth: Callable[[float], Film] | None = None
+    world: Disturb = lambda shots, *_: shots
     disturb: Disturb = lambda shots, *_: shots
-    rate: bool = False
-    spacing: bool = False
+    scaled: tuple[tuple[str, str], ...] = ()
 
     def label(self, strength: float) -> str:
         return self.unit.format(f"{strength:.3g}")
-
-    def train(self, usual: TrainParams, strength: float) -> dict[str, Any]:
-        """Values of `train` that differ from the usual ones."""
-        names = GEOMETRY_RATE if self.rate else SPACING if self.spacing else None
-        if names is None:
-            return {}
-        key = names[usual.model]
-        return nested(key, strength * value_at(usual, key))
 
 
 def fewer_cameras(shots: Shots, count: float, random: Random) -> Shots:
@@ -84,7 +67,7 @@ def _turned(camera: Camera, right: float, down: float) -> Camera:
     c, s = np.cos(angle), np.sin(angle)
     about_x = np.array([[1, 0, 0], [0, c[0], s[0]], [0, -s[0], c[0]]])
     about_y = np.array([[c[1], 0, -s[1]], [0, 1, 0], [s[1], 0, c[1]]])
-    return Camera(camera.name, camera.K, about_x @ about_y @ camera.w2c, camera.width, camera.height)
+    return replace(camera, w2c=about_x @ about_y @ camera.w2c)
 
 
 def calibration_noise(shots: Shots, pixels: float, random: Random) -> Shots:
@@ -130,8 +113,7 @@ def _moved_world(shots: Shots, factor: float, shift: NDArray[np.float64]) -> Sho
 
     def moved(camera: Camera) -> Camera:
         centre = factor * camera.centre + shift
-        w2c = np.concatenate([camera.rotation, -(camera.rotation @ centre)[:, None]], 1)
-        return Camera(camera.name, camera.K, w2c, camera.width, camera.height)
+        return replace(camera, w2c=np.concatenate([camera.rotation, -(camera.rotation @ centre)[:, None]], 1))
 
     surface = shots.surface
     if surface is not None:
@@ -164,7 +146,8 @@ def _subject(**options: float) -> Film:
 
 ODD_SIZES = {1.0: (97, 65), 2.0: (113, 53), 3.0: (71, 89)}
 """Height and width, about as many pixels as 96 x 64."""
-
+RATE = (("mlp", "lr_manifold"), ("explicit", "volume.learning_rate"))
+SPACING = (("mlp", "level_halfwidth"), ("explicit", "geometry.halfwidth"))
 
 HAZARDS: tuple[Hazard, ...] = (
     Hazard("cameras", "fewer cameras", (16, 8, 4), "{} of 22", disturb=fewer_cameras),
@@ -187,9 +170,9 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard("centre", "centre guessed wrong", (0.05, 0.1, 0.2), "{} units", world=wrong_centre),
     Hazard("radius", "radius of the mesh wrong", (0.9, 0.8, 0.6), "x {}", disturb=wrong_radius),
     Hazard("scale", "scale guessed wrong", (0.8, 1.25, 1.5), "x {}", world=wrong_scale),
-    Hazard("rate-low", "geometry's rate too low", (0.5, 0.3, 0.1), "x {}", rate=True),
-    Hazard("rate-high", "geometry's rate too high", (2, 3, 10), "x {}", rate=True),
-    Hazard("spacing", "layer spacing", (0.5, 2, 4), "x {}", spacing=True),
+    Hazard("rate-low", "geometry's rate too low", (0.5, 0.3, 0.1), "x {}", scaled=RATE),
+    Hazard("rate-high", "geometry's rate too high", (2, 3, 10), "x {}", scaled=RATE),
+    Hazard("spacing", "layer spacing", (0.5, 2, 4), "x {}", scaled=SPACING),
     Hazard(
         "size",
         "odd resolutions",
@@ -198,4 +181,54 @@ HAZARDS: tuple[Hazard, ...] = (
         film=lambda s: Film(height=ODD_SIZES[s][0], width=ODD_SIZES[s][1]),
     ),
 )
-"""All rows but the extreme views, which are the clean case seen from elsewhere."""
+CLEAN = Hazard("clean", "clean", (0, 0, 0), "-")
+EXTREME = Hazard("extreme", "extreme views", (60, 75, 85), "{} degrees")
+"""The clean case seen from farther aside: no training of its own."""
+ROWS: tuple[Hazard, ...] = (*HAZARDS, EXTREME)
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a hazard costs.
+
+    Attributes:
+        mean: dB lost against the clean case of the same seed, mean over seeds; None where every one failed.
+        least, most: over seeds.
+        seeds: that were run and have their clean case; of these `failed` ended with an error, `astray` did not
+            converge.
+        worst: the held-out view that lost most, mean over seeds, and its dB; "" if none.
+    """
+
+    mean: float | None
+    least: float
+    most: float
+    seeds: int
+    failed: int
+    astray: int
+    worst: str
+    worst_loss: float
+
+
+def loss_of(cells: Sequence[Cell], hazard: Hazard, strength: float) -> Loss | None:
+    """Of cells of one subject and preset; None where nothing was measured."""
+    clean = {c.seed: c for c in cells if c.hazard == CLEAN.key and c.psnr is not None}
+    if hazard is EXTREME:
+        names = [name for name, azimuth in EXTREMES.items() if abs(azimuth) == strength]
+        found = [c for c in clean.values() if all(name in c.views for name in names)]
+        pairs = [(c.psnr or 0.0, c.views[name], name) for c in found for name in names]
+        lost = [(c.psnr or 0.0) - float(np.mean([c.views[name] for name in names])) for c in found]
+    else:
+        found = [c for c in cells if (c.hazard, c.strength) == (hazard.key, strength) and c.seed in clean]
+        whole = [(clean[c.seed], c) for c in found if c.psnr is not None]
+        pairs = [(a.views[name], value, name) for a, c in whole for name, value in c.views.items()]
+        lost = [(a.psnr or 0.0) - (c.psnr or 0.0) for a, c in whole]
+    if not found:
+        return None
+    names = list(dict.fromkeys(name for _, _, name in pairs))
+    views = {name: float(np.mean([before - now for before, now, at in pairs if at == name])) for name in names}
+    worst = max(views, key=lambda name: views[name]) if views else ""
+    failed = len(found) - len(lost)
+    astray = 0 if hazard is EXTREME else sum(not c.converged for c in found) - failed
+    mean = float(np.mean(lost)) if lost else None
+    span = (min(lost), max(lost)) if lost else (0.0, 0.0)
+    return Loss(mean, *span, len(found), failed, astray, worst, views.get(worst, 0.0))

@@ -1,4 +1,4 @@
-"""Pictures of the actor in memory: what hazards change, and the clean views that every cell is scored on."""
+"""Pictures in memory: what hazards change, and the clean views that every cell is scored on."""
 
 from __future__ import annotations
 
@@ -16,36 +16,21 @@ from facefolds_core.captures import actor
 from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, make_rig, write_capture
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.multiface import read_multiface
-from facefolds_core.captures.scene import Scene, read_scene, write_scene
+from facefolds_core.captures.scene import Scene, Split, read_scene, write_scene
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
 
-EXTREMES: tuple[tuple[str, float], ...] = (
-    ("+60", 60.0),
-    ("-60", -60.0),
-    ("+75", 75.0),
-    ("-75", -75.0),
-    ("+85", 85.0),
-    ("-85", -85.0),
-)
-"""Held-out cameras besides the rig's: name and azimuth, degrees to the head's left; the outermost training cameras lie
+EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "-85": -85.0}
+"""Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; the outermost training cameras lie
 at 72."""
-
 EXTREME_ELEVATION = 5.0
 
 
 @dataclass(frozen=True)
 class Film:
-    """A capture of the actor.
-
-    Attributes:
-        options: see `ActorOptions`.
-        cameras: of the rig, every twelfth of them held out.
-        frames: of one whole cycle of the performance.
-        height, width: pixels.
-    """
+    """A capture of the actor: one whole cycle of its performance, every twelfth camera of the rig held out."""
 
     options: ActorOptions = field(default_factory=ActorOptions)
     cameras: int = 24
@@ -69,10 +54,9 @@ def source_digest() -> int:
 
 @dataclass(frozen=True)
 class Shots:
-    """A normalised scene with its pictures; nothing of it lies on disk.
+    """A normalised scene with its pictures.
 
     Attributes:
-        scene: its folder means nothing.
         images: (camera, frame) -> (H, W, 3) uint8.
         masks: the same of held-out cameras -> (H, W, 1) uint8.
         surface: tracked mesh, vertices (K, V, 3) and faces (F, 3), or None.
@@ -89,10 +73,9 @@ def shoot(film: Film, cache: Path) -> Shots:
     folder = cache / film.key
     if not (folder / "scene.json").exists():
         params = CaptureParams(cameras=film.cameras, frames=film.frames, height=film.height, width=film.width)
-        extremes = [camera_at(name, a, EXTREME_ELEVATION, film.width, film.height) for name, a in EXTREMES]
+        extremes = [camera_at(name, a, EXTREME_ELEVATION, film.width, film.height) for name, a in EXTREMES.items()]
         rig = make_rig(params).cameras
-        held_out = tuple(c.name for c in [*rig[11::12], *extremes])
-        subject = Subject(source="actor", path="", holdout=held_out)
+        subject = Subject(source="actor", path="", holdout=tuple(c.name for c in [*rig[11::12], *extremes]))
         with TemporaryDirectory() as raw:
             write_capture(raw, params, options=film.options, rig=ActorRig((*rig, *extremes)))
             capture = read_multiface(Path(raw), subject, params.fps)
@@ -104,24 +87,21 @@ def read_shots(folder: Path) -> Shots:
     """A scene's folder, whole in memory."""
     scene = read_scene(folder)
     frames, masks = scene.open_frames(), scene.open_masks()
+    images = {key: frames.image(*key).copy() for key in frames}
     return Shots(
-        scene=scene,
-        images={key: frames.image(*key).copy() for key in frames},
-        masks={} if masks is None else {key: masks.image(*key).copy() for key in masks},
-        surface=scene.load_surface(),
+        scene, images, {key: masks.image(*key).copy() for key in masks or ()} if masks else {}, scene.load_surface()
     )
 
 
 def write_shots(shots: Shots, folder: Path) -> Scene:
     """What the trainers read."""
-    scene = shots.scene
+    size = shots.scene.height, shots.scene.width
     with atomic_folder(folder) as temporary:
-        write_scene(scene, temporary)
-        rows = ((*key, image) for key, image in sorted(shots.images.items()))
-        write_frames(temporary / "frames.arrow", (scene.height, scene.width, 3), rows)
-        if shots.masks:
-            rows = ((*key, image) for key, image in sorted(shots.masks.items()))
-            write_frames(temporary / "masks.arrow", (scene.height, scene.width, 1), rows)
+        write_scene(shots.scene, temporary)
+        for name, channels, images in (("frames", 3, shots.images), ("masks", 1, shots.masks)):
+            if images:
+                rows = ((*key, image) for key, image in sorted(images.items()))
+                write_frames(temporary / f"{name}.arrow", (*size, channels), rows)
         if shots.surface is not None:
             np.savez(temporary / "surface.npz", vertices=shots.surface[0], faces=shots.surface[1])
     return read_scene(folder)
@@ -135,21 +115,26 @@ def keep_cameras(shots: Shots, kept: list[int]) -> Shots:
         cameras=tuple(shots.scene.cameras[i] for i in kept),
         splits=tuple(shots.scene.splits[i] for i in kept),
     )
-    images = {(place[c], k): image for (c, k), image in shots.images.items() if c in place}
-    masks = {(place[c], k): mask for (c, k), mask in shots.masks.items() if c in place}
+    images, masks = (
+        {(place[c], k): image for (c, k), image in pictures.items() if c in place}
+        for pictures in (shots.images, shots.masks)
+    )
     return replace(shots, scene=scene, images=images, masks=masks)
+
+
+def of_split(shots: Shots, split: Split) -> Shots:
+    """The training or the held-out cameras alone."""
+    return keep_cameras(shots, shots.scene.indices(split))
 
 
 def keep_frames(shots: Shots, kept: list[int]) -> Shots:
     """Only these frames; they keep their times."""
     place = {frame: position for position, frame in enumerate(kept)}
-    scene = replace(
-        shots.scene,
-        frame_ids=tuple(shots.scene.frame_ids[k] for k in kept),
-        times=shots.scene.times[kept],
+    scene = replace(shots.scene, frame_ids=tuple(shots.scene.frame_ids[k] for k in kept), times=shots.scene.times[kept])
+    images, masks = (
+        {(c, place[k]): image for (c, k), image in pictures.items() if k in place}
+        for pictures in (shots.images, shots.masks)
     )
-    images = {(c, place[k]): image for (c, k), image in shots.images.items() if k in place}
-    masks = {(c, place[k]): mask for (c, k), mask in shots.masks.items() if k in place}
     surface = None if shots.surface is None else (shots.surface[0][kept], shots.surface[1])
     return replace(shots, scene=scene, images=images, masks=masks, surface=surface)
 
@@ -163,13 +148,3 @@ def map_cameras(shots: Shots, change: Callable[[int, Camera], Camera]) -> Shots:
 def map_images(shots: Shots, change: Callable[[int, Image], Image]) -> Shots:
     """`change` is given the camera's index and the picture."""
     return replace(shots, images={key: change(key[0], image) for key, image in shots.images.items()})
-
-
-def training(shots: Shots) -> Shots:
-    """The training cameras alone."""
-    return keep_cameras(shots, shots.scene.indices("train"))
-
-
-def held_out(shots: Shots) -> Shots:
-    """The held-out cameras alone."""
-    return keep_cameras(shots, shots.scene.indices("holdout"))

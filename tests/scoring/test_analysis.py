@@ -1,4 +1,4 @@
-"""What the report measures by itself, against closed forms."""
+"""What layers do in pictures, and where they lie, against closed forms."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.rendering import AssetCaster, Hits
 from facefolds_core.rendering.intersection import EmbreeMesh
-from facefolds_core.reporting.build import MOST_PIXELS, chosen_pairs
-from facefolds_core.reporting.measure import Sums, measure, radii, spacings, view_angles, weights
-from facefolds_core.reporting.tables import place_of
-from facefolds_core.scoring.metrics import shown
+from facefolds_core.scoring.analysis import SECTION_RAYS, Sums, radii, shape_of, spacings, view_angles, weights
 from tests.assets import CENTRE, cap_mesh, make_asset, radius_of
-from tests.scenes import look_at_origin, make_scene
+from tests.scenes import look_at_origin
 
 ALONG_X = np.array([[1.0, 0.0, 0.0]])
 
@@ -57,10 +54,10 @@ class _Caps:
 
 
 def test_an_even_error_is_the_same_at_all_angles_and_the_shares_add_up() -> None:
-    sums = Sums(1)
+    sums = Sums([cap_mesh(0.3)])
     angles = np.array([[5.0, 20.0, 89.0, np.nan]])
     sums.add(np.array([[1.0, 0.5, 0.5, 2.0]]), np.full((1, 4, 3), -0.1), np.ones((1, 4, 1), np.float32), angles)
-    found = sums.result([])
+    found = sums.result()
     shares = [one.share for one in found.angles]
     assert shares == pytest.approx([0.25, 0.125, 0, 0, 0, 0.125])
     assert found.bare.share == pytest.approx(0.5)
@@ -70,17 +67,17 @@ def test_an_even_error_is_the_same_at_all_angles_and_the_shares_add_up() -> None
 
 
 def test_contribution_is_a_share_and_the_greatest_weight_a_bound() -> None:
-    sums = Sums(2)
+    sums = Sums([cap_mesh(0.3)] * 2)
     layer_weights = np.array([[[0.75, 0.25], [0.0, 0.5]]], np.float32)
     sums.add(np.ones((1, 2)), np.zeros((1, 2, 3)), layer_weights, np.zeros((1, 2)))
-    found = sums.result([])
+    found = sums.result()
     assert found.contribution == pytest.approx((0.5, 0.5))
     assert found.reach == pytest.approx((0.5, 1))
     assert found.greatest == pytest.approx((0.75, 0.5))
 
 
 def test_nothing_seen_gives_no_nan() -> None:
-    found = Sums(2).result([])
+    found = Sums([cap_mesh(0.3)] * 2).result()
     assert found.contribution == (0, 0)
     assert found.bare.rms is None
 
@@ -102,34 +99,13 @@ def test_layers_that_no_ray_meets_together_have_no_spacing() -> None:
     assert (found[0].mean, found[0].least) == (None, None)
 
 
-def test_the_place_of_a_camera() -> None:
-    found = place_of(look_at_origin("left", 30, 20, 8))
-    expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
-    assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
-
-
-def test_measured_of_an_asset(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path / "scene", frames=3)
-    make_asset(tmp_path / "asset", layers=2, frames=3, resolution=32)
-    asset = read_asset(tmp_path / "asset")
-    found = measure(scene, asset, [(3, 0), (3, 2)], (0, 0, 0))
-    assert [(view.camera, view.frame) for view in found.views] == [("cam3", "000000"), ("cam3", "000002")]
-    assert found.masked
-    assert sum(found.contribution) == pytest.approx(1)
-    assert sum(one.share for one in found.angles) + found.bare.share == pytest.approx(1)
-
-
-def test_of_frames_between_frames_the_captures_own_are_measured(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path / "scene", frames=3)
-    make_asset(tmp_path / "asset", layers=2, frames=6, resolution=32)
-    asset = read_asset(tmp_path / "asset")
-    view = measure(scene, asset, [(3, 2)], (0, 0, 0)).views[0]
-    rgb, _ = composite(AssetCaster(asset).cast(scene.cameras[3]), asset.frame(4))
-    np.testing.assert_array_equal(view.asset, shown(rgb))
-
-
-def test_large_pictures_are_fewer(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path, frames=4)
-    assert chosen_pairs(scene, 3) == [(3, 0), (3, 2), (3, 3)]
-    assert chosen_pairs(scene, 3, 2 * scene.width * scene.height) == [(3, 0), (3, 3)]
-    assert MOST_PIXELS > 768 * 500
+def test_the_layers_of_an_asset(tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset", layers=3, frames=1, resolution=32)
+    shape = shape_of(read_asset(tmp_path / "asset"))
+    assert [gap.mean for gap in shape.spacing] == pytest.approx([0.03, 0.03], rel=0.02)
+    for cut in shape.sections.values():
+        assert cut.shape == (3, SECTION_RAYS, 2)
+    side = shape.sections["from the side"][0] - [CENTRE[0], CENTRE[2]]
+    known = side[np.isfinite(side[:, 0])]
+    assert len(known) > SECTION_RAYS / 2
+    np.testing.assert_allclose(np.linalg.norm(known, axis=-1), radius_of(0), rtol=0.01)

@@ -1,0 +1,240 @@
+"""Markdown tables of what was measured, and their places between the markers of a document.
+
+python -m bench.tables            prints the README's table, from data/<subject>/metrics.json
+python -m bench.tables --write    replaces it in README.md, so that no figure is typed by hand
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from bench.hazard_rows import FILM, ROWS, Hazard, Loss, loss_of
+from bench.results import ROOT, Cell, Name, Row
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files import read_json, write_text
+
+README = ("<!-- results: written by bench/tables.py -->", "<!-- end of results -->")
+# FaceFolds, comparisons (row 1) and mesh resolution, R^m = 32 (row 2). It gives no training time.
+README_ROWS = [
+    "| paper, 5 Multiface subjects, 768x500 | 25.49 | 0.788 | LPIPS 0.356 | | | | | 118 MiB | V100 |",
+    "| paper, 002914589, R^m = 32 | 29.12 | 0.831 | LPIPS 0.291 | | | | 9 962 | 170 KB + 5.9 MB | V100 |",
+]
+PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
+"""Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
+meshes) and R^t (disk: video), 120 images of subject 002914589. `other_bytes` is what `disk` leaves out."""
+AXES: dict[Name, str] = {"layers": "layers N", "mesh": "R^m", "texture": "R^t"}
+Point = dict[str, Any]
+"""Of bytes against accuracy: "series", "bytes", "psnr", ..."""
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([f"| {' | '.join(head)} |".replace("|  |", "| |"), "|---" * len(head) + "|", *lines])
+
+
+def replace_between(path: Path, start: str, end: str, text: str) -> None:
+    """Write `text` between two markers of a document.
+
+    Raises:
+        UserError: if a marker is missing.
+    """
+    head, found, rest = path.read_text(encoding="utf-8").partition(start)
+    _, closed, tail = rest.partition(end)
+    if not found or not closed:
+        raise UserError("no place for a table", file=path, expected=f"{start} ... {end}", remedy="put the markers back")
+    write_text(path, f"{head}{start}\n{text}\n{end}{tail}")
+
+
+def number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def size(count: float) -> str:
+    return f"{count / 1e6:.2f} MB" if count >= 1e6 else f"{count / 1e3:.0f} KB"
+
+
+def spaced(count: int) -> str:
+    return f"{count:,}".replace(",", " ")
+
+
+def sweep_table(rows: Sequence[Row], sweep: Name, subject: str) -> str:
+    """A subject's cells of one sweep, the paper's printed row beside each."""
+    own = {row.value: row for row in rows if (row.sweep, row.subject) == (sweep, subject)}
+    paper = {point["value"]: point for point in PAPER[sweep]}
+    disk = {"layers": "disk", "mesh": "disk (mesh)", "texture": "disk (texture)"}[sweep]
+    head = [AXES[sweep], "PSNR of the subject", "SSIM", "ST-LPIPS", "whole frame: PSNR", "SSIM", "ST-LPIPS"]
+    head += ["triangles", "mesh", "texture", "GPU", "pictures a second", "seconds"]
+    head += ["paper: PSNR", "SSIM", "LPIPS", "triangles", disk]
+    lines = []
+    for value in sorted({*own, *paper}, reverse=True):
+        point = paper.get(value)
+        theirs = [""] * 5
+        if point:
+            theirs = [f"{point['psnr']:.2f}", f"{point['ssim']:.3f}", f"{point['lpips']:.3f}"]
+            theirs += [spaced(point["triangles"]), point["disk"]]
+        lines.append([str(value), *_own_cells(own.get(value)), *theirs])
+    return markdown(head, lines)
+
+
+def _own_cells(row: Row | None) -> list[str]:
+    if row is None or row.failure:
+        return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 11]
+    scores = [
+        number(row.scores.get(f"{name}{region}"), 2 if name == "psnr" else 3)
+        for region in ("_subject", "")
+        for name in ("psnr", "ssim", "st_lpips")
+    ]
+    seconds = " + ".join(f"{seconds:.0f}" for seconds in (row.train_seconds, row.export_seconds) if seconds)
+    sizes = [size(row.cost[name]) for name in ("mesh_bytes", "texture_bytes", "gpu_bytes")]
+    pictures = f"{row.pictures_a_second:.1f}" if row.pictures_a_second else ""
+    return [*scores, spaced(row.cost["triangles"]), *sizes, pictures, seconds]
+
+
+def hazard_tables(cells: Sequence[Cell]) -> str:
+    """One table a subject and preset, one line a hazard.
+
+    Raises:
+        UserError: if no clean case was measured.
+    """
+    groups = dict.fromkeys((c.subject, c.preset) for c in cells if c.hazard == "clean" and c.psnr is not None)
+    if not groups:
+        raise UserError("nothing measured yet", remedy="run `python -m bench.hazards`")
+    return "\n\n".join(_hazard_table(cells, *group) for group in sorted(groups, key=lambda g: (g[0] != FILM, g)))
+
+
+def _hazard_table(cells: Sequence[Cell], subject: str, preset: str) -> str:
+    own = [c for c in cells if (c.subject, c.preset) == (subject, preset)]
+    clean = {c.seed: c for c in own if c.hazard == "clean" and c.psnr is not None}
+    values = [c.psnr for _, c in sorted(clean.items()) if c.psnr is not None]
+    seconds = np.mean([c.seconds for c in own if c.psnr is not None])
+    flat = f"; a flat silhouette has {clean[min(clean)].flat:.2f}" if clean[min(clean)].flat else ""
+    name = f"`{preset}`" if subject == FILM else f"`{preset}` on `{subject}`, its whole budget"
+    text = f"{name}: clean {np.mean(values):.2f} dB (seeds {', '.join(f'{v:.2f}' for v in values)}{flat}); "
+    text += f"{seconds:.0f} s of processor time a training."
+    if subject == FILM:
+        lines = [line for hazard in ROWS if (line := _hazard_line(own, hazard))]
+        head = ["", "weak", "middle", "strong", "seeds", "worst view, at the strongest measured"]
+        return f"{text} dB lost:\n\n{markdown(head, lines)}"
+    found = dict.fromkeys((c.hazard, c.strength) for c in own if c.hazard != "clean")
+    known = {hazard.key: hazard for hazard in ROWS}
+    rows = []
+    for key, strength in found:
+        hazard = known.get(key, Hazard(key, key, (0, 0, 0), "{} units"))
+        rows.append([hazard.title, hazard.label(strength), cell_text(loss_of(own, hazard, strength), True, 2)])
+    return f"{text} dB lost:\n\n{markdown(['', 'strength', 'dB lost'], rows)}" if rows else text
+
+
+def _hazard_line(cells: Sequence[Cell], hazard: Hazard) -> list[str]:
+    losses = [loss_of(cells, hazard, strength) for strength in hazard.strengths]
+    if not any(losses):
+        return []
+    pairs = zip(hazard.strengths, losses, strict=True)
+    fields = [f"{hazard.label(strength)}: {cell_text(loss, spread=True)}" for strength, loss in pairs]
+    seeds = sorted({loss.seeds for loss in losses if loss})
+    last = next(loss for loss in reversed(losses) if loss)
+    worst = f"{last.worst}: {last.worst_loss:.1f}" if last.worst else "-"
+    return [hazard.title, *fields, "-".join(map(str, seeds)), worst]
+
+
+def cell_text(loss: Loss | None, spread: bool = False, digits: int = 1) -> str:
+    """ "1.2", with "*" where a seed did not converge, "failed" where none ended; "(0.9 to 1.4)" for the spread."""
+    if loss is None or loss.mean is None:
+        return "-" if loss is None else "failed"
+    zero = number(0.0, digits)
+    text = number(loss.mean, digits).replace(f"-{zero}", zero) + ("*" if loss.astray or loss.failed else "")
+    if spread and loss.seeds - loss.failed > 1:
+        text += f" ({number(loss.least, digits)} to {number(loss.most, digits)})"
+    return text
+
+
+def rate_tables(points: Sequence[Point]) -> str:
+    """Bytes of each series at the qualities of the first one's points, and its PSNR at their bytes."""
+
+    def smaller(anchor: Point, own: Sequence[Point]) -> str:
+        found = interpolated(anchor["psnr"], [(p["psnr"], float(np.log(p["bytes"]))) for p in own])
+        better = [p["bytes"] for p in own if p["psnr"] >= anchor["psnr"]]
+        most = f"at most {min(better) / 1000:.0f} kB" if better else "out of reach"
+        return most if found is None else f"{np.exp(found) / 1000:.0f} kB"
+
+    def better(anchor: Point, own: Sequence[Point]) -> str:
+        found = interpolated(float(np.log(anchor["bytes"])), [(float(np.log(p["bytes"])), p["psnr"]) for p in own])
+        fewer = [p["psnr"] for p in own if p["bytes"] <= anchor["bytes"]]
+        least = f"at least {max(fewer):.2f} dB" if fewer else "larger"
+        return least if found is None else f"{found:.2f} dB"
+
+    columns: list[tuple[str, Callable[[Point], str], Callable[[Point, Sequence[Point]], str]]] = [
+        ("held-out PSNR", lambda p: f"{p['psnr']:.2f} dB", smaller),
+        ("bytes", lambda p: f"{p['bytes'] / 1000:.0f} kB", better),
+    ]
+    series = {name: [p for p in points if p["series"] == name] for name in dict.fromkeys(p["series"] for p in points)}
+    anchors = next(iter(series.values()))
+    return "\n\n".join(
+        markdown([title, *series], [[row(a), *(cell(a, own) for own in series.values())] for a in anchors])
+        for title, row, cell in columns
+    )
+
+
+def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | None:
+    """Linear between points (x, y); None beyond their ends."""
+    ordered = sorted(points)
+    if not ordered or not ordered[0][0] <= at <= ordered[-1][0]:
+        return None
+    return float(np.interp(at, [x for x, _ in ordered], [y for _, y in ordered]))
+
+
+def readme_table(data: Path) -> str:
+    """The asset over the whole frame, then asset, diffuse model and model over the subject, and what it took."""
+    files = sorted(data.glob("*/metrics.json"))
+    if not files:
+        raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
+    head = [
+        "",
+        "PSNR",
+        "SSIM",
+        "perceptual",
+        "PSNR of the subject: asset",
+        "diffuse",
+        "model",
+        "triangles",
+        "mesh + video",
+    ]
+    rows = []
+    for path in files:
+        metrics = read_json(path)
+        asset, cost = metrics["asset"], metrics["cost"]
+        lpips, st_lpips = asset.get("lpips"), asset.get("st_lpips")
+        perceptual = f"LPIPS {lpips:.3f}" if lpips is not None else f"ST-LPIPS {number(st_lpips, 3)}"
+        preset = read_json(path.parent / "model" / "training.json")["preset"]
+        rows.append(
+            [
+                *(f"ours, `{path.parent.name}`, preset `{preset}`", number(asset["psnr"], 2), number(asset["ssim"], 3)),
+                perceptual,
+                *(number(metrics[variant].get("psnr_subject"), 2) for variant in ("asset", "diffuse", "model")),
+                spaced(cost["triangles"]),
+                f"{size(cost['mesh_bytes'])} + {size(cost['texture_bytes'])}",
+                f"{cost['device']}, {cost['train_seconds']:.0f} s",
+            ]
+        )
+    whole = markdown([*head, "trained on, for"], rows).splitlines()
+    return "\n".join([*whole[:2], *README_ROWS, *whole[2:]])
+
+
+def main(
+    data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    write: Annotated[bool, typer.Option("--write", help="Replace the table in README.md.")] = False,
+) -> None:
+    """Print (or write into README.md) the table of scores and costs, ours beside the paper's."""
+    with report_user_errors("tables"):
+        text = readme_table(data)
+        if write:
+            replace_between(Path("README.md"), *README, text)
+        typer.echo("tables: written into README.md" if write else text)
+
+
+if __name__ == "__main__":
+    typer.run(main)

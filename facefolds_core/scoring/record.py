@@ -1,0 +1,221 @@
+"""`evaluation/analysis.json` and the pictures beside it: what was seen, kept so that nobody has to render it again."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from facefolds_core.asset import Asset
+from facefolds_core.asset.manifest import MANIFEST_NAME
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json, write_json
+from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.panels import Panel
+
+VERSION = 1
+NAME = "analysis.json"
+PICTURES = "pictures"
+DECIMALS = 6
+REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
+
+
+@dataclass(frozen=True)
+class AngleBin:
+    """Pixels of the subject whose surface is seen at `low` to `high` degrees from its normal.
+
+    Attributes:
+        share: of all pixels of the subject.
+        mean, rms: absolute and root mean square error of R, G and B in [0, 1]; None where there are no such pixels.
+    """
+
+    low: float
+    high: float
+    share: float
+    mean: float | None
+    rms: float | None
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """From a layer to the next one inwards, along rays from the sphere centre; units of the normalised world.
+
+    Attributes:
+        mean, least: None where the two are never met by one ray. A negative `least` means that they cross.
+    """
+
+    mean: float | None
+    least: float | None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Sums over the pictures of the contact sheet.
+
+    Attributes:
+        angles: by the angle, rising.
+        bare: pixels of the subject that meet no visible layer, as a bin of all angles.
+        contribution: (N,) share of each layer in what is seen of the subject, sums to 1.
+        reach: (N,) share of the subject's pixels to which the layer adds at least 1/255.
+        greatest: (N,) largest weight in any pixel: leaving the layer out changes no colour by more.
+        masked: whether the subject is known from masks; else it is where the asset is opaque.
+    """
+
+    angles: tuple[AngleBin, ...]
+    bare: AngleBin
+    contribution: tuple[float, ...]
+    reach: tuple[float, ...]
+    greatest: tuple[float, ...]
+    masked: bool
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Where the layers lie.
+
+    Attributes:
+        spacing: from each layer to the next one inwards, N - 1 of them.
+        sections: name of a cut through the sphere centre -> (N, M, 2) points of each layer, x right and y up as it is
+            seen; NaN where the layer is not met.
+    """
+
+    spacing: tuple[Spacing, ...]
+    sections: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class View:
+    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/metrics.md."""
+
+    camera: str
+    frame: str
+    truth: Array
+    asset: Array
+    mask: Array | None
+    psnr: float | None
+    psnr_subject: float | None
+
+
+@dataclass(frozen=True)
+class Record:
+    """What `evaluate` saw.
+
+    Attributes:
+        views: those of the contact sheet in its order, then the worst where it is not among them.
+        on_sheet: how many of them are of the contact sheet.
+        worst: index of the view with the lowest PSNR of all held-out pictures.
+        seen, shape: of the asset.
+    """
+
+    views: tuple[View, ...]
+    on_sheet: int
+    worst: int
+    seen: Seen
+    shape: Shape
+
+
+def write_record(folder: Path, panels: Sequence[Panel], worst: Panel, seen: Seen, shape: Shape, asset: Asset) -> None:
+    """Write into `folder`, which `evaluate` makes."""
+    listed = panels if any(panel is worst for panel in panels) else [*panels, worst]
+    (folder / PICTURES).mkdir()
+    layers = [
+        {"contribution": part, "reach": reach, "greatest": greatest, "to_next": asdict(gap) if gap else None}
+        for part, reach, greatest, gap in zip(
+            seen.contribution, seen.reach, seen.greatest, [*shape.spacing, None], strict=True
+        )
+    ]
+    value = {
+        "version": VERSION,
+        "asset": digest_of(asset),
+        "views": [_write_view(folder, i, panel) for i, panel in enumerate(listed)],
+        "on_sheet": len(panels),
+        "worst": next(i for i, panel in enumerate(listed) if panel is worst),
+        "masked": seen.masked,
+        "angles": [asdict(one) for one in seen.angles],
+        "no_layer": asdict(seen.bare),
+        "layers": layers,
+        "sections": {name: points.tolist() for name, points in shape.sections.items()},
+    }
+    write_json(folder / NAME, _rounded(value))
+
+
+def _write_view(folder: Path, index: int, panel: Panel) -> dict[str, Any]:
+    images = {"truth": panel.truth, "asset": panel.asset, "mask": panel.mask}
+    entry: dict[str, Any] = {"camera": panel.camera, "frame": panel.frame}
+    entry |= {name: panel.asset_score.values[name] for name in ("psnr", "psnr_subject")}
+    for name, image in images.items():
+        entry[name] = None if image is None else f"{PICTURES}/{index:03d}_{name}.png"
+        if image is not None:  # multiples of 1/255: nothing is lost
+            Image.fromarray(np.rint(255 * image).astype(np.uint8)).save(folder / entry[name])
+    return entry
+
+
+def _rounded(value: Any) -> Any:
+    """JSON with fewer digits, and null for NaN."""
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_rounded(part) for part in value]
+    if isinstance(value, float):
+        return None if math.isnan(value) else round(value, DECIMALS)
+    return value
+
+
+def digest_of(asset: Asset) -> str:
+    """Names the asset: SHA-256 of its manifest, which holds those of its files."""
+    return hashlib.sha256((asset.folder / MANIFEST_NAME).read_bytes()).hexdigest()
+
+
+def read_record(folder: Path, asset: Asset) -> Record | None:
+    """What was seen of `asset`; None where nothing was kept.
+
+    Raises:
+        UserError: if it is of another asset, garbled, or a picture is missing or damaged.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        return None
+    value = read_json(path, remedy=REMEDY)
+    try:
+        if value["version"] != VERSION:
+            raise UserError("of another version", file=path, expected=VERSION, found=value["version"], remedy=REMEDY)
+        if value["asset"] != digest_of(asset):
+            raise UserError("the evaluation is of another asset", file=path, expected=asset.folder, remedy=REMEDY)
+        layers = value["layers"]
+        columns = {name: tuple(float(row[name]) for row in layers) for name in ("contribution", "reach", "greatest")}
+        views = tuple(_read_view(folder, entry) for entry in value["views"])
+        return Record(
+            views=views,
+            on_sheet=int(value["on_sheet"]),
+            worst=range(len(views))[value["worst"]],
+            seen=Seen(
+                angles=tuple(AngleBin(**one) for one in value["angles"]),
+                bare=AngleBin(**value["no_layer"]),
+                masked=bool(value["masked"]),
+                **columns,
+            ),
+            shape=Shape(
+                spacing=tuple(Spacing(**row["to_next"]) for row in layers[:-1]),
+                sections={name: np.array(p, float) for name, p in value["sections"].items()},
+            ),
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise UserError("garbled record of an evaluation", file=path, found=repr(error), remedy=REMEDY) from None
+
+
+def _read_view(folder: Path, entry: dict[str, Any]) -> View:
+    images: dict[str, Any] = {}
+    for name in ("truth", "asset", "mask"):
+        file = entry[name]
+        try:
+            images[name] = None if file is None else np.asarray(Image.open(folder / file, formats=["PNG"])) / 255.0
+        except (OSError, SyntaxError) as error:
+            raise UserError("a picture of the evaluation is damaged", file=folder / file, found=str(error),
+                            remedy=REMEDY) from None  # fmt: skip
+    return View(entry["camera"], entry["frame"], **images, psnr=entry["psnr"], psnr_subject=entry["psnr_subject"])

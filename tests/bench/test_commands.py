@@ -1,0 +1,185 @@
+"""The commands' own work: what is planned, what is not measured again, that a failure is kept and the rest goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+import yaml
+from typer.testing import CliRunner
+
+from bench import hazards, speed_accuracy, sweeps
+from bench.hazard_rows import HAZARDS, Hazard
+from bench.results import Cell, Measurement, Row, Store
+from bench.run import Project
+from facefolds_core.errors import UserError
+from facefolds_core.files import write_json
+from tests.scoring.fakes import FRAMES, flat_scene, half_mask
+
+
+def invoke(main: Any, *arguments: str) -> Any:
+    app = typer.Typer()
+    app.command()(main)
+    return CliRunner().invoke(app, arguments)
+
+
+def diverge(*_: object, **__: object) -> None:
+    raise UserError("training diverged", remedy="none")
+
+
+def test_the_clean_case_and_the_middle_strength_come_first() -> None:
+    planned = hazards.plan("film", ["gloss"], ["fast", "paper"], 2)
+    first = [("film", "clean", 0, "fast", 0), *(("film", "gloss", s, "fast", 0) for s in (4, 8, 2))]
+    assert [c.key for c in planned[:4]] == first
+    assert len({c.key for c in planned}) == len(planned) == 16 and planned[8].seed == 1
+    assert len(hazards.plan("film", [], ["fast"], 1)) == 1 + 3 * len(HAZARDS)
+    assert len(hazards.plan("film", [], ["fast", "paper"], 0)) == 4 * (1 + 3 * len(HAZARDS))
+
+
+def test_what_must_be_filmed_is_none_of_a_prepared_scenes() -> None:
+    assert {c.hazard for c in hazards.plan("mugsy", [], ["fast"], 1)} >= {"cameras", "centre", "rate-high"}
+    for names, presets in ((["gloss"], ["fast"]), (["rain"], ["fast"]), ([], ["slow"])):
+        with pytest.raises(UserError, match="no such row or preset"):
+            hazards.plan("mugsy", names, presets, 1)
+
+
+def test_a_failed_training_is_a_cell(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(hazards, "disturbed", lambda *_: (None, None))
+    monkeypatch.setattr(hazards, "write_shots", lambda *_: None)
+    monkeypatch.setattr(hazards, "train", diverge)
+    made = hazards.run_cell(Cell(hazard="gloss", strength=4, preset="fast", seed=0), tmp_path, tmp_path)
+    assert made.failure == "training diverged" and made.psnr is None and not made.converged
+
+
+def test_the_seed_draws_the_hazard_and_the_world_moves_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[float] = []
+
+    def world(shots: object, strength: float, random: np.random.Generator) -> object:
+        drawn.append(float(random.random()))
+        return shots
+
+    monkeypatch.setattr(hazards, "of_split", lambda shots, _: shots)
+    hazard = Hazard("x", "x", (1, 2, 3), "{}", world=world)  # type: ignore[arg-type]
+    for seed in (0, 0, 1):
+        hazards.disturbed(hazard, 1.0, seed, object(), Path())  # type: ignore[arg-type]
+    assert drawn[0] == drawn[1] == drawn[2] == drawn[3] != drawn[4] == drawn[5]
+
+
+def test_rates_multiply_the_usual_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project = Project(tmp_path, "cell")
+    written: list[dict[str, Any]] = []
+    usual = {"model": "explicit", "lr": 0.5, "inner": {"width": 2.0}}
+    write_json(project.folders.config / "train.json", usual)
+    monkeypatch.setattr(Project, "run", lambda *_: None)
+    monkeypatch.setattr(Project, "write", lambda _, params: written.append(params["subjects"]["cell"]["train"].copy()))
+    blank = Cell(subject="mugsy", hazard="x", strength=3, preset="fast", seed=7)
+    scaled = (("mlp", "other"), ("explicit", "lr"), ("explicit", "inner.width"), ("explicit", "volume.none"))
+    hazards.train(project, blank, Hazard("x", "x", (1, 2, 3), "{}", scaled=scaled))
+    assert written[-1] == {"preset": "fast", "seed": 7, "lr": 1.5, "inner": {"width": 6.0}}
+
+
+def test_a_flat_silhouette(tmp_path: Path) -> None:
+    scene = flat_scene(tmp_path, masks={k: half_mask() for k in range(FRAMES)})
+    # Noise of all codes about its mean: 255 / sqrt(12) of 255.
+    assert hazards.flat(scene, ["front"]) == pytest.approx(10 * np.log10(12), abs=0.2)
+    assert hazards.flat(scene, []) == 0
+
+
+def test_hazards_go_on_where_they_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[tuple[object, ...]] = []
+
+    def measured(blank: Cell, *_: Path) -> Cell:
+        made.append(blank.key)
+        if len(made) == 3:
+            raise KeyboardInterrupt
+        return blank.model_copy(update={"psnr": 20.0})
+
+    monkeypatch.setattr(hazards, "run_cell", measured)
+    path = tmp_path / "cells.json"
+    arguments = ["--only", "gloss", "--presets", "fast", "--seeds", "1", "--results", str(path)]
+    invoke(hazards.main, *arguments)
+    assert len(Store(path, "cells", Cell).read()) == 2
+    assert invoke(hazards.main, *arguments).exit_code == 0
+    assert made == [*made[:3], made[2], ("film", "gloss", 2, "fast", 0)]
+    assert "glossy skin" in invoke(hazards.main, *arguments, "--draw-only").output
+
+
+def test_trainings_that_are_there_are_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Project, "repro", diverge)
+    monkeypatch.setattr(speed_accuracy.charts, "speed", lambda *_: None)
+    arguments = [
+        "--presets",
+        "fast",
+        "--results",
+        str(tmp_path / "r.json"),
+        "--work",
+        str(tmp_path),
+        "--clock",
+        "processor",
+    ]
+    for wanted in ("5", "5,7", "5,7"):
+        assert invoke(speed_accuracy.main, *arguments, "--iterations", wanted).exit_code == 0
+    found = Store(tmp_path / "r.json", "measurements", Measurement).read()
+    assert [(m.iterations, m.failure, m.conditions.clock) for m in found] == [
+        (5, "training diverged", "processor"),
+        (7, "training diverged", "processor"),
+    ]
+
+
+def test_finer_textures_are_sampled_as_finely() -> None:
+    assert sweeps.changes("texture", 128, 512) == {"texture": {"resolution": 128}, "compress": {"levels": []}}
+    finer = {"sample": {"resolution": 1024}, "reconstruct": {"resolution": 512}}
+    assert sweeps.changes("texture", 1024, 512) == {
+        "texture": {"resolution": 1024},
+        "compress": {"levels": []},
+        **finer,
+    }
+
+
+def test_cells_of_a_sweep_are_scored_and_a_failed_one_does_not_lose_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def repro(project: Project, _: str) -> None:
+        params = yaml.safe_load((project.root / "params.yaml").read_text())
+        if params["subjects"]["actor"]["decimate"]["resolution"] == 16:
+            diverge()
+        cost = {**dict.fromkeys(sweeps.SIZES, 10), "device": "cpu", "train_seconds": 9.0}
+        write_json(project.folders.metrics, {"asset": {"psnr": 11.0, "psnr_subject": 24.0}, "cost": cost})
+        for stage in sweeps.SWEEPS["mesh"].timed:
+            write_json(project.folders.timing(stage), {"seconds": 2.0})
+
+    monkeypatch.setattr(Project, "repro", repro)
+    monkeypatch.setattr(sweeps, "drawing_speed", lambda _: {})
+    path = tmp_path / "rows.json"
+    done = invoke(sweeps.main, "mesh", "--values", "16,32", "--work", str(tmp_path), "--results", str(path))
+    assert done.exit_code == 1 and "training diverged" in done.output
+    failed, row = Store(path, "rows", Row).read()
+    assert (failed.failure, row.psnr, row.bytes, row.export_seconds, row.train_seconds) == (
+        "training diverged", 24.0, 20, 6.0, 0.0,
+    )  # fmt: skip
+    assert row.params == {"decimate.resolution": 32}
+    assert sweeps.as_run(row).figures["bytes"] == 30
+
+
+@pytest.mark.parametrize("arguments", [("wind",), ("mesh", "--values", "ten"), ("mesh", "--values", "0")])
+def test_a_sweep_that_is_none(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    assert invoke(sweeps.main, *arguments, "--work", str(tmp_path)).exit_code == 1
+
+
+def test_every_rate_is_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def repro(project: Project, _: str) -> None:
+        asked.append((project.root / "params.yaml").read_text())
+        cost = {"mesh_bytes": 3, "texture_bytes": len(asked)}
+        write_json(project.folders.metrics, {"asset": {"psnr": 11.0, "psnr_subject": None}, "cost": cost})
+
+    monkeypatch.setattr(Project, "repro", repro)
+    points = sweeps.measure_rates("actor", tmp_path, 7)
+    assert len(points) == len({(p["series"], p["crf"]) for p in points}) == 25
+    assert points[1] == {"series": "paper", "crf": 22, "mesh_bytes": 3, "video_bytes": 2, "psnr": 11.0, "bytes": 5}
+    assert all("frames: 7" in text and "target_psnr: null" in text for text in asked)
+    assert len(set(asked)) == 25
