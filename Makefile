@@ -5,7 +5,7 @@
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
-# make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
+# make blender an environment with Blender as a Python module, for docs/guide/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
 # make clean   remove the environment, all results, DVC's cache (experiments included) and dvc.lock
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from facefolds_core.captures import actor
 from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, make_rig, write_capture
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.scene import Scene, Split, read_scene, write_scene
+from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.geometry.cameras import Camera

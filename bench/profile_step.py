@@ -1,4 +1,6 @@
-"""One training step of a perceptron preset, taken apart: seconds and multiply-adds; for docs/performance.md.
+"""One training step of a perceptron preset, taken apart: seconds and multiply-adds.
+
+docs/research/2026-11-21-performance.md has what it gave.
 
 The parts are called one after the other on the rays of one step. The limit that they are held against is what this
 machine's matrix product reaches on large matrices.

@@ -50,8 +50,8 @@ class Conditions(Record):
 
 
 class Scores(Record):
-    """Means over `images` images of the model without its view branch (docs/metrics.md, `diffuse`), of the subject,
-    or of the whole frame where the capture has no masks."""
+    """Means over `images` images of the model without its view branch (docs/reference/metrics.md, `diffuse`), of the
+    subject, or of the whole frame where the capture has no masks."""
 
     region: Literal["subject", "frame"]
     images: int

@@ -4,7 +4,7 @@ python -m bench.sweeps layers          N = 12, 8, 4, 1: trains again
 python -m bench.sweeps mesh            R^m = 512 ... 8, from the trained model
 python -m bench.sweeps texture         R^t = 1024 ... 128, from the trained model
 python -m bench.sweeps rate            the paper's export and ours at five rates, 60 frames: bytes against accuracy
-python -m bench.sweeps draw            the tables of docs/results.md and the charts, from what is there
+python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there
 
 A cell is the subject's own configuration with a value changed, run by `dvc repro` in a copy of the project that shares
 its cache: stages that cells share run once, and a cell that has not changed costs nothing. A cell that fails is kept as
@@ -36,7 +36,7 @@ from facefolds_core.sweeps.table import Run, write_runs
 RESULTS = Path("bench/results/sweeps.json")
 RATE = Path("bench/results/rate_distortion.json")
 IMAGES = Path("docs/images")
-DOCUMENT = Path("docs/results.md")
+DOCUMENT = Path("docs/research/ablations.md")
 WORK = Path("data/bench")
 SIZES = (
     "vertices",

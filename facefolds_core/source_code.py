@@ -15,6 +15,7 @@ import grimp
 import grimp.exceptions
 
 from facefolds_core.errors import UserError
+from facefolds_core.registry import REGISTRIES
 
 PACKAGES = ("facefolds_core", "stages")
 
@@ -22,7 +23,7 @@ PACKAGES = ("facefolds_core", "stages")
 def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, str]]:
     """Stage -> module that `stages.<stage>` imports, directly or not, itself included -> digest of what it does.
 
-    Imports for type checking only are left out.
+    Imports for type checking only are left out; who imports a registry imports all its entries.
 
     Args:
         root: folder of the packages; the one that they are imported from.
@@ -34,6 +35,9 @@ def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, 
         graph = grimp.build_graph(*PACKAGES, cache_dir=None, exclude_type_checking_imports=True)
     except grimp.exceptions.SourceSyntaxError as error:
         raise UserError("not Python", file=error.filename, place=f"line {error.lineno}", remedy="mend it") from None
+    for registry in REGISTRIES:  # imports that no statement names
+        for name in registry.names:
+            graph.add_import(importer=registry.package, imported=f"{registry.package}.{name}")
     known: dict[str, str] = {}
     found: dict[str, dict[str, str]] = {}
     for stage in stages:

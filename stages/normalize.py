@@ -5,25 +5,14 @@ from __future__ import annotations
 import typer
 
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
-from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.multiface import read_multiface
-from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.captures.sources import read_capture
 from facefolds_core.config import read_stage, read_subject
-from facefolds_core.params import CaptureParams, NormalizeParams, Subject
-from facefolds_core.paths import SubjectFolders, check_capture_place
+from facefolds_core.params import CaptureParams, NormalizeParams
+from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
 
 SHOWN = 5
 """Lines on what was left out that are printed; scene.json has all."""
-
-
-def read_capture(subject: Subject, folders: SubjectFolders) -> Capture:
-    """The capture of any source."""
-    if subject.source == "actor":
-        fps = read_stage(CaptureParams, folders.config).fps
-        return read_multiface(folders.capture, subject, fps)
-    path = check_capture_place(subject.path, folders)
-    return read_multiface(path, subject) if subject.source == "multiface" else read_transforms(path, subject)
 
 
 def summary(plan: Plan) -> str:
@@ -49,7 +38,8 @@ def left_out(plan: Plan) -> list[str]:
 def normalize(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
     params = read_stage(NormalizeParams, folders.config)
-    plan = plan_scene(read_capture(subject, folders), folders.root.name, subject, params, folders.scene)
+    capture = read_capture(subject, folders, read_stage(CaptureParams, folders.config))
+    plan = plan_scene(capture, folders.root.name, subject, params, folders.scene)
     write_plan(plan, params)
     for line in left_out(plan):
         typer.echo(line)

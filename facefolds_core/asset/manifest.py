@@ -1,4 +1,4 @@
-"""manifest.json of an asset, format version 2 (docs/asset-format.md), as validated models.
+"""manifest.json of an asset, format version 2 (docs/reference/asset-format.md), as validated models.
 
 The JSON schema beside this file, manifest.schema.json, says the same without our code; a test keeps the two in step.
 """
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from facefolds_core.asset.codecs import CodecName
 from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
@@ -121,7 +122,7 @@ class Video(StoredFile):
     """
 
     container: Literal["mp4", "webm"]
-    codec: Literal["h264", "vp9", "av1"]
+    codec: CodecName
     mime: str
     level: Annotated[str, Field(pattern=r"^[1-7](\.[0-3])?$")]
     pixel_format: Literal["yuv420p"] = "yuv420p"

@@ -1,7 +1,7 @@
 """The texture videos through PyAV, so that frame k of the file is frame k of the sequence.
 
 Decoding order is presentation order, and every `keyframe_interval` frames a key frame starts a closed group: the file
-needs no edit list, and a player that scrubs decodes at most that many pictures. See codecs.py for what differs between
+needs no edit list, and a player that scrubs decodes at most that many pictures. See codecs/ for what differs between
 codecs.
 """
 
@@ -22,7 +22,7 @@ from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
 from facefolds_core.asset.audio import SoundTrack
-from facefolds_core.asset.codecs import Codec, level_and_mime
+from facefolds_core.asset.codecs import CODECS, Codec, Stream
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
 from facefolds_core.asset.containers import container_of
 from facefolds_core.asset.packing import GUTTER, MAX_PIXELS, AtlasLayout, cut, fill_cell
@@ -32,9 +32,6 @@ from facefolds_core.scheduling import kept_scheduling
 _PRIMARIES_BT709 = 1
 _TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273
 
-DECODERS = {"h264": "h264", "vp9": "libvpx-vp9", "av1": "libdav1d"}
-"""Of each codec, the decoder that notices most damage. FFmpeg's own for VP9 reads on beyond a picture's data: of 200
-videos with one flipped bit it showed 104 with errors, libvpx 3 (and the same pictures where nothing is damaged)."""
 STRICT = {"err_detect": "crccheck+bitstream+buffer+explode", "max_pixels": str(MAX_PIXELS)}
 """Damage is an error: nothing is made up in its place. What H.264's decoder conceals all the same, it marks."""
 FORMATS = {"mp4": "mp4", "webm": "matroska"}
@@ -188,11 +185,17 @@ def _damaged(path: Path, found: str) -> UserError:
     return UserError("damaged texture video", file=path, found=found, remedy="make the asset again, or copy it again")
 
 
+def _codec(name: str, path: Path) -> Codec:
+    if name not in CODECS:
+        raise _damaged(path, f"a video of the codec {name}, not {', '.join(CODECS)}")
+    return CODECS[name]
+
+
 def probe_video(path: Path) -> VideoFacts:
     """Read a video's header.
 
     Raises:
-        UserError: if it cannot be opened.
+        UserError: if it cannot be opened, or its codec is none of `CODECS`.
     """
     with _opened(path) as (container, stream, kind):
         context = stream.codec_context
@@ -200,7 +203,8 @@ def probe_video(path: Path) -> VideoFacts:
         rate = stream.average_rate or Fraction(0)
         seconds = (container.duration or 0) / av.time_base
         bits = 8 * path.stat().st_size / seconds if seconds else 0.0
-        level, mime = level_and_mime(codec, bytes(context.extradata or b""), size, rate, bits)
+        facts = Stream(bytes(context.extradata or b""), size, rate, bits)
+        level, mime = _codec(codec, path).level_and_mime(facts)
         return VideoFacts(
             codec=codec,
             container=kind,
@@ -248,10 +252,7 @@ def decode_video(path: Path, size: tuple[int, int], fps: float, start: int = 0) 
 def _strictly_decoded(container: Any, stream: Any, path: Path) -> Iterator[Any]:
     """PyAV's frames of a stream, by the codec's strictest decoder."""
     given = stream.codec_context
-    name = DECODERS.get(given.codec.canonical_name)
-    if name is None:
-        raise _damaged(path, f"a video of the codec {given.codec.canonical_name}, not {', '.join(DECODERS)}")
-    context: Any = av.CodecContext.create(name, "r")
+    context: Any = av.CodecContext.create(_codec(given.codec.canonical_name, path).decoder, "r")
     context.extradata, context.thread_type, context.thread_count = given.extradata, "AUTO", 0
     context.options = STRICT
     for packet in container.demux(stream):

@@ -1,4 +1,4 @@
-"""An asset for Godot 3: what its add-on in engines/godot reads (docs/engines.md).
+"""Plain meshes and a picture a frame (a folder), for the add-on for Godot 3 in engines/godot (docs/guide/engines.md).
 
 Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player of WebM cannot seek. So the folder
 holds plain binary meshes with y up, and every frame as a picture of its own.
@@ -33,6 +33,12 @@ QUALITY = 95
 def y_up(points: NDArray[np.float32]) -> NDArray[np.float32]:
     """(..., 3) in the asset's axes -> Godot's: y up, the subject looks to +z, its left is +x. A rotation."""
     return points[..., [1, 2, 0]]
+
+
+def export(out: Path, level: AssetLevel, subject: str) -> str:
+    """See `write_godot`."""
+    size = write_godot(out, level, subject)
+    return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.1f} MB"
 
 
 def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator
 
 from facefolds_core.params.base import Count, Many, Natural, Pixels, Section, Share, TextureSide
+from facefolds_core.registry import CODECS
 
-CodecName = Literal["h264", "vp9", "av1"]
+if TYPE_CHECKING:
+    CodecName = str
+else:
+    CodecName = Literal[CODECS.names]
 ConstantRateFactor = Annotated[int, Field(ge=0, le=51)]
 Decibels = Annotated[float, Field(ge=0, le=100)]
 
@@ -41,7 +45,7 @@ class VideoCodec(Section):
     """Texture video."""
 
     codec: Annotated[Many[CodecName], BeforeValidator(_one_or_several)] = ("h264",)
-    """"h264", "vp9" or "av1", or a list of them: one file each with the same pictures, the first one first."""
+    """One, or a list of them: one file each with the same pictures, the first one first."""
 
     crf: ConstantRateFactor = 18
     """Constant rate factor on x264's scale (smaller is better and larger); other codecs take the factor of about the

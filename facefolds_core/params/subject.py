@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from facefolds_core.params.base import Count, FrameRate, Many, Natural, Pair, Section
+from facefolds_core.registry import SOURCES
+
+if TYPE_CHECKING:
+    SourceName = str
+else:
+    SourceName = Literal[SOURCES.names]
 
 Raw = dict[str, Any]
 """Keys and values of a section, checked once merged with the section itself."""
@@ -69,7 +75,7 @@ class Overrides(Section):
 class Subject(Overrides):
     """One entry of `subjects`: where a capture is, what of it to use, and overrides of stage sections."""
 
-    source: Literal["actor", "multiface", "transforms"]
+    source: SourceName
     """The layout of the capture; "actor" is generated."""
 
     path: str

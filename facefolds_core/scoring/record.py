@@ -91,7 +91,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class View:
-    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/metrics.md."""
+    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/reference/metrics.md."""
 
     camera: str
     frame: str

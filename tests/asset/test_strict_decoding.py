@@ -15,7 +15,7 @@ from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.containers import ContainerError, container_of
 from facefolds_core.asset.packing import AtlasLayout
-from facefolds_core.asset.video import DECODERS, decode_video, encode_video, pack_frame, probe_video, unpack_picture
+from facefolds_core.asset.video import decode_video, encode_video, pack_frame, probe_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.params import VideoCodec
 from tests.assets import cap_textures
@@ -32,7 +32,7 @@ def textures(frame: int) -> list[np.ndarray]:
     return list(np.clip(cap_textures(2, frame, 96) + np.roll(grain, 3 * frame, 2), 0, 255).astype(np.uint8))
 
 
-@pytest.fixture(scope="module", params=sorted(DECODERS))
+@pytest.fixture(scope="module", params=sorted(CODECS))
 def video(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     codec = CODECS[request.param]
     path = tmp_path_factory.mktemp("strict") / f"{request.param}.{codec.container}"

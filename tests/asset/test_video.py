@@ -12,7 +12,7 @@ import av
 import numpy as np
 import pytest
 
-from facefolds_core.asset.codecs import CODECS, level_and_mime
+from facefolds_core.asset.codecs import CODECS, Stream
 from facefolds_core.asset.packing import AtlasLayout
 from facefolds_core.asset.video import (
     Picture,
@@ -155,9 +155,9 @@ def test_lossless(tmp_path: Path, codec: str) -> None:
 
 def test_level_and_codec_string_of_vp9() -> None:
     # 2064 x 3104 at 30 frames a second: 192 M samples a second, 6.4 M a picture: level 5.
-    level, mime = level_and_mime("vp9", b"", (2064, 3104), Fraction(30), 5e6)
+    level, mime = CODECS["vp9"].level_and_mime(Stream(b"", (2064, 3104), Fraction(30), 5e6))
     assert (level, mime) == ("5", 'video/webm; codecs="vp09.00.50.08.00.01.13.01.00"')
-    assert level_and_mime("vp9", b"", (256, 128), Fraction(30), 1e5)[0] == "1.1"
+    assert CODECS["vp9"].level_and_mime(Stream(b"", (256, 128), Fraction(30), 1e5))[0] == "1.1"
 
 
 def test_sound_goes_into_the_mp4_and_leaves_the_pictures(tmp_path: Path) -> None:

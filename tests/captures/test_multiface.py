@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.krt import read_krt
-from facefolds_core.captures.multiface import read_multiface
+from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.tracked import read_obj
 from facefolds_core.params import FrameRange, Subject
 from tests.captures.fixtures import (

@@ -12,10 +12,10 @@ import pytest
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
 from facefolds_core.captures.capture import complete_subset
 from facefolds_core.captures.images import decode_image, display_colour, downsample, fit_box
-from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.normalization import nearest_to_axes, split_cameras, view_angles
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.captures.sources.multiface import read_multiface
+from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
 from tests.captures.fixtures import (
     FACES,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.sound import cut_sound, sound_start
+from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
 from facefolds_core.params import FrameRange, NormalizeParams, Subject
 from tests.captures.fixtures import SEGMENT, write_multiface

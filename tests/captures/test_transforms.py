@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.lens import Lens, make_lens, undistort
-from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.errors import UserError
 from facefolds_core.params import Subject
 from tests.captures.fixtures import (

@@ -12,7 +12,7 @@ ALL = ("*",)
 
 ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
     "of a file format or a standard: another value would be another format": {
-        "asset/codecs.py": ("X264_FIXED", "SVT_FIXED", "VP9_LEVELS", "CODECS"),
+        "asset/codecs/": ALL,
         "asset/colour.py": ALL,
         "asset/cropping.py": ("ALPHA_BOUND",),
         "asset/effects.py": ALL,
@@ -23,9 +23,9 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/video.py": ALL,
         "asset/writer.py": ("STATIC_FPS",),
         "captures/krt.py": ALL,
-        "captures/multiface.py": ALL,
+        "captures/sources/multiface.py": ALL,
         "captures/scene.py": ALL,
-        "captures/transforms.py": ("FPS", "PIXEL_CENTRES"),
+        "captures/sources/transforms.py": ("FPS", "PIXEL_CENTRES"),
         "pictures.py": ALL,
         "engines/godot.py": ("FORMAT", "VERSION"),
         "export/bake_kernel.py": ("SCALE",),
@@ -73,7 +73,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/audio.py": ("LONGER",),
         "captures/capture.py": ALL,
         "captures/sound.py": ("RATES",),
-        "captures/transforms.py": ("LATEST",),
+        "captures/sources/transforms.py": ("LATEST",),
         "captures/visibility.py": ALL,
         "parsing.py": ALL,
         "reading.py": ALL,
@@ -116,7 +116,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         f"captures/actor/{name}.py": ALL for name in ("hair", "mesh", "motion", "render", "rig", "room", "shape")
     },
 }
-"""Reason -> file (in facefolds_core, or from the root) -> names."""
+"""Reason -> file, or folder with all its files (in facefolds_core, or from the root) -> names."""
 
 
 def numeric(node: ast.AST) -> bool:
@@ -143,8 +143,9 @@ def found(project_root: Path) -> set[tuple[str, str]]:
     library, stages = project_root / "facefolds_core", project_root / "stages"
     files = {path.relative_to(library).as_posix(): path for path in library.rglob("*.py")}
     files |= {path.relative_to(project_root).as_posix(): path for path in stages.rglob("*.py")}
+    folders = {name for allowed in ALLOWED.values() for name in allowed if name.endswith("/")}
     return {
-        (name, constant)
+        (next((folder for folder in folders if name.startswith(folder)), name), constant)
         for name, path in files.items()
         if not name.startswith("params/")
         for constant in constants(path.read_text(encoding="utf-8"))

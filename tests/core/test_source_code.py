@@ -9,6 +9,7 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.params import STAGE_SECTIONS
+from facefolds_core.registry import SOURCES
 from facefolds_core.source_code import digest_of_file, digests_of_stages
 
 CODE = '''"""A module."""
@@ -61,6 +62,11 @@ def test_every_stage_has_itself_and_what_it_imports(found: dict[str, dict[str, s
         assert {f"stages.{stage}", "stages.common", "facefolds_core.params"} <= set(modules)
     assert "facefolds_core.training.explicit.fit" in found["train"]
     assert "facefolds_core.reporting.build" not in {module for modules in found.values() for module in modules}
+
+
+def test_who_imports_a_registry_has_all_its_entries(found: dict[str, dict[str, str]]) -> None:
+    assert {f"{SOURCES.package}.{name}" for name in SOURCES.names} <= set(found["normalize"])
+    assert not {name for name in found["train"] if name.startswith(SOURCES.package)}
 
 
 def test_every_import_of_every_module_is_there(found: dict[str, dict[str, str]]) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.multiface import read_multiface
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.captures.transforms import read_transforms
+from facefolds_core.captures.sources.multiface import read_multiface
+from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.captures.visibility import in_picture
 from facefolds_core.params import NormalizeParams, Subject
 from tests.captures.fixtures import write_multiface, write_transforms

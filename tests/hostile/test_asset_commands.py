@@ -41,10 +41,15 @@ def test_sizes_that_cannot_be(asset: Path, tmp_path: Path, size: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["x" * 5000, "/dev/null", "nowhere", "a\nb"])
-@pytest.mark.parametrize("command", ["validate", "render", "export-godot", "view"])
+@pytest.mark.parametrize("command", ["validate", "render", "export-godot", "export glb", "view"])
 def test_folders_that_are_none(tmp_path: Path, command: str, name: str) -> None:
-    more = {"render": ["--out", tmp_path / "a.png"], "export-godot": [tmp_path / "out"], "view": ["--no-browser"]}
-    assert "no such folder" in refused(command, name, *more.get(command, []))
+    more = {command: [tmp_path / "out"] for command in ("export-godot", "export glb")}
+    more |= {"render": ["--out", tmp_path / "a.png"], "view": ["--no-browser"]}
+    assert "no such folder" in refused(*command.split(), name, *more.get(command, []))
+
+
+def test_an_exporter_that_is_none(asset: Path, tmp_path: Path) -> None:
+    assert "glb, godot" in refused("export", "unreal", asset, tmp_path / "out")
 
 
 def test_a_file_in_place_of_the_folder_to_write(asset: Path, tmp_path: Path) -> None:

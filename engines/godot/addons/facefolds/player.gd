@@ -1,5 +1,5 @@
 extends Spatial
-# Plays what `facefolds export-godot` writes. Add it to a scene, give it a folder, play. y is up, the subject
+# Plays what `facefolds export godot` writes. Add it to a scene, give it a folder, play. y is up, the subject
 # looks to +z; the meshes are about 1 unit from where the capture's cameras stood.
 #
 # Every frame is a picture of its own: `seek` is exact, and playing leaves out the frames that the machine is too slow
@@ -114,7 +114,7 @@ func _read_contents():
 	var path = folder.plus_file("facefolds.json")
 	var file = File.new()
 	if file.open(path, File.READ) != OK:
-		return "cannot open " + path + ": is it a folder that facefolds export-godot wrote?"
+		return "cannot open " + path + ": is it a folder that facefolds export godot wrote?"
 	var parsed = JSON.parse(file.get_as_text())
 	if parsed.error != OK or typeof(parsed.result) != TYPE_DICTIONARY:
 		return path + " is not JSON"

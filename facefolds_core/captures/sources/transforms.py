@@ -26,7 +26,7 @@ from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.files import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
-from facefolds_core.params import Subject
+from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import LARGEST, check_regular, is_folder, is_regular, is_there
 
 Array = NDArray[np.float64]
@@ -66,6 +66,11 @@ class Entry:
 def _number(entry: Entry, key: str) -> float:
     limit = LATEST if key == "time" else HUGE
     return json_number(entry.values[key], entry.file, f"{entry.place}, {key}", limit)
+
+
+def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+    """See `read_transforms`."""
+    return read_transforms(root, subject)
 
 
 def read_transforms(root: Path, subject: Subject) -> Capture:

@@ -22,12 +22,17 @@ from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import Subject
+from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import check_folder, is_there, read_text
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
 """OpenCV's calibration, from which Multiface's KRT comes, puts the centre of the first pixel at 0."""
+
+
+def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+    """As `read_multiface`, at Multiface's rate."""
+    return read_multiface(root, subject)
 
 
 def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:

@@ -1,0 +1,25 @@
+"""AV1 in MP4, by SVT-AV1."""
+
+from __future__ import annotations
+
+from facefolds_core.asset.codecs import Codec, Stream, VideoSettings, joined
+
+SVT_FIXED = {"lp": 1, "scd": 0, "irefresh-type": 2, "chroma-sample-position": "left"}
+SVT_PRESET = "6"
+
+
+def _options(params: VideoSettings, crf: int) -> dict[str, str]:
+    fixed = {**SVT_FIXED, **({"lossless": 1} if params.lossless else {})}
+    quality = {} if params.lossless else {"crf": str(crf)}
+    return {"preset": SVT_PRESET, "g": str(params.keyframe_interval), **quality, "svtav1-params": joined(**fixed)}
+
+
+def _level_and_mime(stream: Stream) -> tuple[str, str]:
+    # AV1 codec configuration record: byte 1 is seq_profile (3 bits) and seq_level_idx_0 (5 bits).
+    packed = stream.header[1] if len(stream.header) > 1 else 0
+    profile, index = packed >> 5, packed & 0x1F
+    level = f"{2 + index // 4}.{index % 4}".removesuffix(".0")
+    return level, f'video/mp4; codecs="av01.{profile}.{index:02d}M.08.0.111.01.13.01.0"'
+
+
+CODEC = Codec("av1", "libsvtav1", "libdav1d", "mp4", 63, _options, _level_and_mime, 2.0, -6.0)

@@ -1,0 +1,32 @@
+"""H.264 in MP4, by x264: what every browser and nearly every player plays."""
+
+from __future__ import annotations
+
+from facefolds_core.asset.codecs import Codec, Stream, VideoSettings, joined
+
+X264_FIXED = {
+    "scenecut": 0,
+    "open-gop": 0,
+    "bframes": 0,
+    "chromaloc": 0,
+    "psy": 0,  # a texture is warped and blended before it is seen: +0.25 dB at equal size
+    "chroma-qp-offset": -4,  # a wrong hue shows: +0.5 dB of rendered views for 3 % of the bytes
+    "threads": 1,
+    "cpu-independent": 1,
+}
+
+
+def _options(params: VideoSettings, crf: int) -> dict[str, str]:
+    interval = params.keyframe_interval
+    fixed = {"keyint": interval, "min-keyint": interval, **X264_FIXED}
+    quality = {"qp": "0"} if params.lossless else {"crf": str(crf)}
+    return {**quality, "preset": params.preset, "x264-params": joined(**fixed)}
+
+
+def _level_and_mime(stream: Stream) -> tuple[str, str]:
+    # ISO/IEC 14496-15, AVCDecoderConfigurationRecord: bytes 1 to 3 are the profile, its constraints and the level.
+    profile = stream.header[1:4] if len(stream.header) > 3 else bytes(3)
+    return f"{profile[2] / 10:g}", f'video/mp4; codecs="avc1.{profile.hex()}"'
+
+
+CODEC = Codec("h264", "libx264", "h264", "mp4", 51, _options, _level_and_mime)

@@ -1,0 +1,32 @@
+"""Layouts of captures: each module of this package reads one, named as `source` of a subject in params.yaml.
+
+A module has
+
+    def read(root: Path, subject: Subject, params: CaptureParams) -> Capture
+
+which reads everything but the pixels, or raises `UserError`. `params` are the embedded actor's. A module that says
+`GENERATED = True` reads what the stage `capture` has made; all others read the folder or file that `path` names.
+"""
+
+from __future__ import annotations
+
+from facefolds_core.captures.capture import Capture
+from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.paths import SubjectFolders, check_capture_place
+from facefolds_core.registry import SOURCES
+
+
+def is_generated(source: str) -> bool:
+    """Whether the stage `capture` makes the capture."""
+    return bool(getattr(SOURCES[source], "GENERATED", False))
+
+
+def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParams) -> Capture:
+    """The capture of any source.
+
+    Raises:
+        UserError: if its place is none that may be read, or what is there is damaged.
+    """
+    place = folders.capture if is_generated(subject.source) else check_capture_place(subject.path, folders)
+    capture: Capture = SOURCES[subject.source].read(place, subject, params)
+    return capture
