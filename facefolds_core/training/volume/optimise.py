@@ -74,7 +74,7 @@ def _shade(
     binarisation_weight: float,
 ) -> tuple[float, Array, Array]:
     """`kernel.shade` with steps of so many voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
-    residual, through = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
+    residual, transmittance = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
     samples = int(math.sqrt(3) * max(grid.shape) / step) + 2
     squares: float = kernel.shade(
         rays.origins,
@@ -91,11 +91,11 @@ def _shade(
         gradient,
         touched,
         residual,
-        through,
+        transmittance,
         opacity_weight,
         binarisation_weight,
     )
-    return squares, residual, through
+    return squares, residual, transmittance
 
 
 def clear(
@@ -152,7 +152,7 @@ def train(
         background, taps, weights = environment.look_up(origins, directions)
         part = Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
-        squares, residual, through = _shade(
+        squares, residual, transmittance = _shade(
             grid[0],
             occupied,
             lower,
@@ -169,7 +169,7 @@ def train(
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - 0.9 * i / level.iterations if last else 1.0
-        environment.step(taps, weights, through[:, None] * residual, scale)
+        environment.step(taps, weights, transmittance[:, None] * residual, scale)
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
         kernel.adam_step(grid, gradient, touched, share, *rates, bias1, bias2, params.smoothness_weight)
