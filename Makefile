@@ -1,11 +1,13 @@
 # make repro   set up, then run the pipeline for every subject in params.yaml
-# make test    set up, then run the tests
+# make check   set up, then the fast tests, and lint: before each commit
+# make test    set up, then run the tests, all but those marked `nightly`, on as many processes as there are cores (WORKERS=1 for one)
+# make nightly set up, then run all tests: what `nightly` marks shows at length what another test shows
 # make view    set up, then play the asset made last in a browser (or ASSET=folder)
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
-# make blender an environment with Blender as a Python module, for docs/engines.md (about 400 MB; needs Python 3.11)
+# make blender an environment with Blender as a Python module, for docs/guide/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
 # make clean   remove the environment, all results, DVC's cache (experiments included) and dvc.lock
 
@@ -16,14 +18,25 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.installed
 PLAYER := viewer/dist/index.html
 
-.PHONY: repro test view report lint lint-player wheel bench charts blender clean
+# Tests with threads of their own need two; more would wait for one another.
+WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
+PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+
+.PHONY: repro check test nightly view report lint lint-player wheel bench charts blender clean
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
 
+check: $(READY)
+	$(PYTEST) -m "not (slow or pipeline or browser or nightly)"
+	@$(MAKE) --no-print-directory lint
+
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(PYTEST) -m "not nightly"
+
+nightly: $(READY)
+	$(PYTEST)
 
 view: $(READY) $(PLAYER)
 	$(BIN)/facefolds view $(ASSET)
@@ -57,7 +70,10 @@ bench: $(READY)
 
 charts: repro
 	$(BIN)/python -m bench.export_waterfall --chart
-	$(BIN)/python -m bench.sweeps rate
+	$(BIN)/python -m bench.sweeps queue rate
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc exp run --run-all
+	$(BIN)/python -m bench.sweeps collect
+	$(BIN)/python -m bench.sweeps draw
 
 $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else f"facefolds needs Python 3.11 or newer, found {sys.version.split()[0]}: install one and run make PYTHON=python3.11 ...")'
@@ -75,4 +91,4 @@ blender: .venv-blender/.installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config dvc.lock
+	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config data/.timings data/.locks dvc.lock

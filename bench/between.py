@@ -10,7 +10,7 @@ against its own truth on the same pixels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -24,7 +24,7 @@ from facefolds_core.captures.actor import frame_times, make_rig, render
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.export.between import Moved, between_rows, sources
+from facefolds_core.export.between import Motion, between_rows
 from facefolds_core.export.stores import read_meshes
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.params import CaptureParams
@@ -40,6 +40,9 @@ MOVES = 0.05
 Codes = NDArray[np.uint8]
 Textures = Sequence[Codes]
 Frames = Iterator[tuple[int, Textures]]
+Sums = NDArray[np.float64]
+"""(K, 4), of the intervals from frame k to k + 1: squared errors over the subject, weighted with its opacity, and these
+weights; the same over its pixels that move."""
 
 
 class Truth(NamedTuple):
@@ -47,18 +50,6 @@ class Truth(NamedTuple):
 
     pictures: Codes
     opacity: Codes
-
-
-class Score(NamedTuple):
-    """Squared errors of one picture, summed, with the weights that they were summed with: over the subject, weighted
-    with its opacity, and over its pixels that move. `frame` is k of the interval from k to k + 1."""
-
-    method: str
-    frame: int
-    subject: float
-    subject_weight: float
-    moving: float
-    moving_weight: float
 
 
 def frames_of(store: FrameStore) -> list[Textures]:
@@ -72,11 +63,10 @@ def repeated(store: FrameStore, factor: int) -> Frames:
 
 
 def mixed(store: FrameStore, factor: int) -> Frames:
-    still, frames = sources(np.zeros((store.height, store.width, 2), np.float32)), frames_of(store)
+    still, frames = np.zeros((store.height, store.width, 2), np.float32), frames_of(store)
     for at, before in repeated(store, factor):
-        mixture = Moved(still, still, np.full((store.height, store.width, 1), at % factor / factor, np.float32))
-        pairs = zip(before, frames[at // factor + 1], strict=True)
-        yield at, [mixture.image(one, other) for one, other in pairs]
+        mixture = Motion(still, still).at(at % factor / factor)
+        yield at, [mixture.image(*pair) for pair in zip(before, frames[at // factor + 1], strict=True)]
 
 
 def moved(store: FrameStore, factor: int) -> Frames:
@@ -119,46 +109,41 @@ def truth_of(folders: SubjectFolders, scene: Scene, camera: int, factor: int) ->
     return truth
 
 
-def score(method: str, frame: int, picture: NDArray[np.float32], truth: Truth, at: int, factor: int) -> Score:
-    """Of a picture over black, against the truth at index `at`, in the interval of the capture's frame `frame`."""
+def score(frame: int, picture: NDArray[np.float32], truth: Truth, at: int, factor: int) -> Sums:
+    """(4,) of a picture over black, against the truth at index `at`, in the interval of the capture's frame `frame`."""
     around = truth.pictures[frame * factor : (frame + 1) * factor + 1].astype(np.int16)
     moves = (around.max(0) - around.min(0)).max(-1) > MOVES * 255
     square = ((shown(picture) - truth.pictures[at] / 255.0) ** 2).mean(-1)
     weight = truth.opacity[at] / 255.0
-    sums = (square * weight).sum(), weight.sum(), (square * weight * moves).sum(), (weight * moves).sum()
-    return Score(method, frame, *(float(x) for x in sums))
+    return np.array([(values * part).sum() for part in (weight, weight * moves) for values in (square, 1.0)])
 
 
-def fast_intervals(scores: Iterable[Score]) -> set[int]:
-    """The half of the intervals (rounded down) with the largest share of pixels that move."""
-    shares: dict[int, list[float]] = {}
-    for found in scores:
-        if found.method == "repeat":
-            shares.setdefault(found.frame, []).append(found.moving_weight / found.subject_weight)
-    ordered = sorted(shares, key=lambda frame: -float(np.mean(shares[frame])))
-    return set(ordered[: len(ordered) // 2])
+def fast_intervals(repeat: Sums) -> NDArray[np.bool_]:
+    """(K,): the half of the intervals (rounded down) with the largest share of pixels that move."""
+    order = np.argsort(-repeat[:, 3] / repeat[:, 1], kind="stable")
+    return np.isin(np.arange(len(repeat)), order[: len(repeat) // 2])
 
 
-def decibels(scores: Sequence[Score], region: str) -> float:
+def decibels(sums: Sums, moving: bool) -> float:
     """PSNR over all pixels of a region of all pictures together."""
-    error, weight = (sum(getattr(s, name) for s in scores) for name in (region, f"{region}_weight"))
+    error, weight = sums[:, 2:].sum(0) if moving else sums[:, :2].sum(0)
     return float(-10 * np.log10(error / weight)) if weight and error else float("nan")
 
 
-def table(scores: Sequence[Score]) -> str:
+def table(found: Mapping[str, Sums]) -> str:
     """Markdown."""
-    fast, rows = fast_intervals(scores), []
-    kinds = {"all": (True, False), "fast": (True,), "still": (False,)}
-    columns = [(region, kind) for region in ("moving", "subject") for kind in kinds]
-    for method in dict.fromkeys(s.method for s in scores):
-        own = [s for s in scores if s.method == method]
-        values = [decibels([s for s in own if (s.frame in fast) in kinds[kind]], region) for region, kind in columns]
-        rows.append([method, *(f"{value:.2f}" for value in values)])
-    return markdown(["between frames", *(f"{kind}, {region}" for region, kind in columns)], rows)
+    fast = fast_intervals(found["repeat"])
+    kinds = {"all": fast | True, "fast": fast, "still": ~fast}
+    columns = [(moving, kind) for moving in (True, False) for kind in kinds]
+    rows = [
+        [method, *(f"{decibels(sums[kinds[kind]], moving):.2f}" for moving, kind in columns)]
+        for method, sums in found.items()
+    ]
+    return markdown(["between frames", *(f"{kind}, {'moving' if m else 'subject'}" for m, kind in columns)], rows)
 
 
-def measure(folders: SubjectFolders, factor: int) -> Iterator[Score]:
-    """Of all times between frames; the bound is scored in both intervals beside a frame.
+def measure(folders: SubjectFolders, factor: int) -> dict[str, Sums]:
+    """Of all times between frames, by METHODS; the bound is scored in both intervals beside a frame.
 
     Raises:
         UserError: if the subject is not the actor.
@@ -172,14 +157,15 @@ def measure(folders: SubjectFolders, factor: int) -> Iterator[Score]:
         )
     scene = read_scene(folders.scene)
     store, meshes = FrameStore(folders.textures / "textures.arrow"), read_meshes(folders.meshes / "meshes.npz")
+    found = {method: np.zeros((scene.num_frames - 1, 4)) for method in METHODS}
     for camera in scene.indices("holdout"):
         truth, hits = truth_of(folders, scene, camera, factor), cast_layers(scene.cameras[camera], meshes)
         for method, fill in METHODS.items():
             for at, textures in fill(store, factor):
                 picture = composite(hits, textures)[0]
-                for interval in {at // factor, (at - 1) // factor}:
-                    if 0 <= interval < scene.num_frames - 1:
-                        yield score(method, interval, picture, truth, at, factor)
+                for interval in {at // factor, (at - 1) // factor} & set(range(scene.num_frames - 1)):
+                    found[method][interval] += score(interval, picture, truth, at, factor)
+    return found
 
 
 def main(
@@ -188,9 +174,10 @@ def main(
 ) -> None:
     """Score frames between frames against the actor's truth."""
     with report_user_errors("between"):
-        scores = list(measure(SubjectFolders(subject), factor))
-        typer.echo(f"\n{factor} times the frame rate; dB against the truth, held-out cameras\n{table(scores)}")
-        typer.echo(f"fast: the intervals after frames {', '.join(map(str, sorted(fast_intervals(scores))))}")
+        found = measure(SubjectFolders(subject), factor)
+        typer.echo(f"\n{factor} times the frame rate; dB against the truth, held-out cameras\n{table(found)}")
+        fast = np.flatnonzero(fast_intervals(found["repeat"]))
+        typer.echo(f"fast: the intervals after frames {', '.join(map(str, fast))}")
 
 
 if __name__ == "__main__":

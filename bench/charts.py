@@ -18,7 +18,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocat
 
 from bench.hazard_rows import CLEAN, ROWS, loss_of
 from bench.results import Cell, Measurement, Row
-from bench.tables import PAPER, cell_text
+from bench.tables import PAPER, RATES, cell_text
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.sweeps.frontier import frontier
@@ -127,15 +127,12 @@ def _speed_panel(axes: Axes, measurements: Sequence[Measurement], name: str) -> 
 def conditions_text(data: Sequence[Measurement]) -> str:
     """Clock, machine, commits and dates of what is drawn, one line."""
     at = max(data, key=lambda m: m.date).conditions
-    wall, shared = (
-        f"wall clock, {at.threads} threads",
-        f"processor time / {at.threads} (a machine shared with other work)",
-    )
+    shared = f"processor time / {at.threads} (a machine shared with other work)"
+    clock = shared if at.clock == "processor" else f"wall clock, {at.threads} threads"
     commits: dict[str, set[str]] = defaultdict(set)
     for m in data:
         commits[m.preset].add(m.conditions.commit[:8])
     made = ", ".join(f"{preset} {'/'.join(sorted(names))}" for preset, names in commits.items())
-    clock = wall if at.clock == "wall" else shared
     return f"{clock}; {at.machine}; {_dates([m.date for m in data])}; commits: {made}"
 
 
@@ -206,10 +203,13 @@ def own_spots(rows: Sequence[Row], cost: str) -> dict[str, list[tuple[int, float
     """Sweep -> (value, cost, PSNR) of a subject's measured cells, by value."""
     found: dict[str, list[tuple[int, float, float]]] = {sweep: [] for sweep in SWEEPS}
     for row in sorted(rows, key=lambda row: row.value):
-        psnr = row.psnr
-        if psnr is not None and not row.failure:
-            x = {"bytes": row.bytes, "triangles": row.cost["triangles"], "pictures": row.pictures_a_second}[cost]
-            found[row.sweep] += [(row.value, x, psnr)] if x else []
+        if not row.failure:
+            x = {
+                "bytes": row.bytes,
+                "triangles": row.figures["triangles"],
+                "pictures": row.figures.get("pictures_a_second"),
+            }[cost]
+            found[row.sweep] += [(row.value, x, row.psnr)] if x else []
     return found
 
 
@@ -222,7 +222,7 @@ def sweeps(rows: Sequence[Row], path: Path) -> None:
     measured = [row for row in rows if not row.failure]
     subjects = sorted({row.subject for row in measured})
     if not subjects:
-        raise UserError("nothing measured yet", remedy="run `python -m bench.sweeps mesh`, `texture` or `layers`")
+        raise UserError("nothing measured yet", remedy="run `python -m bench.sweeps queue mesh`")
     with figure_of(path, 14.5, 1.3 + 3.7 * len(subjects)) as figure:
         grid = figure.subplots(len(subjects), len(COSTS), sharex="col", sharey="row", squeeze=False)
         for i, subject in enumerate(subjects):
@@ -267,19 +267,19 @@ def _short(count: float) -> str:
     return f"{count / 1e6:g} M" if count >= 1e6 else f"{count / 1e3:g} k" if count >= 1e3 else f"{count:g}"
 
 
-def rate(points: Sequence[Mapping[str, Any]], path: Path, title: str) -> None:
+def rate(rows: Sequence[Row], path: Path, title: str) -> None:
     """Bytes across (log), PSNR upwards, a line a series."""
     with figure_of(path, 7, 4.5, dpi=120) as figure:
         axes = figure.subplots()
-        for name in dict.fromkeys(point["series"] for point in points):
-            line = sorted((point["bytes"] / 1000, point["psnr"]) for point in points if point["series"] == name)
-            axes.plot(*zip(*line, strict=True), "o-", label=name)
+        for name in [name for name in RATES if any(row.sweep == name for row in rows)]:
+            line = sorted((row.bytes / 1000, row.psnr) for row in rows if row.sweep == name)
+            axes.plot(*zip(*line, strict=True), "o-", label=RATES[name])
         axes.set(xscale="log", xlabel="kB, meshes and video", ylabel="PSNR on held-out cameras, dB", title=title)
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter("{x:g}")
         axes.grid(True, alpha=0.3)
-        axes.legend()
+        axes.legend(loc="lower right")
 
 
 def waterfall(found: Mapping[str, Sequence[Mapping[str, Any]]], path: Path) -> None:

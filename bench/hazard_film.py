@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
@@ -21,6 +20,7 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from facefolds_core.source_code import digest_of_file
 
 EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "-85": -85.0}
 """Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; the outermost training cameras lie
@@ -41,15 +41,8 @@ class Film:
     @property
     def key(self) -> str:
         """Names the film and the code that makes it."""
-        return sha256(f"{self!r} {source_digest()}".encode()).hexdigest()[:16]
-
-
-def source_digest() -> int:
-    """CRC-32 of the sources of the actor."""
-    digest = 0
-    for path in sorted(Path(actor.__file__).parent.glob("*.py")):
-        digest = zlib.crc32(path.read_bytes(), digest)
-    return digest
+        code = [digest_of_file(path) for path in sorted(Path(actor.__file__).parent.glob("*.py"))]
+        return sha256(f"{self!r} {code}".encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)

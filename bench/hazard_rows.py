@@ -144,8 +144,8 @@ def _subject(**options: float) -> Film:
     return Film(ActorOptions(**options))
 
 
-ODD_SIZES = {1.0: (97, 65), 2.0: (113, 53), 3.0: (71, 89)}
-"""Height and width, about as many pixels as 96 x 64."""
+ODD_SIZES = {n: Film(height=h, width=w) for n, h, w in ((1.0, 97, 65), (2.0, 113, 53), (3.0, 71, 89))}
+"""About as many pixels as 96 x 64."""
 RATE = (("mlp", "lr_manifold"), ("explicit", "volume.learning_rate"))
 SPACING = (("mlp", "level_halfwidth"), ("explicit", "geometry.halfwidth"))
 
@@ -173,13 +173,7 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard("rate-low", "geometry's rate too low", (0.5, 0.3, 0.1), "x {}", scaled=RATE),
     Hazard("rate-high", "geometry's rate too high", (2, 3, 10), "x {}", scaled=RATE),
     Hazard("spacing", "layer spacing", (0.5, 2, 4), "x {}", scaled=SPACING),
-    Hazard(
-        "size",
-        "odd resolutions",
-        (1, 2, 3),
-        "no. {}",
-        film=lambda s: Film(height=ODD_SIZES[s][0], width=ODD_SIZES[s][1]),
-    ),
+    Hazard("size", "odd resolutions", (1, 2, 3), "no. {}", film=lambda s: ODD_SIZES[s]),
 )
 CLEAN = Hazard("clean", "clean", (0, 0, 0), "-")
 EXTREME = Hazard("extreme", "extreme views", (60, 75, 85), "{} degrees")

@@ -1,6 +1,6 @@
 """Where trainers fail: bad captures, wrong starts, other rates and seeds, as what they cost on clean held-out views.
 
-python -m bench.hazards                      # the actor's small film, a cut budget; tables of docs/limits.md, heat map
+python -m bench.hazards                      # the actor's small film, a cut budget: docs/research/hazards.md, heat map
 python -m bench.hazards --subject actor      # a prepared scene, each preset's whole budget
 
 Every cell is a training of its own; it is kept in bench/results/hazards.json as soon as it is there, failures too, and
@@ -36,7 +36,7 @@ from facefolds_core.scoring.perceptual import Perceptual
 
 RESULTS = Path("bench/results/hazards.json")
 CHART = Path("docs/images/hazards.png")
-PAGE = Path("docs/limits.md")
+PAGE = Path("docs/research/hazards.md")
 MARKERS = ("<!-- written by bench/hazards.py -->", "<!-- end of what bench/hazards.py writes -->")
 SEEDS = {"fast": 3, "paper": 1}
 """Of the film, without --seeds: with these the matrix takes less than an hour on two idle cores."""
@@ -191,15 +191,13 @@ def main(
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
     results: Annotated[Path, typer.Option(help="File that cells are added to.")] = RESULTS,
 ) -> None:
-    """Measure the matrix, draw it, print its tables and write them into docs/limits.md."""
+    """Measure the matrix, draw it, print its tables and write them into docs/research/hazards.md."""
     with report_user_errors("hazards"):
         store = Store(results, "cells", Cell)
-        done = set() if force else {cell.key for cell in store.read()}
         if not draw_only:
-            for blank in plan(subject, [k for k in only.split(",") if k], presets.split(","), seeds):
-                if blank.key not in done:
-                    store.add(run_cell(blank, data, data / "bench" / "films"))
-                    typer.echo(f"hazards: {describe(store.read()[-1])}")
+            blanks = plan(subject, [k for k in only.split(",") if k], presets.split(","), seeds)
+            for cell in store.fill(blanks, lambda blank: run_cell(blank, data, data / "bench" / "films"), force):
+                typer.echo(f"hazards: {describe(cell)}")
         text = hazard_tables(store.read())
         typer.echo(f"\n{text}")
         if results == RESULTS:

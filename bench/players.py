@@ -1,6 +1,6 @@
 """Pictures a second in a browser: `python -m bench.players data/actor/asset`.
 
-Assets as they ship (coarser or finer ones: `python -m bench.sweeps mesh --values 16,512`), a Gaussian-splat player from
+Assets as they ship (coarser or finer ones: docs/research/ablations.md), a Gaussian-splat player from
 npm with splats of the first one's head, and one opaque mesh as the floor: in the same browser, one after the other,
 from the same cameras. A picture's time runs until its pixels can be read back; nothing waits for a screen. Also: time
 and bytes to the first picture, and memory. Needs Chromium, npm, and the player that `make view` builds.
@@ -11,8 +11,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,12 +30,9 @@ from facefolds_core.files import write_json
 from facefolds_core.player import find_player
 from facefolds_core.rendering.reference import sample_texture
 from facefolds_core.serving import serving
+from tests.chromium import BROWSERS, FLAGS, find_browser
 
 PAGES = ROOT / "bench" / "browser"
-BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
-# The graphics card, or Mesa's llvmpipe where there is none; containers run as root.
-FLAGS = "--use-angle=gl-egl --ignore-gpu-blocklist --no-sandbox --disable-gpu-vsync"
-FLAGS += " --autoplay-policy=no-user-gesture-required"
 PATIENCE = 300_000
 """Milliseconds for one page to load or one picture's row to be drawn: software rendering takes its time."""
 WARM_UP = 2
@@ -124,24 +120,6 @@ def prepare(assets: Sequence[Asset], splats: Sequence[int], heads: Path) -> tupl
     return rows, {f"asset{i}": asset.folder for i, asset in enumerate(assets)}
 
 
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """A headless one.
-
-    Raises:
-        UserError: if there is none.
-    """
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS.split())
-        try:
-            yield browser
-        finally:
-            browser.close()
-
-
 def processes(browser: Browser) -> tuple[float, int | None]:
     """Processor seconds of all of the browser's processes so far; resident bytes of the one that draws, on Linux
     (without a graphics card textures lie there; most of it is the browser's own)."""
@@ -224,10 +202,12 @@ def main(
         counts = [int(count) for count in splats.split(",") if count]
         rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "site" / "heads")
         wanted = [parse_size(text, film=False) for text in sizes.split(",")]
-        found = []
-        with serving(place / "site", folders) as address:
+        path, flags, found = find_browser(), [*FLAGS, "--disable-gpu-vsync"], []
+        if path is None:
+            raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
+        with serving(place / "site", folders) as address, sync_playwright() as playwright:
             for row in rows:
-                with chromium() as browser:
+                with playwright.chromium.launch(executable_path=path, args=flags) as browser:
                     found.append(measure_row(browser, address, row, wanted, pictures))
                 typer.echo(f"players: {row['name']}: {found[-1]['timings'][0]['milliseconds']:.0f} ms")
         typer.echo(timing_table([t for entry in found for t in entry["timings"]]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Generic, Literal, TypeVar
@@ -17,7 +18,6 @@ from facefolds_core.files import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 Clock = Literal["wall", "processor"]
-Name = Literal["layers", "mesh", "texture"]
 Means = dict[str, float | None]
 
 
@@ -50,8 +50,8 @@ class Conditions(Record):
 
 
 class Scores(Record):
-    """Means over `images` images of the model without its view branch (docs/metrics.md, `diffuse`), of the subject,
-    or of the whole frame where the capture has no masks."""
+    """Means over `images` images of the model without its view branch (docs/reference/metrics.md, `diffuse`), of the
+    subject, or of the whole frame where the capture has no masks."""
 
     region: Literal["subject", "frame"]
     images: int
@@ -117,31 +117,22 @@ class Cell(Entry):
 
 
 class Row(Entry):
-    """An asset with one value of its subject's configuration changed (bench/sweeps.py).
+    """An asset with a few values of its subject's configuration changed (bench/sweeps.py).
 
     Attributes:
-        params: "section.key" -> value of what differs.
-        digest: of configuration, code and data, where it was measured without DVC.
-        scores, cost: of metrics.json; empty if it failed.
-        pictures_a_second: that the OpenGL renderer draws; 0 where not measured.
-        train_seconds, export_seconds: of the stages that the change concerns, on `clock` ("processor": all threads
-            together); 0 where they were not run for it.
+        params: "section.key" -> value of what differs, numbers only.
+        figures: scores of the asset and costs, as `facefolds collect` has them, and pictures a second that `renderer`
+            draws; empty if it failed.
     """
 
-    sweep: Name
+    sweep: str
     subject: str
     value: Annotated[int, Field(ge=1)]
-    params: dict[str, int]
-    digest: str = ""
+    params: dict[str, int | float]
     commit: str
     machine: str
-    scores: Means = {}
-    cost: dict[str, int] = {}
-    pictures_a_second: float = 0.0
+    figures: dict[str, float] = {}
     renderer: str = ""
-    clock: Clock = "wall"
-    train_seconds: float = 0.0
-    export_seconds: float = 0.0
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -149,13 +140,13 @@ class Row(Entry):
 
     @property
     def bytes(self) -> int:
-        return self.cost["mesh_bytes"] + self.cost["texture_bytes"]
+        """Of meshes and texture video."""
+        return int(self.figures["mesh_bytes"] + self.figures["texture_bytes"])
 
     @property
-    def psnr(self) -> float | None:
-        """Of the subject, where the capture has masks; else of the whole frame."""
-        subject = self.scores.get("psnr_subject")
-        return self.scores.get("psnr") if subject is None else subject
+    def psnr(self) -> float:
+        """Of the subject, where the capture has masks; else of the whole frame. Nothing of a failed one."""
+        return self.figures.get("psnr_subject", self.figures.get("psnr", float("nan")))
 
 
 Kind = TypeVar("Kind", bound=Entry)
@@ -184,6 +175,15 @@ class Store(Generic[Kind]):
         except (KeyError, TypeError, ValueError) as error:
             raise UserError("garbled results", file=self.path, found=str(error)[:300], remedy=remedy) from None
 
+    def fill(self, blanks: Iterable[Kind], measure: Callable[[Kind], Kind], force: bool = False) -> Iterator[Kind]:
+        """Measure what is not there (or all), and keep each as soon as it is measured."""
+        done = set() if force else {entry.key for entry in self.read()}
+        for blank in blanks:
+            if blank.key not in done:
+                found = measure(blank)
+                self.add(found)
+                yield found
+
     def add(self, entry: Kind) -> None:
         """Keep it in place of the same one measured before. The file is read again: others may have added to it."""
         kept = [other for other in self.read() if other.key != entry.key]
@@ -203,16 +203,12 @@ def mean(values: list[float | None]) -> float | None:
 
 def commit_name(folder: Path = ROOT) -> str:
     """First 12 digits of the commit, "+" if tracked files differ from it; "unknown" outside a git checkout."""
-
-    def git(*arguments: str) -> str:
-        done = subprocess.run(["git", "-C", folder, *arguments], capture_output=True, text=True, check=False)
-        return done.stdout.strip()
-
-    commit = git("rev-parse", "--short=12", "HEAD")
     # Results themselves are tracked: they must not make their own commit look changed.
     own = [f":(top,exclude){path}" for path in ("bench/results", "docs/images")]
-    changed = "+" if git("status", "--porcelain", "-uno", "--", ":/", *own) else ""
-    return commit + changed or "unknown"
+    commands = ["rev-parse", "--short=12", "HEAD"], ["status", "--porcelain", "-uno", "--", ":/", *own]
+    said = [subprocess.run(["git", "-C", folder, *c], capture_output=True, text=True, check=False) for c in commands]
+    commit, changed = (done.stdout.strip() for done in said)
+    return commit + ("+" if changed else "") or "unknown"
 
 
 def machine_name(device: str) -> str:

@@ -1,47 +1,35 @@
-"""How a cell is run: a project folder of its own, its parameters in params.yaml, and the real stages.
-
-`run` calls the stages' commands. `repro` asks DVC, in a copy of the project's code that shares its cache: a stage whose
-code, configuration and inputs were seen before, in the project or in another cell, is not run again.
-"""
+"""How a cell is run where DVC would not do: a folder with a params.yaml of its own, and the real stages' commands."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import torch
 import yaml
 
 from bench.results import ROOT, Means
-from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.files import read_json, write_text
-from facefolds_core.model import load_model
+from facefolds_core.params import merged
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.evaluation import score_images
-from facefolds_core.scoring.metrics import shown
-from facefolds_core.scoring.model_view import ModelView
-from facefolds_core.scoring.perceptual import Perceptual
+
+if TYPE_CHECKING:
+    import torch
+
+    from facefolds_core.captures.scene import Scene
+    from facefolds_core.scoring.perceptual import Perceptual
 
 Sections = Mapping[str, Mapping[str, Any]]
 STAGES = (
     *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
     *("decimate", "texture", "bake", "compress", "evaluate"),
 )
-DVC_CONFIG = """[core]
-    no_scm = true
-    analytics = false
-[cache]
-    dir = {}
-    type = reflink,hardlink,copy
-"""
 
 
 @dataclass(frozen=True)
@@ -66,51 +54,16 @@ class Project:
         Raises:
             UserError: with what a stage said last, if it failed.
         """
-        for stage in stages:
-            self._call([sys.executable, "-m", f"stages.{stage}", "--subject", self.subject], stage)
-
-    def repro(self, stage: str, force: bool = False) -> None:
-        """All that a stage needs, and itself.
-
-        Args:
-            force: run it (not what it needs) though nothing has changed.
-
-        Raises:
-            UserError: with what was said last, if something failed.
-        """
-        for name in ("stages", "facefolds_core"):
-            shutil.rmtree(self.root / name, ignore_errors=True)
-            shutil.copytree(ROOT / name, self.root / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for name in ("dvc.yaml", ".dvcignore"):
-            shutil.copyfile(ROOT / name, self.root / name)
-        write_text(self.root / ".dvc" / "config", DVC_CONFIG.format(ROOT / ".dvc" / "cache"))
-        target = f"{stage}@{self.subject}"
-        self._call([sys.executable, "-m", "dvc", "repro", "--quiet", target], stage)
-        if force:
-            options = ["--quiet", "--force", "--single-item", "--no-run-cache"]
-            self._call([sys.executable, "-m", "dvc", "repro", *options, target], stage)
-
-    def _call(self, command: list[str], stage: str) -> None:
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": path}
-        done = subprocess.run(command, cwd=self.root, env=environment, capture_output=True, text=True)
-        if done.returncode:
-            said = [line for line in f"{done.stdout}\n{done.stderr}".splitlines() if line.strip()]
-            errors = (
-                [line for line in said if line.startswith(f"{stage}: ")]
-                or said[-3:]
-                or [f"ended with {done.returncode}"]
-            )
-            raise UserError(" ".join(errors)[:300], place=f"{stage} of {self.subject}", file=self.root)
-
-
-def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Mappings within mappings are merged, all else is replaced."""
-    found = dict(base)
-    for key, value in changes.items():
-        both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
-        found[key] = merged(found[key], value) if both else value
-    return found
+        for stage in stages:
+            command = [sys.executable, "-m", f"stages.{stage}", "--subject", self.subject]
+            done = subprocess.run(command, cwd=self.root, env=environment, capture_output=True, text=True, check=False)
+            if done.returncode:
+                said = [line for line in f"{done.stdout}\n{done.stderr}".splitlines() if line.strip()]
+                errors = [line for line in said if line.startswith(f"{stage}: ")] or said[-3:]
+                message = " ".join(errors)[:300] or f"ended with {done.returncode}"
+                raise UserError(message, place=f"{stage} of {self.subject}", file=self.root)
 
 
 def own_params(subject: str, changes: Sections, path: Path = ROOT / "params.yaml") -> dict[str, Any]:
@@ -149,6 +102,11 @@ def score_model(
     Yields:
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
+    from facefolds_core.model import load_model
+    from facefolds_core.scoring.evaluation import score_images
+    from facefolds_core.scoring.metrics import shown
+    from facefolds_core.scoring.model_view import ModelView
+
     model = load_model(folder, device)
     truths, masks = scene.open_frames(), scene.open_masks()
     for index in scene.indices("holdout"):

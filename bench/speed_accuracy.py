@@ -2,11 +2,12 @@
 
 Trains presets with several numbers of iterations, scores the view-independent model on the held-out cameras, keeps each
 measurement in bench/results/speed_accuracy.json, and draws the chart. What is there for this commit is not measured
-again. Training runs by DVC in data/bench/<subject>, with the subject's own capture.
+again. Trainings run in data/bench/<subject>, on the subject's own capture.
 """
 
 from __future__ import annotations
 
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated
 
@@ -54,14 +55,20 @@ def score(project: Project, frames: int) -> Scores:
     return Scores.model_validate(region | values)
 
 
-def measure(project: Project, preset: str, iterations: int, conditions: Conditions) -> Measurement:
+@cache
+def prepare(project: Project) -> None:
+    """Its scene, anew, once for all trainings of this command."""
+    project.write(own_params(project.subject, {}))
+    project.run("configure", "capture", "normalize")
+
+
+def measure(project: Project, blank: Measurement) -> Measurement:
     """One training, timed anew, and scored; a failed one is a result."""
-    blank = Measurement(
-        subject=project.subject, preset=preset, iterations=iterations, conditions=conditions, date=now()
-    )
+    prepare(project)
+    conditions = blank.conditions
     try:
-        project.write(own_params(project.subject, {"train": {"preset": preset, "iterations": iterations}}))
-        project.repro("train", force=True)
+        project.write(own_params(project.subject, {"train": {"preset": blank.preset, "iterations": blank.iterations}}))
+        project.run("configure", "train")
         report = training_of(project.folders)
         processor = report["processor_seconds"] / conditions.threads
         found = {
@@ -103,13 +110,13 @@ def main(
         count = threads or torch.get_num_threads()
         conditions = Conditions(commit=commit_name(), clock=clock, threads=count, machine=machine, frames=frames)
         for subject in [] if draw_only else subjects.split(","):
-            for preset in presets.split(","):
-                for wanted in [int(n) for n in iterations.split(",")] if iterations else ITERATIONS[preset]:
-                    place = {"subject": subject, "preset": preset, "iterations": wanted, "conditions": conditions}
-                    blank = Measurement.model_validate({**place, "date": now()})
-                    if force or all(m.key != blank.key for m in store.read()):
-                        store.add(measure(Project(work / subject, subject), preset, wanted, conditions))
-                        typer.echo(f"bench: {describe(store.read()[-1])}")
+            blanks = [
+                Measurement(subject=subject, preset=preset, iterations=wanted, conditions=conditions, date=now())
+                for preset in presets.split(",")
+                for wanted in ([int(n) for n in iterations.split(",")] if iterations else ITERATIONS[preset])
+            ]
+            for found in store.fill(blanks, partial(measure, Project(work / subject, subject)), force):
+                typer.echo(f"bench: {describe(found)}")
         charts.speed(store.read(), picture)
         typer.echo(f"bench: {picture} drawn from {results}")
 

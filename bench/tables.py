@@ -6,7 +6,7 @@ python -m bench.tables --write    replaces it in README.md, so that no figure is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,7 @@ import numpy as np
 import typer
 
 from bench.hazard_rows import FILM, ROWS, Hazard, Loss, loss_of
-from bench.results import ROOT, Cell, Name, Row
+from bench.results import ROOT, Cell, Row
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json, write_text
 
@@ -27,9 +27,9 @@ README_ROWS = [
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
 """Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
 meshes) and R^t (disk: video), 120 images of subject 002914589. `other_bytes` is what `disk` leaves out."""
-AXES: dict[Name, str] = {"layers": "layers N", "mesh": "R^m", "texture": "R^t"}
-Point = dict[str, Any]
-"""Of bytes against accuracy: "series", "bytes", "psnr", ..."""
+AXES = {"layers": "layers N", "mesh": "R^m", "texture": "R^t"}
+RATES = {"paper": "paper"} | {codec: f"ours, {codec}" for codec in ("h264", "vp9", "av1")} | {"h264x32": "ours32, h264"}
+"""Series of bytes against accuracy -> in tables and charts."""
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -62,7 +62,7 @@ def spaced(count: int) -> str:
     return f"{count:,}".replace(",", " ")
 
 
-def sweep_table(rows: Sequence[Row], sweep: Name, subject: str) -> str:
+def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
     """A subject's cells of one sweep, the paper's printed row beside each."""
     own = {row.value: row for row in rows if (row.sweep, row.subject) == (sweep, subject)}
     paper = {point["value"]: point for point in PAPER[sweep]}
@@ -85,14 +85,15 @@ def _own_cells(row: Row | None) -> list[str]:
     if row is None or row.failure:
         return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 11]
     scores = [
-        number(row.scores.get(f"{name}{region}"), 2 if name == "psnr" else 3)
+        number(row.figures.get(f"{name}{region}"), 2 if name == "psnr" else 3)
         for region in ("_subject", "")
         for name in ("psnr", "ssim", "st_lpips")
     ]
-    seconds = " + ".join(f"{seconds:.0f}" for seconds in (row.train_seconds, row.export_seconds) if seconds)
-    sizes = [size(row.cost[name]) for name in ("mesh_bytes", "texture_bytes", "gpu_bytes")]
-    pictures = f"{row.pictures_a_second:.1f}" if row.pictures_a_second else ""
-    return [*scores, spaced(row.cost["triangles"]), *sizes, pictures, seconds]
+    taken = [row.figures.get(f"{what}_seconds", 0.0) for what in ("train", "export")]
+    seconds = " + ".join(f"{seconds:.0f}" for seconds in taken if seconds)
+    sizes = [size(row.figures[name]) for name in ("mesh_bytes", "texture_bytes", "gpu_bytes")]
+    pictures = number(row.figures.get("pictures_a_second"), 1)
+    return [*scores, spaced(int(row.figures["triangles"])), *sizes, pictures, seconds]
 
 
 def hazard_tables(cells: Sequence[Cell]) -> str:
@@ -152,31 +153,28 @@ def cell_text(loss: Loss | None, spread: bool = False, digits: int = 1) -> str:
     return text
 
 
-def rate_tables(points: Sequence[Point]) -> str:
-    """Bytes of each series at the qualities of the first one's points, and its PSNR at their bytes."""
+def rate_tables(rows: Sequence[Row]) -> str:
+    """Bytes of each series at the qualities of the first one's rows, and its PSNR at their bytes."""
+    found = {name: [r for r in rows if r.sweep == name] for name in RATES}
+    series = {name: own for name, own in found.items() if own}
+    anchors = sorted(next(iter(series.values())), key=lambda row: -row.bytes)
 
-    def smaller(anchor: Point, own: Sequence[Point]) -> str:
-        found = interpolated(anchor["psnr"], [(p["psnr"], float(np.log(p["bytes"]))) for p in own])
-        better = [p["bytes"] for p in own if p["psnr"] >= anchor["psnr"]]
+    def smaller(anchor: Row, own: Sequence[Row]) -> str:
+        found = interpolated(anchor.psnr, [(r.psnr, float(np.log(r.bytes))) for r in own])
+        better = [r.bytes for r in own if r.psnr >= anchor.psnr]
         most = f"at most {min(better) / 1000:.0f} kB" if better else "out of reach"
         return most if found is None else f"{np.exp(found) / 1000:.0f} kB"
 
-    def better(anchor: Point, own: Sequence[Point]) -> str:
-        found = interpolated(float(np.log(anchor["bytes"])), [(float(np.log(p["bytes"])), p["psnr"]) for p in own])
-        fewer = [p["psnr"] for p in own if p["bytes"] <= anchor["bytes"]]
+    def better(anchor: Row, own: Sequence[Row]) -> str:
+        found = interpolated(float(np.log(anchor.bytes)), [(float(np.log(r.bytes)), r.psnr) for r in own])
+        fewer = [r.psnr for r in own if r.bytes <= anchor.bytes]
         least = f"at least {max(fewer):.2f} dB" if fewer else "larger"
         return least if found is None else f"{found:.2f} dB"
 
-    columns: list[tuple[str, Callable[[Point], str], Callable[[Point, Sequence[Point]], str]]] = [
-        ("held-out PSNR", lambda p: f"{p['psnr']:.2f} dB", smaller),
-        ("bytes", lambda p: f"{p['bytes'] / 1000:.0f} kB", better),
-    ]
-    series = {name: [p for p in points if p["series"] == name] for name in dict.fromkeys(p["series"] for p in points)}
-    anchors = next(iter(series.values()))
-    return "\n\n".join(
-        markdown([title, *series], [[row(a), *(cell(a, own) for own in series.values())] for a in anchors])
-        for title, row, cell in columns
-    )
+    names = [RATES[name] for name in series]
+    sizes = [[f"{a.psnr:.2f} dB", *(smaller(a, own) for own in series.values())] for a in anchors]
+    qualities = [[f"{a.bytes / 1000:.0f} kB", *(better(a, own) for own in series.values())] for a in anchors]
+    return markdown(["held-out PSNR", *names], sizes) + "\n\n" + markdown(["bytes", *names], qualities)
 
 
 def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | None:
@@ -192,17 +190,7 @@ def readme_table(data: Path) -> str:
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = [
-        "",
-        "PSNR",
-        "SSIM",
-        "perceptual",
-        "PSNR of the subject: asset",
-        "diffuse",
-        "model",
-        "triangles",
-        "mesh + video",
-    ]
+    head = ["", "PSNR", "SSIM", "perceptual", "PSNR of the subject: asset", "diffuse", "model", "triangles"]
     rows = []
     for path in files:
         metrics = read_json(path)
@@ -220,7 +208,7 @@ def readme_table(data: Path) -> str:
                 f"{cost['device']}, {cost['train_seconds']:.0f} s",
             ]
         )
-    whole = markdown([*head, "trained on, for"], rows).splitlines()
+    whole = markdown([*head, "mesh + video", "trained on, for"], rows).splitlines()
     return "\n".join([*whole[:2], *README_ROWS, *whole[2:]])
 
 

@@ -47,3 +47,8 @@ def read_stage(kind: type[S], folder: Path) -> S:
 def read_train(folder: Path) -> TrainParams:
     """The section `train`, of whichever model it is."""
     return _read(TypeAdapter[TrainParams](TrainSection), folder / "train.json")
+
+
+def read_level_resolutions(folder: Path) -> tuple[int, ...]:
+    """R^m of the coarser levels of detail (`compress.levels`), each once: all that `decimate` needs to know of them."""
+    return _read(TypeAdapter(tuple[int, ...]), folder / "levels.json")

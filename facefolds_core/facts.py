@@ -31,6 +31,9 @@ WORDS = {
     "krt_is_of_full_size": "note: K of KRT is for full-size images; scaled (median principal point ({point[0]:.1f}, "
     "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
     "front_guessed": "note: no `front` camera and no tracked mesh; +x is the cameras' mean direction",
+    "pictures_disagree": "note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation "
+    "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
+    "another's?",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     # of a training
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "

@@ -206,14 +206,14 @@ def write_json(target: str | Path, value: Any) -> None:
 
 
 def read_json(path: str | Path, remedy: str = "make the file again, or restore it from a backup") -> Any:
-    """Parse a JSON file.
+    """Parse a JSON file, with or without a byte order mark.
 
     Raises:
         UserError: if the file is missing, is not UTF-8 or is not JSON (parsing.py); names the line and column.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise UserError("file not found", file=path, remedy=remedy) from None
     except UnicodeDecodeError as error:

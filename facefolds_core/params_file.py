@@ -35,7 +35,7 @@ class Params(Section):
                 place="subjects",
                 expected=", ".join(sorted(self.subjects)),
                 found=name,
-                remedy="add it under `subjects` (docs/subjects.md), or name one that is there",
+                remedy="add it under `subjects` (docs/guide/subjects.md), or name one that is there",
             )
         return self.subjects[name]
 
@@ -71,10 +71,13 @@ def load_params(path: str | Path = "params.yaml") -> Params:
     except UnicodeDecodeError as error:
         place = f"byte {error.start}"
         raise UserError("garbled YAML", file=path, place=place, expected="UTF-8", remedy="save it as UTF-8") from None
-    value = parse_yaml(text, path, "mend it; docs/subjects.md describes the file")
+    value = parse_yaml(text, path, "mend it; docs/guide/subjects.md describes the file")
     if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
         raise UserError(
-            "no subjects", file=path, expected="a mapping with a `subjects` section", remedy="see docs/subjects.md"
+            "no subjects",
+            file=path,
+            expected="a mapping with a `subjects` section",
+            remedy="see docs/guide/subjects.md",
         )
     unknown = [brief(name) for name in value if name not in ("subjects", *STAGE_SECTIONS)]
     if unknown:
@@ -140,10 +143,11 @@ def _has(overrides: Any, name: str) -> bool:
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
-    """Write `subject.json` and one file for each stage; returns their paths."""
+    """Write `subject.json`, one file a stage, and `levels.json` (see `config`); returns their paths."""
     core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
-    values = {"subject": core}
+    values: dict[str, Any] = {"subject": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
+    values["levels"] = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
     for name, value in values.items():
         write_json(folder / f"{name}.json", value)
     return [folder / f"{name}.json" for name in values]

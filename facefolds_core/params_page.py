@@ -1,4 +1,4 @@
-"""docs/params.md: all keys of params.yaml with their types, bounds, defaults and descriptions, from the sections.
+"""docs/reference/params.md: all keys of params.yaml: types, bounds, defaults, descriptions, from the sections.
 
 python -m facefolds_core.params_page    # writes it; a test compares
 """
@@ -19,15 +19,15 @@ from facefolds_core.params.sections import SECTIONS
 from facefolds_core.params.subject import Overrides, Subject
 from facefolds_core.params.train import PRESETS
 
-PAGE = Path("docs/params.md")
+PAGE = Path("docs/reference/params.md")
 
 HEAD = """\
 # Parameters
 
 All keys of params.yaml, made from facefolds_core/params by `python -m facefolds_core.params_page`. Every section of a
-stage can be overridden for one subject, key by key (docs/subjects.md). Unknown keys are refused, and so are strings or
-true and false where a number belongs, and numbers out of bounds. Lengths are in units of the scene: cameras are about 1
-away from the subject.
+stage can be overridden for one subject, key by key ([subjects](../guide/subjects.md)). Unknown keys are refused, and so
+are strings or true and false where a number belongs, and numbers out of bounds. Lengths are in units of the scene:
+cameras are about 1 away from the subject.
 
 For one run without a change of the file, and for sweeps, each key is set by its path; `++` adds it where params.yaml
 does not write it:

@@ -99,8 +99,8 @@ class SubjectFolders:
         return self.root / "metrics.json"
 
     def timing(self, stage: str) -> Path:
-        """Seconds that a stage took, read by evaluate."""
-        return self.root / "timings" / f"{stage}.json"
+        """Seconds that a stage took, read by evaluate. Why they lie beside the subject's folder: .dvcignore."""
+        return self.root.parent / ".timings" / self.root.name / f"{stage}.json"
 
 
 def check_subject_name(name: object, file: str | Path | None = None) -> str:

@@ -6,8 +6,8 @@ is lenient: it skips the checksums of a PNG's pixels and swallows the warnings o
 - PNG: signature, header, every chunk's CRC and the end are checked, and the zlib stream's own checksum is Pillow's:
   any damage to the pixels is found, but for a chance of 2^-32 a chunk.
 - JPEG: it has no checksums, so a change of bits that makes another valid picture cannot be found. Found are: a cut
-  file (the end marker must be there), segments that do not follow one another, restart markers out of turn, and codes
-  that FFmpeg's decoder, told to be strict, cannot decode.
+  file (the end marker must be there), segments that do not follow one another, restart markers out of turn, blocks of
+  a disk that were never written, and codes that FFmpeg's decoder, told to be strict, cannot decode.
 
 What follows the end of a picture is ignored, as every viewer does.
 """
@@ -33,6 +33,8 @@ FORMATS = ("PNG", "JPEG")
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _DEFLATE = 1040
 """No zlib stream is more than this many times as long when it is unpacked (1032, and some for its ends)."""
+_BLOCK = 4096
+"""Bytes of a file system's block, and of a page of memory."""
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 """PNG's colour types -> values a pixel."""
 
@@ -154,7 +156,8 @@ def _jpeg_end(data: bytes) -> int:
         position += 2 + int.from_bytes(data[position + 2 : position + 4], "big")
         if kind == 0xDA:
             scans += 1
-            position = _scan_end(codes, found, position)
+            start, position = position, _scan_end(codes, found, position)
+            _check_blocks(codes, start, position)
 
 
 def _scan_end(codes: NDArray[np.uint8], found: NDArray[np.int64], start: int) -> int:
@@ -173,3 +176,17 @@ def _scan_end(codes: NDArray[np.uint8], found: NDArray[np.int64], start: int) ->
     if not np.array_equal(restarts, 0xD0 + np.arange(len(restarts)) % 8):
         raise DamagedPictureError("restart markers out of turn: a part is missing, or there twice")
     return int(places[others[0]])
+
+
+def _check_blocks(codes: NDArray[np.uint8], start: int, end: int) -> None:
+    """Refuse blocks of zeros in a scan's codes: a copy that was interrupted, or a disk that failed, leaves them.
+
+    Even surfaces may be long runs of zeros, too, where Huffman's codes were made for the picture. But they do not begin
+    and end exactly where blocks do: that is chance once in 16 million runs.
+    """
+    first, last = -(-start // _BLOCK), end // _BLOCK
+    empty = np.flatnonzero(~codes[first * _BLOCK : last * _BLOCK].reshape(max(0, last - first), _BLOCK).any(1)) + first
+    for run in np.split(empty, np.flatnonzero(np.diff(empty) > 1) + 1) if len(empty) else []:
+        begin, stop = int(run[0]) * _BLOCK, int(run[-1] + 1) * _BLOCK
+        if codes[begin - 1] and codes[stop]:  # a scan ends with a marker, so `stop` is in the file
+            raise DamagedPictureError(f"bytes {begin} to {stop} are zeros: a part was never written")

@@ -1,4 +1,4 @@
-"""Serve the web player and assets to browsers on this machine: what the player needs and nothing else (docs/viewer.md).
+"""Serve the web player and assets to browsers on this machine: what it needs, nothing else (docs/guide/viewer.md).
 
 Every page that a browser shows can send requests to 127.0.0.1. So the Host header must be this machine's name (a page
 whose own name was made to point here, DNS rebinding, sends its own), nobody else may embed what is served, and of an

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
+from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import read_capture
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.params import CaptureParams, NormalizeParams
@@ -26,9 +27,9 @@ def summary(plan: Plan) -> str:
     )
 
 
-def left_out(plan: Plan) -> list[str]:
-    """The first lines on what the scene does not have."""
-    lines = plan.scene.left_out
+def left_out(scene: Scene) -> list[str]:
+    """The first lines on what the scene does not have, and on what is odd in it."""
+    lines = scene.left_out
     shown = [f"  {line}" for line in lines[:SHOWN]]
     if len(lines) > SHOWN:
         shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")
@@ -40,8 +41,7 @@ def normalize(folders: SubjectFolders) -> str:
     params = read_stage(NormalizeParams, folders.config)
     capture = read_capture(subject, folders, read_stage(CaptureParams, folders.config))
     plan = plan_scene(capture, folders.root.name, subject, params, folders.scene)
-    write_plan(plan, params)
-    for line in left_out(plan):
+    for line in left_out(write_plan(plan, params)):
         typer.echo(line)
     return summary(plan)
 

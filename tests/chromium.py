@@ -85,6 +85,7 @@ class Chromium:
 
 def _arguments(process: psutil.Process) -> list[str]:
     try:
-        return process.cmdline()
+        arguments: list[str] = process.cmdline()
+        return arguments
     except psutil.Error:  # it ended meanwhile
         return []

@@ -12,6 +12,9 @@ from playwright.sync_api import Browser, sync_playwright
 from tests.chromium import BROWSERS, Chromium, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
+BROWSER = ("tests/viewer/", "tests/reporting/test_browser.py", "tests/core/test_chromium.py")
+LONGEST = ("tests/pipeline/test_end_to_end", *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
+"""What several workers begin with."""
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +50,33 @@ def browser(chromium: Chromium) -> Iterator[Browser]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A browser that hung, and was killed, gets one more chance; a test that found something wrong gets none."""
+    """Mark what runs DVC or a browser, for `make check`; begin with what takes longest, for several workers.
+
+    A browser that hung, and was killed, gets one more chance; a test that found something wrong gets none.
+    """
     for item in items:
-        if "browser" in getattr(item, "fixturenames", ()):
+        if item.path.is_relative_to(ROOT / "tests" / "pipeline"):
+            item.add_marker(pytest.mark.pipeline)
+        fixtures = getattr(item, "fixturenames", ())
+        if "chromium" in fixtures or "player_folder" in fixtures:
+            item.add_marker(pytest.mark.browser)
+        if "browser" in fixtures:
             item.add_marker(pytest.mark.flaky(reruns=1, only_rerun=["TargetClosedError"]))
+    items.sort(key=lambda item: _rank(item.nodeid))
+
+
+def _rank(nodeid: str) -> int:
+    return next((i for i, start in enumerate(LONGEST) if nodeid.startswith(start)), len(LONGEST))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """With `-n`: a worker gets whole files, so that what they share is made once; one of them has the browser."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            return "browser" if nodeid.startswith(BROWSER) else nodeid.split("::")[0]
+
+    config.option.loadscopereorder = False
+    return ByFile(config, log)

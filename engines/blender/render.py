@@ -100,7 +100,7 @@ def render(view: dict[str, Any]) -> None:
     """One picture.
 
     Args:
-        view: file, width, height, K (3, 3) and w2c (3, 4) as in docs/conventions.md; pixels are square.
+        view: file, width, height, K (3, 3) and w2c (3, 4) as in docs/reference/conventions.md; pixels are square.
     """
     scene, width, height, K = bpy.context.scene, view["width"], view["height"], view["K"]
     rotation = Matrix([row[:3] for row in view["w2c"]])

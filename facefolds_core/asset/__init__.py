@@ -1,4 +1,4 @@
-"""The asset: the border between what makes it and what shows it. See docs/asset-format.md.
+"""The asset: the border between what makes it and what shows it. See docs/reference/asset-format.md.
 
 Reading needs no torch, no numba and nothing of what makes an asset; `asset.writer` is imported by those who write.
 """

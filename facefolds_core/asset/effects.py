@@ -1,4 +1,4 @@
-"""View effects in a file: three planes of an RGB PNG, 8 bits (docs/asset-format.md)."""
+"""View effects in a file: three planes of an RGB PNG, 8 bits (docs/reference/asset-format.md)."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x
 from the innermost layer to the outermost: viewers draw blended objects at one distance in that order.
 
 glTF's viewers decode colours to linear light before they blend, the asset's players do not: half-transparent parts look
-slightly different (docs/asset-format.md).
+slightly different (docs/reference/asset-format.md).
 """
 
 from __future__ import annotations

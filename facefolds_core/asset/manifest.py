@@ -1,4 +1,4 @@
-"""manifest.json of an asset, format version 2 (docs/asset-format.md), as validated models.
+"""manifest.json of an asset, format version 2 (docs/reference/asset-format.md), as validated models.
 
 The JSON schema beside this file, manifest.schema.json, says the same without our code; a test keeps the two in step.
 """

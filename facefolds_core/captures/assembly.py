@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.agreement import AGREE, agreement
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
 from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
@@ -18,9 +19,9 @@ from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
-from facefolds_core.facts import fact
+from facefolds_core.facts import Fact, fact
 from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import Image, write_frames
+from facefolds_core.frame_store import FrameStore, Image, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
@@ -140,8 +141,11 @@ def _moved(tracking: Tracking, moves: list[Similarity]) -> Tracking:
     return replace(tracking, poses=np.array(poses))
 
 
-def write_plan(plan: Plan, params: NormalizeParams) -> None:
+def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     """Write the scene's folder, whole or not at all; one image is held in memory at a time.
+
+    Returns:
+        The scene, with what its pictures show to be odd in `left_out`.
 
     Raises:
         UserError: if an image is damaged.
@@ -158,7 +162,23 @@ def write_plan(plan: Plan, params: NormalizeParams) -> None:
         if capture.sound is not None and plan.sound_start is not None:
             seconds = scene.num_frames / (scene.fps or 1.0)
             cut_sound(capture.sound.path, temporary / "audio.wav", plan.sound_start, seconds)
+        scene = replace(scene, left_out=(*_doubts(plan, temporary), *scene.left_out))
         write_scene(scene, temporary)
+    return scene
+
+
+def _doubts(plan: Plan, written: Path) -> list[Fact]:
+    """A note if the pictures of the first frame do not agree about the tracked mesh."""
+    tracking = plan.capture.tracking
+    if plan.vertices is None or tracking is None or tracking.faces is None:
+        return []
+    first = [row.camera for row in plan.rows if row.frame == 0]
+    store = FrameStore(written / "frames.arrow")
+    cameras, vertices = [plan.scene.cameras[c] for c in first], plan.vertices[0].astype(np.float64)
+    found = agreement(cameras, vertices, tracking.faces, lambda i: store.image(first[i], 0))
+    if found is None or found >= AGREE:
+        return []
+    return [fact("pictures_disagree", correlation=found)]
 
 
 def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:

@@ -161,7 +161,7 @@ def krt_reference(
 
 
 def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
-    """K of KRT -> K for the images at hand in continuous coordinates (docs/conventions.md).
+    """K of KRT -> K for the images at hand in continuous coordinates (docs/reference/conventions.md).
 
     Args:
         K: (3, 3) for images of size `reference`, whose first pixel has its centre at `pixel_centres`.

@@ -87,6 +87,10 @@ class Scene:
         """Indices of the cameras of one split."""
         return [i for i, s in enumerate(self.splits) if s == split]
 
+    def cameras_of(self, split: Split) -> list[Camera]:
+        """The cameras of one split."""
+        return [self.cameras[i] for i in self.indices(split)]
+
     def open_frames(self) -> FrameStore:
         return FrameStore(self.folder / "frames.arrow")
 

@@ -1,4 +1,4 @@
-"""Write an asset for another program: `facefolds export godot data/<subject>/asset OUT`; see docs/engines.md."""
+"""Write an asset for another program: `facefolds export godot data/<subject>/asset OUT`; see docs/guide/engines.md."""
 
 from __future__ import annotations
 

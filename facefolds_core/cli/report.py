@@ -1,4 +1,4 @@
-"""Make a page that tells all about a subject: `facefolds report data/<subject>` (docs/report.md)."""
+"""Make a page that tells all about a subject: `facefolds report data/<subject>` (docs/guide/report.md)."""
 
 from __future__ import annotations
 

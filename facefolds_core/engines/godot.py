@@ -1,4 +1,4 @@
-"""Plain meshes and a picture a frame (a folder), for the add-on for Godot 3 in engines/godot (docs/engines.md).
+"""Plain meshes and a picture a frame (a folder), for the add-on for Godot 3 in engines/godot (docs/guide/engines.md).
 
 Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player of WebM cannot seek. So the folder
 holds plain binary meshes with y up, and every frame as a picture of its own.

@@ -1,4 +1,4 @@
-"""Pinhole cameras, in the one convention of this project (docs/conventions.md).
+"""Pinhole cameras, in the one convention of this project (docs/reference/conventions.md).
 
 - Camera axes are OpenCV's: x right, y down, z forward. `w2c` maps world to camera: X_c = R X_w + t.
 - Image coordinates are continuous: pixel (column i, row j) covers [i, i+1) x [j, j+1), its centre is

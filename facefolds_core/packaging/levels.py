@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from facefolds_core.export.textures import resample
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import CompressParams, LevelParams
-
-Decimate = Callable[[int], Sequence[TexturedMesh]]
-"""R^m -> all layers with at most R^m x R^m vertices."""
 
 
 class Resampled:
@@ -34,16 +31,16 @@ class Resampled:
 
 
 def coarse_content(
-    full: LevelContent, windows: Sequence[Window], level: LevelParams, decimate: Decimate
+    full: LevelContent, windows: Sequence[Window], level: LevelParams, meshes: Sequence[TexturedMesh]
 ) -> LevelContent:
     """What a coarser level shows.
 
     Args:
-        windows: of all layers of the export.
+        windows, meshes: of all layers of the export; the meshes as coarse as the level asks for.
     """
     size = min(level.texture_resolution, full.textures.image(0, 0).shape[0])
     textures = Resampled(full.textures, size)
-    layers = crop_layers(decimate(level.mesh_resolution), windows, textures, full.frames)
+    layers = crop_layers(meshes, windows, textures, full.frames)
     return LevelContent(layers, textures, full.frames, full.fps, full.audio)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -41,13 +41,14 @@ from facefolds_core.asset.writer import (
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.export.between import at_frame_rate
+from facefolds_core.export.stores import Grids
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.effects import fit_effects
-from facefolds_core.packaging.levels import Decimate, coarse_content, level_params
+from facefolds_core.packaging.levels import coarse_content, level_params
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import ViewMeter, spread, training_cameras
@@ -63,22 +64,38 @@ class Export:
         meshes: N layers, outermost first.
         windows: of each layer's texture.
         textures: layered store, N layers x K frames of (R, R, 4).
-        decimate: R^m -> the layers with at most R^m x R^m vertices, for coarser levels.
+        centre: c of the UV map, units.
+        coarser: R^m -> the layers with at most R^m x R^m vertices, for the coarser levels.
     """
 
     meshes: Sequence[TexturedMesh]
     windows: Sequence[Window]
     textures: FrameStore
-    decimate: Decimate
+    centre: tuple[float, float, float]
+    coarser: Mapping[int, Sequence[TexturedMesh]]
+
+    @classmethod
+    def of(
+        cls,
+        grids: Grids,
+        meshes: Sequence[TexturedMesh],
+        textures: Path,
+        coarser: Mapping[int, Sequence[TexturedMesh]],
+    ) -> Export:
+        """From what the steps of the export give; `textures` is the frame store of `bake`."""
+        windows = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in grids.windows]
+        x, y, z = (float(value) for value in grids.centre)
+        return cls(meshes, windows, FrameStore(textures), (x, y, z), coarser)
 
 
-def package(folder: Path, export: Export, scene: Scene, source: AssetSource, params: CompressParams) -> Manifest:
+def package(folder: Path, export: Export, scene: Scene, params: CompressParams) -> Manifest:
     """Write the folder of an asset, whole or not at all; an older one is replaced.
 
     Raises:
         UserError: if the export cannot be an asset.
     """
     _check_order(params.levels)
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
     cameras = training_cameras(scene)
@@ -91,7 +108,7 @@ def package(folder: Path, export: Export, scene: Scene, source: AssetSource, par
         meter = make_meter(full, cameras, params)
         levels = []
         for coarse in params.levels:
-            content = coarse_content(full, export.windows, coarse, export.decimate)
+            content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
             levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
         level = _level(temporary, FULL, full, params, meter, cameras)
         if params.view_effects:

@@ -13,8 +13,8 @@ T = TypeVar("T")
 class Section(BaseModel):
     """Base of all sections: frozen; unknown keys, NaN, infinities, and strings or true and false for numbers refused.
 
-    The string below each field is its description: with its unit, and the reason for its default. docs/params.md is
-    made of them.
+    The string below each field is its description: with its unit, and the reason for its default.
+    docs/reference/params.md is made of them.
     """
 
     model_config = ConfigDict(

@@ -51,4 +51,4 @@ class NormalizeParams(Section):
 
     stabilize: bool = False
     """Move each frame's cameras by the head pose so that the head stands still. Cameras then move from frame to frame,
-    which the static background and held-out scoring do not expect: see docs/subjects.md."""
+    which the static background and held-out scoring do not expect: see docs/guide/subjects.md."""

@@ -1,4 +1,4 @@
-"""`train` of the model `explicit`: radius maps and texel grids (docs/method.md). The preset `fast` are its defaults."""
+"""`train` of the model `explicit`: radius maps, texel grids (docs/reference/method.md). Preset `fast`: the defaults."""
 
 from __future__ import annotations
 

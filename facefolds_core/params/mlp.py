@@ -69,7 +69,7 @@ class MlpParams(Section):
 
     output_scale: Factor = 0.36
     """Factor on its output: how far a step of Adam moves the surfaces. Ours: a step at the paper's rate then moves them
-    as far as in the paper's network (docs/method.md)."""
+    as far as in the paper's network (docs/reference/method.md)."""
 
     input_scale: Factor = 6.0
     """The perceptron sees (x - c) in units of this part of the outermost radius: without it, SiLU layers of He's size

@@ -37,7 +37,7 @@ SECTIONS: dict[str, tuple[type[Section], ...]] = {
 STAGE_SECTIONS = tuple(SECTIONS)
 
 _TRAIN: TypeAdapter[TrainParams] = TypeAdapter(TrainSection)
-REFERENCE = "docs/params.md"
+REFERENCE = "docs/reference/params.md"
 _SHARED = "what stands in `train` holds for all subjects, so keys of one model belong to the subjects that use it"
 
 

@@ -1,4 +1,4 @@
-"""Cameras for stills and films of an asset: around the subject at the origin, up +z, front +x (docs/conventions.md)."""
+"""Cameras for stills and films of an asset: around the origin, up +z, front +x (docs/reference/conventions.md)."""
 
 from __future__ import annotations
 

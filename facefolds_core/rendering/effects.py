@@ -1,4 +1,4 @@
-"""View effects: what a level adds to its layers' colours, by the direction to the eye (docs/asset-format.md)."""
+"""View effects: what a level adds to its layers' colours, by the way to the eye (docs/reference/asset-format.md)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The reference renderer: an asset as it ships, seen from a camera. Slow and clear: faster players are held against it.
 
-What it does is what docs/asset-format.md asks of a player:
+What it does is what docs/reference/asset-format.md asks of a player:
 - one ray through each pixel's centre, no anti-aliasing; the nearest hit with each layer counts, whichever side it is;
 - (s, t) from the triangle's vertices; RGBA by bilinear interpolation of the stored (sRGB-encoded) values, colour and
   straight alpha each by itself, clamped to the texture's edge texels;

@@ -1,4 +1,4 @@
-"""Score the shipped asset, and the model it came from, on the held-out cameras (docs/metrics.md).
+"""Score the shipped asset, and the model it came from, on the held-out cameras (docs/reference/metrics.md).
 
 An asset at a multiple of the capture's frame rate is scored on the frames that have photos.
 

@@ -1,4 +1,4 @@
-"""PSNR and SSIM of an image against the truth, over the whole frame or weighted by a mask (docs/metrics.md).
+"""PSNR and SSIM of an image against the truth, over the whole frame or weighted by a mask (docs/reference/metrics.md).
 
 Images are (H, W, 3) float64 in [0, 1], in stored (sRGB-encoded) values. SSIM is written out here with separable filters
 because torchmetrics' takes seconds an image on a CPU; tests compare the two.

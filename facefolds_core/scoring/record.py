@@ -16,6 +16,7 @@ from facefolds_core.asset import Asset
 from facefolds_core.asset.manifest import MANIFEST_NAME
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
+from facefolds_core.pictures import DamagedPictureError, open_picture
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import Panel
 
@@ -91,7 +92,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class View:
-    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/metrics.md."""
+    """One held-out picture: images (H, W, 3) in [0, 1], mask (H, W) or None; dB as in docs/reference/metrics.md."""
 
     camera: str
     frame: str
@@ -214,8 +215,8 @@ def _read_view(folder: Path, entry: dict[str, Any]) -> View:
     for name in ("truth", "asset", "mask"):
         file = entry[name]
         try:
-            images[name] = None if file is None else np.asarray(Image.open(folder / file, formats=["PNG"])) / 255.0
-        except (OSError, SyntaxError) as error:
+            images[name] = None if file is None else np.asarray(open_picture(folder / file)) / 255.0
+        except (OSError, DamagedPictureError) as error:
             raise UserError("a picture of the evaluation is damaged", file=folder / file, found=str(error),
                             remedy=REMEDY) from None  # fmt: skip
     return View(entry["camera"], entry["frame"], **images, psnr=entry["psnr"], psnr_subject=entry["psnr_subject"])

@@ -1,4 +1,4 @@
-"""What `evaluate` writes: metrics.json and per_image.parquet (docs/metrics.md), and a table for the terminal."""
+"""What `evaluate` writes: metrics.json and per_image.parquet (docs/reference/metrics.md); a table for the terminal."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
 
 
 def asset_cost(manifest: Manifest) -> dict[str, int]:
-    """What the full level costs a player (docs/metrics.md, `cost`)."""
+    """What the full level costs a player (docs/reference/metrics.md, `cost`)."""
     level = manifest.full
     vertices, triangles = sum(x.vertices for x in level.layers), sum(x.triangles for x in level.layers)
     picture = level.texture.width * level.texture.height

@@ -27,7 +27,7 @@ class _Shown:
     pending: bool
 
 
-def runs_of(shown: Any) -> tuple[list[Run], int]:
+def runs_of(shown: Any, distinct: bool = True) -> tuple[list[Run], int]:
     """Rows, and how many experiments have not ended yet.
 
     A row is an experiment (or the working folder, "workspace", or a commit) and a subject. Its parameters are those of
@@ -36,6 +36,7 @@ def runs_of(shown: Any) -> tuple[list[Run], int]:
 
     Args:
         shown: the parsed JSON.
+        distinct: False keeps rows that agree in all but the name.
 
     Raises:
         UserError: if it is not of the kind that DVC 3 writes.
@@ -51,7 +52,8 @@ def runs_of(shown: Any) -> tuple[list[Run], int]:
     measured = {run.subject for run in runs if run.figures}
     known = [run for run in runs if run.figures or (run.error and (run.subject in measured or not measured))]
     subjects = sorted({run.subject for run in known})
-    return [row for subject in subjects for row in _rows([run for run in known if run.subject == subject])], pending
+    groups = [[run for run in known if run.subject == subject] for subject in subjects]
+    return [row for group in groups for row in _rows(group, distinct)], pending
 
 
 def _revisions(shown: Any) -> Iterator[_Shown]:
@@ -107,13 +109,14 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def _rows(runs: list[Run]) -> list[Run]:
-    """Of one subject: with the parameters that differ, each row once."""
+def _rows(runs: list[Run], distinct: bool) -> list[Run]:
+    """Of one subject: with the parameters that differ; each row once, if they are to be distinct."""
     names = list(dict.fromkeys(name for run in runs for name in run.params))
     differ = [name for name in names if len({json.dumps(run.params.get(name)) for run in runs}) > 1]
     rows: dict[str, Run] = {}
     for run in runs:
         kept = {name: run.params[name] for name in differ if name in run.params}
-        key = json.dumps([kept, dict(run.figures), run.error], sort_keys=True)
+        name = "" if distinct else run.experiment
+        key = json.dumps([kept, dict(run.figures), run.error, name], sort_keys=True)
         rows.setdefault(key, replace(run, params=kept))
     return list(rows.values())

@@ -20,7 +20,7 @@ class Budget:
     Attributes:
         bytes: of meshes, video and view effects together.
         triangles: of all layers.
-        gpu_bytes: docs/metrics.md.
+        gpu_bytes: docs/reference/metrics.md.
         video_bits_per_second: of the texture video.
     """
 

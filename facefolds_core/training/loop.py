@@ -7,17 +7,16 @@ import shutil
 import sys
 import time
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError, is_disk_error
-from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
-from facefolds_core.model.storage import ModelSpec, build_model, save_model
+from facefolds_core.model.storage import ModelSpec, build_model
 from facefolds_core.model.textures import MlpTextures
 from facefolds_core.params import MlpParams
 from facefolds_core.progress import progress
@@ -34,6 +33,7 @@ from facefolds_core.training.patience import patiently
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.start import Start, find_start, fit_outline
+from facefolds_core.training.trained import Trained
 
 LOG_POINTS = 500
 """Lines in the log of a whole training, at least; never more than 100 iterations apart."""
@@ -202,7 +202,20 @@ def _trim_log(folder: Path, iteration: int) -> None:
 
 
 def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    """Train on `scene`, write the model folder whole, and remove the checkpoint.
+    """`fit_mlp`, and the model's folder written whole; a full disk is waited for, and leaves a checkpoint at worst."""
+    run, trained = _fit(scene, params, checkpoints, log)
+    try:
+        patiently(lambda: trained.save(model_folder))
+    except OSError:
+        with suppress(OSError):  # the one before stays
+            save_checkpoint(run.state, run.mark, run.checkpoints)
+        raise
+    shutil.rmtree(run.checkpoints, ignore_errors=True)
+    return trained.report
+
+
+def fit_mlp(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> Trained:
+    """Train on `scene`, and remove the checkpoint.
 
     A run that was interrupted continues from its last checkpoint, to the same result (bit for bit on a CPU with the
     same number of threads).
@@ -214,25 +227,18 @@ def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path
     Raises:
         UserError: if training diverges (the last checkpoint stays), or the checkpoint found is damaged.
     """
+    run, trained = _fit(scene, params, checkpoints, log)
+    shutil.rmtree(run.checkpoints, ignore_errors=True)
+    return trained
+
+
+def _fit(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> tuple[TrainingRun, Trained]:
     run = begin(scene, params, checkpoints)
     psnr = _finish(run, params, log)
     state = run.state
     rays = state.iteration * params.rays
     report = make_report(state.seconds, state.iteration, run.sampler.device, params.preset, rays, psnr)
-
-    def write() -> None:
-        with atomic_folder(model_folder) as temporary:
-            save_model(state.model, run.spec, temporary)
-            write_json(temporary / "training.json", asdict(report))
-
-    try:
-        patiently(write)
-    except OSError:
-        with suppress(OSError):  # the one before stays
-            save_checkpoint(state, run.mark, run.checkpoints)
-        raise
-    shutil.rmtree(run.checkpoints, ignore_errors=True)
-    return report
+    return run, Trained(state.model, run.spec, report)
 
 
 def _move_to_mesh(state: TrainingState, params: MlpParams, start: Start) -> None:

@@ -15,7 +15,7 @@ from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams, merged
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
-from tests.assets import SOURCE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import CENTRE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
 SIZE, LAYERS, FRAMES, R = 48, 3, 3, 64
@@ -58,6 +58,7 @@ def packaged(folder: Path, scene: Scene, section: dict[str, Any]) -> None:
     def caps(side: int) -> list[TexturedMesh]:
         return [cap_mesh(radius_of(i), side) for i in range(LAYERS)]
 
-    export = Export(caps(12), [WINDOW] * LAYERS, textures, caps)
+    levels = {level["mesh_resolution"] for level in section.get("levels", ())}
+    export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels})
     values = merged({"effects": {"share": 10.0}}, section)
-    package(folder, export, scene, SOURCE, CompressParams.model_validate(values))
+    package(folder, export, scene, CompressParams.model_validate(values))

@@ -1,4 +1,4 @@
-"""A player written from docs/asset-format.md alone: nothing of facefolds is imported. Slow and plain.
+"""A player written from docs/reference/asset-format.md alone: nothing of facefolds is imported. Slow and plain.
 
 Libraries: DracoPy for the meshes, PyAV for the video's planes, Pillow for the PNG. Everything else is the document's
 formulas: YCbCr to RGB with chroma sited left, rectangles, clamped bilinear look-ups, nearest hits, blending.

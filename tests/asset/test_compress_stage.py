@@ -17,12 +17,11 @@ from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
-from facefolds_core.export.stores import Grids, write_grids, write_surfaces
+from facefolds_core.export.stores import write_meshes
 from facefolds_core.files import write_text
 from facefolds_core.frame_store import write_frames
-from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.params import CompressParams, DecimateParams, MeshCodec
+from facefolds_core.params import CompressParams, MeshCodec
 from facefolds_core.paths import SubjectFolders
 from stages.compress import compress
 from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
@@ -36,9 +35,9 @@ def folders(tmp_path: Path) -> SubjectFolders:
     """Three layers and two frames, as `normalize`, `sample`, `decimate` and `texture` leave them."""
     subject = SubjectFolders(tmp_path / "caps")
     write_text(subject.config / "compress.json", CompressParams().model_dump_json())
-    write_scene(
-        Scene("caps", (), (), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene), subject.scene
-    )
+    cameras = (look_at_origin("cam0", 0, 5, 48),)  # held out: nothing that a camera decides
+    scene = Scene("caps", cameras, ("holdout",), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene)
+    write_scene(scene, subject.scene)
     subject.samples.mkdir()
     np.savez(subject.samples / "grids.npz", windows=np.array([WINDOW] * 3), centre=np.array(CENTRE))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(3)]
@@ -130,20 +129,8 @@ def test_levels_of_detail(folders: SubjectFolders) -> None:
         {"name": "medium", "mesh_resolution": 8, "texture_resolution": 32, "crf": 26},
     ]
     rig(folders, levels=levels)
-    write_text(folders.config / "decimate.json", DecimateParams(resolution=12).model_dump_json())
-    meshes = [cap_mesh(radius_of(layer), 25) for layer in range(3)]
-    write_surfaces(folders.surfaces / "surfaces.npz", [Surface(mesh.vertices, mesh.faces) for mesh in meshes])
-    n = 12
-    flat = np.zeros((3, n, n, 3), np.float32)
-    grids = Grids(
-        points=flat,
-        normals=flat,
-        valid=np.ones((3, n, n), bool),
-        opacity=np.full((3, n, n), 255, np.uint8),
-        windows=np.array([WINDOW] * 3),
-        centre=np.array(CENTRE),
-    )
-    write_grids(folders.samples / "grids.npz", grids)
+    for side in (5, 8):
+        write_meshes(folders.meshes / f"level_{side}.npz", [cap_mesh(radius_of(layer), side) for layer in range(3)])
     compress(folders)
     assert validate_asset(folders.asset) == []
     asset = read_asset(folders.asset)

@@ -1,4 +1,4 @@
-"""docs/asset-format.md: its example is right, it names every key, and a player written from it sees the asset."""
+"""docs/reference/asset-format.md: its example is right, it names every key, a player written from it sees the asset."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
 from tests.assets import make_asset
 
-TEXT = (Path(__file__).parents[2] / "docs" / "asset-format.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[2] / "docs" / "reference" / "asset-format.md").read_text(encoding="utf-8")
 
 
 def test_example_rectangles() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.between import METHODS, Score, Truth, decibels, fast_intervals, measure, score, table
+from bench.between import METHODS, Sums, Truth, decibels, fast_intervals, measure, score, table
 from facefolds_core.errors import UserError
 from facefolds_core.export.between import between_rows
 from facefolds_core.files import write_json
@@ -15,8 +15,9 @@ from facefolds_core.paths import SubjectFolders
 from tests.assets import write_store
 
 
-def entry(method: str, frame: int, moving: float, share: float) -> Score:
-    return Score(method, frame, subject=0.01 * 100, subject_weight=100, moving=moving, moving_weight=100 * share)
+def sums(*intervals: tuple[float, float]) -> Sums:
+    """Of intervals with so much error where it moves, and so large a share that does."""
+    return np.array([(0.01 * 100, 100, moving, 100 * share) for moving, share in intervals])
 
 
 def test_errors_count_where_the_subject_is_and_where_it_moves() -> None:
@@ -27,28 +28,24 @@ def test_errors_count_where_the_subject_is_and_where_it_moves() -> None:
     opacity = np.full((3, 2, 2), 255, np.uint8)
     opacity[:, 1, 0] = 0
     black = np.zeros((2, 2, 3), np.float32)
-    found = score("ours", 0, black, Truth(pictures, opacity), 1, 2)
     still, moving = (100 / 255) ** 2, (151 / 255) ** 2
-    assert (found.subject_weight, found.moving_weight) == (3, 2)
-    assert found.subject == pytest.approx(moving + 2 * still)
-    assert found.moving == pytest.approx(moving + still)
+    found = score(0, black, Truth(pictures, opacity), 1, 2)
+    assert found == pytest.approx([moving + 2 * still, 3, moving + still, 2])
 
 
 def test_decibels_are_over_all_pixels_together() -> None:
-    scores = [entry("a", 0, 1.0, 0.1), entry("a", 1, 0.2, 0.02)]
-    assert decibels(scores, "moving") == pytest.approx(-10 * np.log10(1.2 / 12))
-    assert decibels(scores, "subject") == pytest.approx(20)
+    found = sums((1.0, 0.1), (0.2, 0.02))
+    assert decibels(found, moving=True) == pytest.approx(-10 * np.log10(1.2 / 12))
+    assert decibels(found, moving=False) == pytest.approx(20)
 
 
 def test_the_faster_half_of_the_intervals() -> None:
-    shares = [0.1, 0.4, 0.2, 0.3, 0.05]
-    scores = [entry("repeat", k, 0.0, share) for k, share in enumerate(shares)]
-    assert fast_intervals(scores) == {1, 3}
+    found = sums(*((0.0, share) for share in (0.1, 0.4, 0.2, 0.3, 0.05)))
+    assert np.flatnonzero(fast_intervals(found)).tolist() == [1, 3]
 
 
 def test_the_table_has_a_row_a_method() -> None:
-    scores = [entry(method, k, 0.01 * k + 0.01, 0.1 * k + 0.1) for method in METHODS for k in range(2)]
-    rows = table(scores).splitlines()[2:]
+    rows = table(dict.fromkeys(METHODS, sums((0.01, 0.1), (0.02, 0.2)))).splitlines()[2:]
     assert [row.split("|")[1].strip() for row in rows] == list(METHODS)
     assert rows[0].split("|")[2:4] == [" 30.00 ", " 30.00 "]
 
@@ -72,4 +69,4 @@ def test_only_the_actor_has_a_truth(tmp_path: Path) -> None:
     folders = SubjectFolders(tmp_path)
     write_json(folders.config / "subject.json", {"source": "multiface", "path": "somewhere"})
     with pytest.raises(UserError, match="no truth between the frames"):
-        list(measure(folders, 2))
+        measure(folders, 2)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import typer
-import yaml
 from typer.testing import CliRunner
 
 from bench import hazards, speed_accuracy, sweeps
@@ -17,6 +17,7 @@ from bench.results import Cell, Measurement, Row, Store
 from bench.run import Project
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
+from facefolds_core.sweeps.table import Run
 from tests.scoring.fakes import FRAMES, flat_scene, half_mask
 
 
@@ -28,6 +29,11 @@ def invoke(main: Any, *arguments: str) -> Any:
 
 def diverge(*_: object, **__: object) -> None:
     raise UserError("training diverged", remedy="none")
+
+
+def diverge_in_training(_: Project, *stages: str) -> None:
+    if "train" in stages:
+        diverge()
 
 
 def test_the_clean_case_and_the_middle_strength_come_first() -> None:
@@ -108,7 +114,7 @@ def test_hazards_go_on_where_they_stopped(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_trainings_that_are_there_are_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Project, "repro", diverge)
+    monkeypatch.setattr(Project, "run", diverge_in_training)
     monkeypatch.setattr(speed_accuracy.charts, "speed", lambda *_: None)
     arguments = [
         "--presets",
@@ -130,56 +136,73 @@ def test_trainings_that_are_there_are_not_measured_again(tmp_path: Path, monkeyp
 
 
 def test_finer_textures_are_sampled_as_finely() -> None:
-    assert sweeps.changes("texture", 128, 512) == {"texture": {"resolution": 128}, "compress": {"levels": []}}
-    finer = {"sample": {"resolution": 1024}, "reconstruct": {"resolution": 512}}
-    assert sweeps.changes("texture", 1024, 512) == {
-        "texture": {"resolution": 1024},
-        "compress": {"levels": []},
-        **finer,
-    }
+    given = {"compress.levels": []}
+    assert sweeps.changes("texture", 128, "actor") == {"texture.resolution": 128, **given}
+    finer = {"sample.resolution": 1024, "reconstruct.resolution": 512}
+    assert sweeps.changes("texture", 1024, "actor") == {"texture.resolution": 1024, **given, **finer}
 
 
-def test_cells_of_a_sweep_are_scored_and_a_failed_one_does_not_lose_the_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def repro(project: Project, _: str) -> None:
-        params = yaml.safe_load((project.root / "params.yaml").read_text())
-        if params["subjects"]["actor"]["decimate"]["resolution"] == 16:
-            diverge()
-        cost = {**dict.fromkeys(sweeps.SIZES, 10), "device": "cpu", "train_seconds": 9.0}
-        write_json(project.folders.metrics, {"asset": {"psnr": 11.0, "psnr_subject": 24.0}, "cost": cost})
-        for stage in sweeps.SWEEPS["mesh"].timed:
-            write_json(project.folders.timing(stage), {"seconds": 2.0})
+def test_every_cell_is_an_experiment_of_its_own_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
 
-    monkeypatch.setattr(Project, "repro", repro)
-    monkeypatch.setattr(sweeps, "drawing_speed", lambda _: {})
-    path = tmp_path / "rows.json"
-    done = invoke(sweeps.main, "mesh", "--values", "16,32", "--work", str(tmp_path), "--results", str(path))
-    assert done.exit_code == 1 and "training diverged" in done.output
-    failed, row = Store(path, "rows", Row).read()
-    assert (failed.failure, row.psnr, row.bytes, row.export_seconds, row.train_seconds) == (
-        "training diverged", 24.0, 20, 6.0, 0.0,
-    )  # fmt: skip
-    assert row.params == {"decimate.resolution": 32}
-    assert sweeps.as_run(row).figures["bytes"] == 30
+    def ran(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
+        asked.append(command[3:])
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr(sweeps.subprocess, "run", ran)
+    assert invoke_app("queue", "rate").exit_code == 0
+    assert len({command[5] for command in asked}) == len(asked) == 25
+    assert asked[1][:6] == ["exp", "run", "--quiet", "--queue", "--name", "paper-actor-22"]
+    assert asked[1][-1] == "evaluate@actor"
+    for wanted in ("capture.frames=60", "compress.video.target_psnr=null", 'sample.window="full"'):
+        assert f"++subjects.actor.{wanted}" in asked[1]
+    asked.clear()
+    assert invoke_app("queue", "mesh", "--values", "16,32").exit_code == 0
+    assert [command[5] for command in asked] == ["mesh-actor-16", "mesh-actor-32"]
 
 
 @pytest.mark.parametrize("arguments", [("wind",), ("mesh", "--values", "ten"), ("mesh", "--values", "0")])
-def test_a_sweep_that_is_none(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    assert invoke(sweeps.main, *arguments, "--work", str(tmp_path)).exit_code == 1
+def test_a_sweep_that_is_none(arguments: tuple[str, ...]) -> None:
+    assert invoke_app("queue", *arguments).exit_code == 1
 
 
-def test_every_rate_is_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
+def test_dvc_says_why_it_does_not_queue(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = subprocess.CompletedProcess([], 1, "", "ERROR: already there")
+    monkeypatch.setattr(sweeps.subprocess, "run", lambda *_, **__: refused)
+    done = invoke_app("queue", "mesh")
+    assert done.exit_code == 1 and "already there" in done.output
 
-    def repro(project: Project, _: str) -> None:
-        asked.append((project.root / "params.yaml").read_text())
-        cost = {"mesh_bytes": 3, "texture_bytes": len(asked)}
-        write_json(project.folders.metrics, {"asset": {"psnr": 11.0, "psnr_subject": None}, "cost": cost})
 
-    monkeypatch.setattr(Project, "repro", repro)
-    points = sweeps.measure_rates("actor", tmp_path, 7)
-    assert len(points) == len({(p["series"], p["crf"]) for p in points}) == 25
-    assert points[1] == {"series": "paper", "crf": 22, "mesh_bytes": 3, "video_bytes": 2, "psnr": 11.0, "bytes": 5}
-    assert all("frames: 7" in text and "target_psnr: null" in text for text in asked)
-    assert len(set(asked)) == 25
+def test_what_became_of_experiments_is_kept_failures_too(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    figures = {"psnr": 11.0, "psnr_subject": 24.0, "mesh_bytes": 10.0, "texture_bytes": 10.0, "bytes": 30.0}
+    runs = [
+        Run("mesh-actor-32", "actor", "abc", figures=figures),
+        Run("mesh-actor-32", "mugsy", "abc", figures=figures),  # shown beside the experiment's own subject
+        Run("mesh-actor-16", "actor", "abc", error="training diverged"),
+        Run("brisk-otter", "actor", "abc", figures=figures),
+    ]
+    monkeypatch.setattr(sweeps, "shown_experiments", lambda: None)
+    monkeypatch.setattr(sweeps, "runs_of", lambda *_, distinct: (runs, 2))
+    monkeypatch.setattr(sweeps, "DVCFileSystem", Files)
+    monkeypatch.setattr(sweeps, "drawing_speed", lambda _: (8.5, "llvmpipe"))
+    path = tmp_path / "rows.json"
+    done = invoke_app("collect", "--results", str(path))
+    assert done.exit_code == 0 and "2 not ended" in done.output
+    row, failed = Store(path, "rows", Row).read()
+    assert (row.value, row.psnr, row.bytes, row.renderer) == (32, 24.0, 20, "llvmpipe")
+    assert row.figures == {**figures, "pictures_a_second": 8.5} and row.params == {"decimate.resolution": 32}
+    assert (failed.value, failed.failure) == (16, "training diverged")
+
+
+class Files:
+    """In place of DVC's file system of a revision."""
+
+    def __init__(self, _: str, rev: str) -> None:
+        assert rev == "abc"
+
+    def get(self, source: str, target: str, recursive: bool) -> None:
+        assert source == "data/actor/asset" and recursive
+
+
+def invoke_app(*arguments: str) -> Any:
+    return CliRunner().invoke(sweeps.app, arguments)

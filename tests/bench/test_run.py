@@ -9,22 +9,13 @@ import torch
 import yaml
 
 from bench.results import ROOT
-from bench.run import Project, merged, own_params, score_model, training_of
+from bench.run import Project, own_params, score_model, training_of
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.files import write_json
 from facefolds_core.model.storage import save_model
 from facefolds_core.scoring.perceptual import Perceptual
 from tests.scoring.fakes import FRAMES, SPEC, flat_scene, half_mask, tiny_model
-
-
-def test_mappings_are_merged_and_all_else_is_replaced() -> None:
-    base = {"a": {"b": 1, "c": [1, 2]}, "d": 3}
-    assert merged(base, {"a": {"c": [4], "e": None}, "d": {"f": 5}}) == {
-        "a": {"b": 1, "c": [4], "e": None},
-        "d": {"f": 5},
-    }
-    assert base == {"a": {"b": 1, "c": [1, 2]}, "d": 3}
 
 
 def test_a_subject_stands_alone_with_its_changes(tmp_path: Path) -> None:

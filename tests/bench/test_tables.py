@@ -40,11 +40,12 @@ def test_interpolation_ends_where_points_do() -> None:
 
 
 def test_bytes_at_a_quality_and_the_way_back() -> None:
-    def point(series: str, size: int, psnr: float) -> dict[str, object]:
-        return {"series": series, "bytes": size, "psnr": psnr}
+    def point(series: str, size: int, psnr: float) -> Row:
+        figures = {"mesh_bytes": size / 2, "texture_bytes": size / 2, "psnr": psnr}
+        return Row(sweep=series, subject="a", value=size, params={}, commit="", machine="", figures=figures)
 
     paper = [point("paper", 10_000, 30.0), point("paper", 4_000, 28.0), point("paper", 1_000, 25.0)]
-    smaller, better = rate_tables([*paper, point("ours", 4_000, 30.5), point("ours", 1_000, 28.0)]).split("\n\n")
+    smaller, better = rate_tables([*paper, point("h264", 4_000, 30.5), point("h264", 1_000, 28.0)]).split("\n\n")
     assert smaller.splitlines()[3:] == ["| 28.00 dB | 4 kB | 1 kB |", "| 25.00 dB | 1 kB | at most 1 kB |"]
     assert better.splitlines()[2:4] == ["| 10 kB | 30.00 dB | at least 30.50 dB |", "| 4 kB | 28.00 dB | 30.50 dB |"]
 
@@ -52,8 +53,8 @@ def test_bytes_at_a_quality_and_the_way_back() -> None:
 def test_a_sweep_stands_beside_the_paper() -> None:
     given = {"sweep": "mesh", "subject": "actor", "params": {}, "commit": "", "machine": ""}
     cost = {"triangles": 1234, "mesh_bytes": 2_500_000, "texture_bytes": 3_000, "gpu_bytes": 9_000_000}
-    scores = {"psnr": 11.0, "psnr_subject": 24.0}
-    rows = [Row(**given, value=64, scores=scores, cost=cost, export_seconds=7.0), Row(**given, value=32, failure="oh")]
+    figures = {**cost, "psnr": 11.0, "psnr_subject": 24.0, "export_seconds": 7.0}
+    rows = [Row(**given, value=64, figures=figures), Row(**given, value=32, failure="oh")]
     lines = {line.split("|")[1].strip(): line for line in sweep_table(rows, "mesh", "actor").splitlines()}
     assert lines["64"].startswith(
         "| 64 | 24.00 |  |  | 11.00 |  |  | 1 234 | 2.50 MB | 3 KB | 9.00 MB |  | 7 | 29.49 |"

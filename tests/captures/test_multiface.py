@@ -190,3 +190,17 @@ def test_the_scaled_calibration_is_the_real_one_times_a_plain_factor(captures_fo
     full = {camera.name: camera.K for camera in read_krt(captures_folder / "mugsy_real" / "KRT")}
     for camera in read_krt(captures_folder / "mugsy" / "KRT"):
         assert camera.K[:2] == pytest.approx(full[camera.name][:2] * 384 / 2048, rel=1e-6)
+
+
+def test_what_other_systems_leave_in_folders_is_no_picture(tmp_path: Path) -> None:
+    fixture = write_multiface(tmp_path)
+    sound = read_multiface(tmp_path, subject(tmp_path))
+    images = fixture.image("x", "x").parents[2]
+    for folder in [images, *(path for path in images.rglob("*") if path.is_dir())]:
+        (folder / "._000003.png").write_bytes(b"\0\5\26\7")
+        (folder / ".Trash").mkdir()
+    for path in fixture.image("400001", "x").parent.glob("0*.png"):
+        path.rename(path.with_suffix(".PNG"))
+    found = read_multiface(tmp_path, subject(tmp_path))
+    assert found.frame_ids == sound.frame_ids
+    assert {key: path.stem for key, path in found.images.items()} == {k: p.stem for k, p in sound.images.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import socket
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from facefolds_core.captures.capture import frame_rate
 from facefolds_core.captures.sound import cut_sound
@@ -278,10 +280,16 @@ def test_names_that_cannot_be_are_missing_images(tmp_path: Path, label: str) -> 
     assert any("no image" in one["words"] for one in left_out)
 
 
-@pytest.mark.parametrize("fps", [1e-300, 1e300, 1e-3])
+@pytest.mark.parametrize("fps", [0.05, 2000])
 def test_a_rate_that_no_capture_has(tmp_path: Path, fps: float) -> None:
     write_multiface(tmp_path / "c")
     assert refused(tmp_path / "c", "multiface", fps=fps).place == "fps"
+
+
+@pytest.mark.parametrize("fps", [1e-300, 1e300, 1e-3, math.nan, math.inf])
+def test_a_rate_that_no_subject_can_have(fps: float) -> None:
+    with pytest.raises(ValidationError, match="fps"):
+        Subject(source="multiface", path="x", fps=fps)
 
 
 def test_usual_rates_are_fine() -> None:
@@ -290,9 +298,9 @@ def test_usual_rates_are_fine() -> None:
 
 
 @pytest.mark.parametrize("size", [(0, 0), (-40, 64), (10**12, 3)])
-def test_a_size_that_no_image_has(tmp_path: Path, size: tuple[int, int]) -> None:
-    write_multiface(tmp_path / "c")
-    assert refused(tmp_path / "c", "multiface", krt_size=size).place == "krt_size"
+def test_a_size_that_no_image_has(size: tuple[int, int]) -> None:
+    with pytest.raises(ValidationError, match="krt_size"):
+        Subject(source="multiface", path="x", krt_size=size)
 
 
 @pytest.mark.parametrize("source", ["multiface", "transforms"])

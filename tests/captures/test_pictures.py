@@ -166,6 +166,25 @@ def test_a_jpeg_with_a_lost_block_is_refused_more_often_than_not(options: dict[s
     assert refused >= 9  # of 18; Pillow alone refuses none
 
 
+@pytest.mark.parametrize("options", [{}, {"progressive": True}, {"restart_marker_rows": 1}, {"optimize": True}])
+def test_blocks_that_were_never_written_are_found(options: dict[str, object]) -> None:
+    data = encoded("JPEG", np.random.default_rng(0).integers(0, 256, (240, 240, 3), dtype=np.uint8), **options)
+    for block in range(1, len(data) // 4096):
+        for count in (1, 2):
+            hole = data[: block * 4096] + bytes(4096 * count) + data[(block + count) * 4096 :]
+            with pytest.raises(DamagedPictureError):
+                open_picture(hole)
+
+
+def test_an_even_picture_is_no_block_that_was_never_written() -> None:
+    """Its codes are zeros for long, from anywhere to anywhere."""
+    image = np.zeros((4000, 4000, 3), np.uint8)
+    image[1000:1100, 1000:1100] = np.random.default_rng(0).integers(0, 256, (100, 100, 3))
+    data = encoded("JPEG", image, optimize=True)
+    assert bytes(4 * 4096) in data
+    assert open_picture(data).size == (4000, 4000)
+
+
 @pytest.mark.parametrize("call", [picture_size, open_picture])
 def test_what_is_no_file_is_not_opened(tmp_path: Path, call: Callable[[Path], object]) -> None:
     os.mkfifo(tmp_path / "x.png")

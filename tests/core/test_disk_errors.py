@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,7 @@ def test_signals_end_with_one_line_and_without_leftovers(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=partial(signal.signal, number, signal.SIG_DFL),  # a shell's background jobs ignore some of them
     )
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     process.send_signal(number)

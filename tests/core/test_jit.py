@@ -54,6 +54,7 @@ def scaled(x):
 BEFORE = {"decorator": "compiled", "factor": 2.0, "offset": 100.0, "entry": 0.0, "body": "x ** POWER"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decorator", ["compiled", "kernel", "inlined"])
 def test_an_edit_of_an_imported_module_is_compiled(tmp_path: Path, decorator: str) -> None:
     """A function, constants taken by name and through their module, an array, and what the imported module imports."""

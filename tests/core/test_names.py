@@ -21,7 +21,29 @@ from stages.capture import capture
 from stages.common import run_stage
 from tests.hostile.damage import fingerprint
 
-BAD = ["", ".", "..", "../precious", "a/b", "/a", "a b", "a;b", "$(a)", "`a`", "a'b", "-a", "a\n", "\u00e9", "x" * 65]
+# Those of tests/pipeline/test_names.py, and more.
+SHELL = ["a;touch X;echo", "$(touch X)", "`touch X`", "'; touch X; '", '"; touch X; "', "a\ntouch X\n", "-x"]
+BAD = [
+    *SHELL,
+    "../../outside",
+    "/etc",
+    "a/../../precious",
+    "",
+    ".",
+    "..",
+    "../precious",
+    "a/b",
+    "/a",
+    "a b",
+    "a;b",
+    "$(a)",
+    "`a`",
+    "a'b",
+    "-a",
+    "a\n",
+    "\u00e9",
+    "x" * 65,
+]
 
 
 @pytest.mark.parametrize("name", ["a", "_", "0", "Anna-2_b", "x" * 64])

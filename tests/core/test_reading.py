@@ -20,6 +20,7 @@ from facefolds_core.captures.scene import read_scene, write_scene
 from facefolds_core.config import read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import read_meshes
+from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.model.storage import load_model, read_tensors
 from facefolds_core.reading import remake
@@ -225,3 +226,9 @@ def test_a_surface_that_does_not_fit_its_scene(tmp_path: Path, change: dict[str,
     np.savez(tmp_path / "surface.npz", **change)
     with pytest.raises(UserError, match="tracked mesh of the scene is damaged"):
         scene(tmp_path).load_surface()
+
+
+def test_json_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    """Windows' editors write one."""
+    (tmp_path / "transforms.json").write_bytes(b"\xef\xbb\xbf" + b'{"a": 1}')
+    assert read_json(tmp_path / "transforms.json") == {"a": 1}

@@ -1,4 +1,4 @@
-"""How near an engine comes to the reference on an asset: the figures and pictures of docs/engines.md.
+"""How near an engine comes to the reference on an asset: the figures and pictures of docs/guide/engines.md.
 
 python -m tests.engines.agreement blender data/actor/asset --picture docs/images/blender.jpg
 """

@@ -12,6 +12,8 @@ from tests.assets import make_asset
 from tests.engines.blender import REMEDY, find_blender, pictures
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
 
+pytestmark = pytest.mark.slow
+
 SIZE = 96
 FRAME = 1
 AGREE = 40.0

@@ -17,6 +17,8 @@ from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
 
+pytestmark = pytest.mark.slow
+
 SIZE = 128
 AGREE = 40.0
 """dB. Seen: 45 and more; the canvas rounds to 8 bits after each layer, the pictures are lossy."""

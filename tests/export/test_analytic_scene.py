@@ -28,6 +28,8 @@ from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import look_at_origin
 
+pytestmark = pytest.mark.slow
+
 RIG = [look_at_origin("right", -35, 10, 96), look_at_origin("front", 0, 0, 96), look_at_origin("left", 30, -15, 96)]
 
 

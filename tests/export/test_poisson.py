@@ -71,6 +71,7 @@ def test_faces_look_outward() -> None:
     assert (volume > 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_two_processes_give_what_one_gives() -> None:
     grids = sample_grids(Ellipsoids(), 48, WINDOW, progress=False)
     apart = [reconstruct(gather_samples(grids, i, None), PARAMS, i) for i in range(2)]

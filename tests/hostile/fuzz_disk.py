@@ -38,7 +38,7 @@ from tests.hostile.damage import Counts, Outcome, fingerprint, outcome
 Stage = Callable[[SubjectFolders], str]
 STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
     # name -> (what it does, its outputs)
-    "configure": (configure, ("config",)),
+    "configure": (lambda folders: configure(folders.root.parent), ("../.config", "../.code")),
     "capture": (capture, ("capture",)),
     "normalize": (normalize, ("scene",)),
     "train": (train_stage, ("model",)),
@@ -133,13 +133,20 @@ def run(count: int, seed: int, folder: Path) -> Counts:
         for name, (work, _) in STAGES.items():
             _quietly(work, folders)
             write_json(folders.timing(name), {"stage": name, "seconds": 1.0})
-        good = digests(folders.root)
+        good = _digests(folders)
         for number in range(count):
             random = np.random.default_rng((seed, number))
             name = list(STAGES)[number % len(STAGES)]
             full = disk and number // len(STAGES) % 2 == 1
             _case(folders, name, full, random, good, f"disk, seed {seed}, number {number}", counts)
     return counts
+
+
+def _digests(folders: SubjectFolders) -> dict[str, str]:
+    """What all stages made: the subject's files, and those that `configure` writes beside them."""
+    data = folders.root.parent
+    beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(data / n).items()}
+    return {**digests(folders.root), **beside}
 
 
 def _quietly(work: Stage, folders: SubjectFolders) -> None:
@@ -173,20 +180,20 @@ def _case(
     sizes = [path.stat().st_size for path in files]
     size = int(random.integers(0, 1 + (2 * sum(sizes) if full else max(1, int(random.choice(sizes))))))
     what += f", {name}, {f'{size} bytes free' if full else f'no file above {size} bytes'}"
-    before = fingerprint(folders.root)
+    before = fingerprint(folders.root.parent)
     with filled_disk(folders.root.parents[1], size) if full else limited_files(size):
         result = outcome(lambda: _quietly(work, folders))
     counts.add(what, result)
     if result.kind == "accepted":
-        found = digests(folders.root)
+        found = _digests(folders)
         wrong = sorted(n for n in {*found, *good} if found.get(n) != good.get(n))
         counts.kept_wrong += [f"{what}: other results: {', '.join(wrong)}"] if wrong else []
     else:
-        after = fingerprint(folders.root)
+        after = fingerprint(folders.root.parent)
         changed = [n for n in {*before, *after} if before.get(n) != after.get(n)]
-        harmed = sorted(n for n in changed if not n.startswith(("training", "checkpoints")))
+        harmed = sorted(n for n in changed if not n.startswith(("tight/training", "tight/checkpoints")))
         counts.harmed += [f"{what}: {result.text}: changed {', '.join(harmed)}"] if harmed else []
-    left = [str(path) for path in folders.root.rglob(f"{PREFIX}*")]
+    left = [str(path) for path in folders.root.parent.rglob(f"{PREFIX}*")]
     counts.harmed += [f"{what}: left {', '.join(left)}"] if left else []
     if result.kind != "accepted":  # there is room again: the same command makes the same
         counts.kept_wrong += _again(work, folders, good, what)
@@ -194,7 +201,7 @@ def _case(
 
 def _again(work: Stage, folders: SubjectFolders, good: dict[str, str], what: str) -> list[str]:
     result = outcome(lambda: _quietly(work, folders))
-    found = digests(folders.root)
+    found = _digests(folders)
     wrong = sorted(n for n in {*found, *good} if found.get(n) != good.get(n))
     if result != Outcome("accepted") or wrong:
         return [f"{what}: again, with room: {result.text} {', '.join(wrong)}"]

@@ -56,6 +56,11 @@ ENDS_WITHIN = 20.0
 VICTIMS = ("dvc", "stage", "group")
 
 
+def target(stage: str) -> str:
+    """What DVC calls the stage."""
+    return stage if stage == "configure" else f"{stage}@{NAME}"
+
+
 @dataclass
 class Project:
     """A tiny project that was run once, undisturbed.
@@ -84,39 +89,42 @@ class Project:
 
     @property
     def all(self) -> tuple[str, ...]:
-        return ("dvc", "repro", f"{self.stages[-1]}@{NAME}")
+        return ("dvc", "repro", target(self.stages[-1]))
 
     def one(self, stage: str) -> tuple[str, ...]:
-        return ("dvc", "repro", "--force", "--single-item", f"{stage}@{NAME}")
+        return ("dvc", "repro", "--force", "--single-item", target(stage))
+
+    def made(self) -> dict[str, str]:
+        """Digests of what all stages made."""
+        data = self.data.parent
+        beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(data / n).items()}
+        return {**digests(self.data), **beside}
 
     def untouched(self) -> dict[str, str]:
         """What is neither a stage's output nor DVC's own."""
         found = fingerprint(self.tiny.root)
-        own = (f"data/{NAME}", ".dvc", "dvc.lock")
+        own = (f"data/{NAME}", "data/.config", "data/.code", "data/.timings", "data/.locks", ".dvc", "dvc.lock")
         kept = f"data/{NAME}/.mygame-settings"
         return {k: v for k, v in found.items() if k.startswith(kept) or not k.startswith(own)}
 
     def reset(self) -> None:
         """What it was after the undisturbed run."""
         shutil.copy(self.tiny.root / "base.lock", self.lock)
-        status, output = self.tiny.run("dvc", "checkout", "--force", *(f"{stage}@{NAME}" for stage in self.stages))
+        status, output = self.tiny.run("dvc", "checkout", "--force", *map(target, self.stages))
         assert status == 0, output
 
 
 def prepare(folder: Path, stages: tuple[str, ...]) -> Project:
     """Run the pipeline undisturbed; note what it makes and how long it takes."""
     tiny = TinyProject(ROOT, folder, PARAMS)
-    for name in ("stages", "facefolds_core"):  # links: what numba compiled once is found again
-        shutil.rmtree(folder / name)
-        (folder / name).symlink_to(ROOT / name)
     for name in (f"data/{NAME}/.mygame-settings/a", "data/other/b"):
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text("a user's file")
     project = Project(tiny, stages)
     for stage in stages:
-        status, output = tiny.run("dvc", "repro", "--single-item", f"{stage}@{NAME}")
+        status, output = tiny.run("dvc", "repro", "--single-item", target(stage))
         assert status == 0, output
-    project.results = digests(project.data)
+    project.results = project.made()
     shutil.copy(project.lock, folder / "base.lock")
     for stage in stages[-1:] if len(stages) < len(STAGES) else stages:
         project.seconds[stage] = _timed(tiny, *project.one(stage))
@@ -181,7 +189,7 @@ def _recover(project: Project, command: tuple[str, ...], what: str, counts: Coun
             counts.add(what, Outcome("crashed", f"{' '.join(step)}: {output[-600:]}"))
             return
     counts.add(what, Outcome("accepted"))
-    found = digests(project.data)
+    found = project.made()
     wrong = sorted(name for name in {*found, *project.results} if found.get(name) != project.results.get(name))
     if wrong:
         counts.kept_wrong.append(f"{what}: other results than undisturbed: {', '.join(wrong)}")

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.hostile import fuzz_assets
+
+pytestmark = pytest.mark.slow
 
 
 def test_damaged_assets_are_refused_in_words(tmp_path: Path) -> None:

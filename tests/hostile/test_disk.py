@@ -8,6 +8,8 @@ import pytest
 
 from tests.hostile.fuzz_disk import STAGES, NoSmallDiskError, run, small_disk
 
+pytestmark = pytest.mark.slow
+
 
 def test_no_stage_loses_anything_for_want_of_room(tmp_path: Path) -> None:
     counts = run(2 * len(STAGES), 0, tmp_path)

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.hostile.fuzz_files import KINDS, run
+
+pytestmark = pytest.mark.slow
 
 
 def test_damaged_files_are_refused_or_harmless(tmp_path: Path) -> None:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.hostile.fuzz_kills import run
+
+pytestmark = pytest.mark.slow
 
 
 def test_killed_runs_are_recovered(tmp_path: Path) -> None:

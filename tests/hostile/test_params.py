@@ -8,6 +8,8 @@ import pytest
 
 from tests.hostile import fuzz_params
 
+pytestmark = pytest.mark.slow
+
 
 def test_nothing_crashes_or_leads_elsewhere(tmp_path: Path) -> None:
     counts = fuzz_params.run(80, 1, tmp_path)

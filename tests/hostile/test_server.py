@@ -8,6 +8,8 @@ import pytest
 
 from tests.hostile import fuzz_server
 
+pytestmark = pytest.mark.slow
+
 
 def test_broken_requests_harm_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     counts = fuzz_server.run(100, 1, tmp_path)

@@ -91,7 +91,7 @@ def test_a_killed_run_keeps_nobody_out(folder: Path, project_root: Path) -> None
     process = start(folder, project_root, sys.executable, "stage.py", "--subject", "x")
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 0, output
-    assert sorted(p.name for p in (folder / "data" / "x").iterdir()) == ["locks", "model", "timings"]
+    assert sorted(p.name for p in (folder / "data" / "x").iterdir()) == ["locks", "model"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])

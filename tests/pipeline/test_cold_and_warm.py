@@ -29,7 +29,8 @@ SCRIPTS = {
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius)
-        params = ExplicitParams(device="cpu", layers=4, iterations=183)
+        volume = {"levels": [{"resolution": 16, "iterations": 20}, {"resolution": 32, "iterations": 20}]}
+        params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183, "volume": volume})
         train_explicit(scene, params, folder / "model", folder / "log")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,
@@ -82,7 +83,9 @@ print(digest.hexdigest())
 """
 
 
-@pytest.mark.parametrize("stage", SCRIPTS)
+@pytest.mark.parametrize(
+    "stage", [*("bake", "decimate"), *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "train"))]
+)
 def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path, project_root: Path) -> None:
     code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))
     found = []

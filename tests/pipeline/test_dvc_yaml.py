@@ -54,8 +54,11 @@ def test_a_stage_depends_on_its_code_and_on_what_it_is_told(stage: str, pipeline
 
 
 @pytest.mark.parametrize("stage", STAGES[1:])
-def test_dvcignore_can_see_where_each_stage_writes(stage: str, pipeline: dict[str, dict[str, Any]]) -> None:
-    assert f"data/${{key}}/timings/{stage}.json" in pipeline[stage]["outs"]
+def test_no_stage_can_write_elsewhere(stage: str, pipeline: dict[str, dict[str, Any]], project_root: Path) -> None:
+    """Both are the same file where a key leads out of data/ (.dvcignore)."""
+    assert f"data/.timings/${{key}}/{stage}.json" in pipeline[stage]["outs"]
+    assert f"data/.config/${{key}}/{stage}.json" in pipeline[stage]["deps"]
+    assert f"{stage}.json" in (project_root / ".dvcignore").read_text().splitlines()
 
 
 def test_configure_sees_all_code_and_parameters(pipeline: dict[str, dict[str, Any]]) -> None:

@@ -51,6 +51,7 @@ def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, command: 
     assert kept(project) == before
 
 
+@pytest.mark.nightly  # tests/core/test_names.py refuses the same names, without DVC
 @pytest.mark.parametrize("name", [*SHELL[2:], *PATHS[2:]])
 def test_no_other_name_does(project: TinyProject, name: str) -> None:
     with_subject(project, name)
@@ -61,7 +62,7 @@ def test_no_other_name_does(project: TinyProject, name: str) -> None:
     assert kept(project) == before
 
 
-@pytest.mark.parametrize("name", ["../precious", "a/b", ".."])
+@pytest.mark.parametrize("name", ["../precious", "a/b", "..", "../../outside", "a/../../../outside"])
 def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str) -> None:
     """DVC deletes the outputs of a stage before it runs it: .dvcignore keeps them from being outputs."""
     with_subject(project, name)
@@ -71,6 +72,19 @@ def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str
     assert kept(project) == before
 
 
+@pytest.mark.parametrize("name", ["../../../farther", "a/../../../../../x/../farther"])
+def test_nor_far_outside(project: TinyProject, name: str) -> None:
+    """Past the project's folder .dvcignore says nothing: there an output is a dependency, too, which DVC refuses."""
+    path = project.root.parents[1] / "farther" / "capture" / "kept.txt"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("precious")
+    with_subject(project, name)
+    status, output = project.repro("--ignore-errors")
+    assert status != 0
+    assert "as both a dependency and an output" in output
+    assert path.read_text() == "precious"
+
+
 @pytest.mark.parametrize(
     "change", ["+subjects={../../outside:{source:actor,path:x}}", "+subjects={a$\\(touch\\ X\\):{source:actor,path:x}}"]
 )
@@ -78,7 +92,7 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     for folder in ("outside/capture", "project"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "outside" / "capture" / "kept.txt").write_text("precious")
-    tiny = TinyProject(project_root, tmp_path / "project")
+    tiny = TinyProject(project_root, tmp_path / "project", own_code=True)
     (tiny.root / ".dvc" / "config").write_text("[core]\n    analytics = false\n")
     (tiny.root / ".gitignore").write_text("/data/*\n__pycache__\n")
     commit = ("git", "-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "--quiet", "--message", "start")
@@ -87,7 +101,7 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     before = kept(tiny)
     status, output = tiny.run("dvc", "exp", "run", "-S", change)
     assert status != 0
-    assert "not a name for a subject" in output
+    assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
     after = {name: digest for name, digest in kept(tiny).items() if ".git/" not in name}
     assert after == {name: digest for name, digest in before.items() if ".git/" not in name}
 

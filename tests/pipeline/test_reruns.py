@@ -19,7 +19,7 @@ subjects:
 @pytest.fixture(scope="module")
 def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
     """Run once."""
-    tiny = TinyProject(project_root, tmp_path_factory.mktemp("reruns"), PARAMS)
+    tiny = TinyProject(project_root, tmp_path_factory.mktemp("reruns"), PARAMS, own_code=True)
     (tiny.root / "mine").mkdir()
     (tiny.root / "mine" / "KRT").write_text("`capture` only notes where it is")
     assert ran(tiny) == ["capture@one", "capture@two", "configure"]

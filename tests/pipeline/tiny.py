@@ -1,11 +1,14 @@
-"""A copy of the project in a temporary folder, with a tiny actor, to run the real pipeline on."""
+"""The project in a temporary folder, with a tiny actor, to run the real pipeline on."""
 
 from __future__ import annotations
 
+import io
 import os
+import runpy
 import shutil
 import subprocess
 import sys
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 PARAMS = """\
@@ -20,17 +23,16 @@ subjects:
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     normalize: {stabilize: true}
-    train: {iterations: 10, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
-  killed:
-    source: actor
-    path: facefolds_core/captures/actor
-    holdout: {every: 4}
-    train: {iterations: 400, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+    train: {iterations: 300, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
   fast:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {preset: fast, layers: 3, iterations: 130}
+    train:
+      preset: fast
+      layers: 3
+      iterations: 130
+      volume: {levels: [{resolution: 24, iterations: 60}, {resolution: 48, iterations: 60}]}
 capture: {cameras: 8, frames: 2, height: 48, width: 32}
 train: {preset: quick}
 sample: {resolution: 64}
@@ -47,15 +49,21 @@ evaluate: {}
 class TinyProject:
     """The project's code beside parameters of its own.
 
+    The code is a link: numba keeps compiled kernels beside their source, and a copy would compile them all anew.
+
     Attributes:
         root: its folder.
     """
 
-    def __init__(self, source: Path, root: Path, params: str = PARAMS) -> None:
+    def __init__(self, source: Path, root: Path, params: str = PARAMS, own_code: bool = False) -> None:
+        """Make the project in `root`; with `own_code` the code is a copy, for tests that change or commit it."""
         self.root = root
-        skip = shutil.ignore_patterns("__pycache__", "*.pyc")
+        root.mkdir(parents=True, exist_ok=True)
         for name in ("stages", "facefolds_core"):
-            shutil.copytree(source / name, root / name, ignore=skip)
+            if own_code:
+                shutil.copytree(source / name, root / name, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
+            else:
+                (root / name).symlink_to(source / name)
         for name in ("dvc.yaml", ".dvcignore"):
             shutil.copy(source / name, root)
         (root / ".dvc").mkdir()
@@ -97,3 +105,17 @@ class TinyProject:
 
     def stage(self, name: str, *arguments: str) -> tuple[int, str]:
         return self.run("python", "-m", f"stages.{name}", "--subject", "actor", *arguments)
+
+    def stage_here(self, name: str) -> tuple[int, str]:
+        """The same in this process, which has imported what stages import (seconds)."""
+        said = io.StringIO()
+        before = sys.argv
+        with chdir(self.root), redirect_stdout(said), redirect_stderr(said):
+            sys.argv = [name, "--subject", "actor"]
+            try:
+                runpy.run_path(str(self.root / "stages" / f"{name}.py"), run_name="__main__")
+            except SystemExit as end:
+                return int(end.code or 0), said.getvalue()
+            finally:
+                sys.argv = before
+        return 0, said.getvalue()

@@ -68,6 +68,8 @@ def test_rows_that_agree_are_one() -> None:
     again = experiment("again", "success", data(64, 256, {"actor": 25.0}))
     runs, _ = runs_of([*SHOWN, {"rev": "1", "name": "x", "data": None, "experiments": [again]}])
     assert [run.experiment for run in runs if run.subject == "actor"] == ["workspace", "coarse", "fine", "broken"]
+    runs, _ = runs_of([*SHOWN, {"rev": "1", "name": "x", "data": None, "experiments": [again]}], distinct=False)
+    assert {run.experiment for run in runs if run.subject == "actor"} >= {"again", "workspace"}
 
 
 @pytest.mark.parametrize("shown", [{"a": 1}, [1], [{"name": "main"}], None])

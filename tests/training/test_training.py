@@ -15,7 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import MlpParams, train_params
-from facefolds_core.training import loop, patience
+from facefolds_core.training import loop, patience, trained
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.rays import RaySampler
@@ -113,6 +113,7 @@ def test_learning_rates_decay_exponentially() -> None:
     assert rates == pytest.approx({"manifold": 7e-4 * 0.05**2, "texture": 1e-3 * 0.2**2})
 
 
+@pytest.mark.slow
 def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
     # One textured opaque sphere of radius 0.33; the single layer starts 0.02 too far out and must move in.
     scene = make_scene(tmp_path, OPAQUE, size=48, frames=1)
@@ -314,7 +315,7 @@ def test_a_model_that_could_not_be_written_is_not_trained_again(
 
     with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
         patched.setattr(patience, "SECONDS", 0.0)
-        patched.setattr(loop, "save_model", full)
+        patched.setattr(trained, "save_model", full)
         run(scene, params(), tmp_path)
     assert caught.value.filename == str(tmp_path / "model")
     monkeypatch.setattr(loop, "train_step", None)  # nothing is left to be done

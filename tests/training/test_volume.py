@@ -171,13 +171,17 @@ def test_environment_learns_what_it_is_shown() -> None:
     assert np.abs(seen - wanted).mean() < 0.06
 
 
-def test_a_sphere_is_found_from_images_alone(tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("resolution", [48, pytest.param(96, marks=pytest.mark.nightly)])
+def test_a_sphere_is_found_from_images_alone(tmp_path: Path, resolution: int) -> None:
     scene = make_scene(tmp_path, size=64)
-    volume = outline.largest_body(fit.fit_volume(scene, PARAMS, tqdm(disable=True)), PARAMS.volume.body_depth)
+    levels = [{"resolution": r, "iterations": 120 * resolution // 96} for r in (resolution // 2, resolution)]
+    params = ExplicitParams.model_validate({"volume": {"levels": levels}})
+    volume = outline.largest_body(fit.fit_volume(scene, params, tqdm(disable=True)), PARAMS.volume.body_depth)
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
-    # Voxels are 0.008 wide here.
-    assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=0.008)
+    voxel = 0.008 * 96 / resolution
+    assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=voxel)
 
 
 def test_cameras_that_look_elsewhere_are_refused(tmp_path: Path) -> None:

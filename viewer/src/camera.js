@@ -1,4 +1,4 @@
-/** Cameras: the captures' K and w2c (OpenCV axes, docs/conventions.md) to OpenGL's matrices, and the orbit's angles. */
+/** Cameras: the captures' K and w2c (OpenCV axes, docs/reference/conventions.md) to OpenGL's matrices, and the orbit's angles. */
 import { Matrix4, Vector3 } from "three";
 
 /**

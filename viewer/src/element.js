@@ -1,4 +1,4 @@
-/** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/viewer.md is its manual. */
+/** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
 import { PlayerError } from "./errors.js";
 import { Player } from "./player.js";
 import { connectBar } from "./ui/bar.js";
@@ -251,7 +251,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#player?.view.reset();
   }
 
-  /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera docs/conventions.md; null: back to the orbit */
+  /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera docs/reference/conventions.md; null: back to the orbit */
   setCamera(camera) {
     this.#player?.view.setExact(camera);
   }

@@ -1,4 +1,4 @@
-/** manifest.json, format version 2 (docs/asset-format.md): read, checked as far as the player relies on it. */
+/** manifest.json, format version 2 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
 import { PlayerError } from "./errors.js";
 
 export const VERSION = 2;

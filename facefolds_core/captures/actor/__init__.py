@@ -1,7 +1,7 @@
 """The embedded actor: a procedural talking head with everything that a capture has, and the truth behind it.
 
 Its renderer is written from nothing (distance functions, sphere tracing, ray-marched hair) and shares no code with the
-product's rendering, so that one can judge the other. docs/actor.md describes it.
+product's rendering, so that one can judge the other. docs/guide/actor.md describes it.
 """
 
 from facefolds_core.captures.actor.capture import SEGMENT, frame_times, write_capture

@@ -90,7 +90,7 @@ def _segment(root: Path, wanted: str | None) -> str:
     folder = root / "images"
     for place in (root, folder):
         check_folder(place, "point `path` at a Multiface subject's folder, which holds KRT and images")
-    segments = sorted(path.name for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    segments = [path.name for path in _inside(folder) if path.is_dir()] if folder.is_dir() else []
     if wanted in segments:
         return str(wanted)
     if wanted is None and len(segments) == 1:
@@ -114,10 +114,15 @@ def _segment(root: Path, wanted: str | None) -> str:
 def _photos(folder: Path) -> dict[str, dict[str, Path]]:
     """Camera -> frame -> file, of what is there."""
     return {
-        camera.name: {path.stem: path for path in sorted(camera.iterdir()) if path.suffix == ".png"}
-        for camera in sorted(folder.iterdir())
+        camera.name: {path.stem: path for path in _inside(camera) if path.suffix.lower() == ".png"}
+        for camera in _inside(folder)
         if camera.is_dir()
     }
+
+
+def _inside(folder: Path) -> list[Path]:
+    """What lies there, but for hidden files: a Mac leaves `._x.png` beside every x.png on disks of other systems."""
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
 
 
 def _listed(path: Path, segment: str) -> list[str]:

@@ -4,8 +4,9 @@ crossings. Under two minutes, so that an interrupted run simply starts again."""
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,11 +17,10 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
-from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
-from facefolds_core.model.storage import ExplicitSpec, save_model
+from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
@@ -34,12 +34,24 @@ from facefolds_core.training.explicit.views import Images, Views, check_images, 
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
+from facefolds_core.training.trained import Trained
 from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
 from facefolds_core.training.volume.outline import largest_body
 
 
 def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log: Path) -> TrainingReport:
-    """Train on `scene` and write the model folder whole.
+    """`fit_explicit`, and the model's folder written whole; a full disk is waited for."""
+    trained = fit_explicit(scene, params, log, model_folder)
+    patiently(lambda: trained.save(model_folder))
+    return trained.report
+
+
+def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None) -> Trained:
+    """Train on `scene`.
+
+    Args:
+        log: folder of dvclive's files.
+        place: where the model is to be written: that it will fit there is checked before the training.
 
     Raises:
         UserError: if an image is missing, nothing stands out from the background, or training diverges even at small
@@ -57,7 +69,8 @@ def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log
         fit = fit_scene(cameras.scene, volume, params)
         for note in fit.notes:
             bar.write(f"train: {note}")
-        check_space(model_folder, model_bytes(fit.texels, params.layers, scene.num_frames))
+        if place is not None:
+            check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
         levels = plan(fit, params)
         for k, level in enumerate(levels):
@@ -68,16 +81,8 @@ def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log
     report = make_report(
         time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
     )
-
-    def write() -> None:
-        with atomic_folder(model_folder) as temporary:
-            save_model(model, spec, temporary)
-            write_json(temporary / "training.json", asdict(report))
-            write_json(temporary / "fit.json", trainer.summary(spec))
-            draw_fit(temporary / "fit.png", fit, spec.num_layers, params.start.subject_opacity)
-
-    patiently(write)
-    return report
+    draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
+    return Trained(model, spec, report, trainer.summary(spec), draw)
 
 
 class _Trainer:
@@ -258,7 +263,7 @@ class _Trainer:
         )
         return RadianceManifolds(manifolds, textures), spec
 
-    def summary(self, spec: ExplicitSpec) -> dict[str, object]:
+    def summary(self, spec: ExplicitSpec) -> dict[str, Any]:
         """`fit.json`: what was chosen, and why."""
         return {
             "window": list(spec.window),

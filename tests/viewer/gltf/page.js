@@ -6,7 +6,7 @@ import { projectionOf, viewOf } from "../../../viewer/src/camera.js";
 
 const TO_Y_UP = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 1); // (x, y, z) -> (y, z, x)
 
-/** Pictures (PNG, base64) of the GLB from cameras of the asset (docs/conventions.md), all of one size. */
+/** Pictures (PNG, base64) of the GLB from cameras of the asset (docs/reference/conventions.md), all of one size. */
 window.show = async (file, cameras, background) => {
   const loader = new GLTFLoader().setDRACOLoader(new DRACOLoader().setDecoderPath("draco/"));
   const { scene } = await loader.loadAsync(file);

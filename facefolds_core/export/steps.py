@@ -1,0 +1,153 @@
+"""The steps of the export as functions of what they need: the stages call them on files, `pipeline` in a row.
+
+Textures are many and large: they go to and come from frame stores in a folder that the caller gives. Everything else
+is passed in memory.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.export.bake import Baker, Codes, baked_rows, gather_rays
+from facefolds_core.export.collapse import decimate_sheets, decimated_ladder
+from facefolds_core.export.decimation import decimate_layers
+from facefolds_core.export.hold import held_rows, texel_weights
+from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
+from facefolds_core.export.protocol import LayeredModel
+from facefolds_core.export.sampling import sample_grids, write_textures
+from facefolds_core.export.sheets import Gridded, grid_sheets
+from facefolds_core.export.stores import Grids, Sheets
+from facefolds_core.export.window import visible_window
+from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW
+from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams
+
+TEXTURES = "textures.arrow"
+"""Name of a frame store of textures, N layers x K frames, in its folder."""
+
+Surfaces = Sheets | list[Surface]
+"""Of all layers, outermost first: the sampled grids themselves, or triangle surfaces."""
+
+
+def check_frames(model: LayeredModel, scene: Scene, file: Path | None = None) -> None:
+    """Raises UserError if the model was trained on another number of frames; `file` is named."""
+    if model.num_frames != scene.num_frames:
+        raise UserError(
+            "the model and the scene do not belong together",
+            file=file,
+            expected=f"{scene.num_frames} frames, as in {scene.folder}",
+            found=f"{model.num_frames} frames",
+            remedy="run `dvc repro`, which trains again, or train on this scene",
+        )
+
+
+def sample_model(model: LayeredModel, cameras: Sequence[Camera], params: SampleParams, folder: Path) -> Grids:
+    """N grids of R x R points and normals; the textures of all frames go to `folder`/textures.arrow.
+
+    Args:
+        cameras: for training: they decide what the window must hold.
+    """
+    window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else FULL_WINDOW
+    grids = sample_grids(model, params.resolution, window)
+    return replace(grids, opacity=write_textures(folder / TEXTURES, model, grids))
+
+
+def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:
+    """Surfaces of the layers, with what is to be said of them: `surfaces_in` takes it off."""
+    return grid_sheets(grids, params.resolution) if params.method == "grid" else reconstruct_layers(grids, params)
+
+
+def surfaces_in(made: Gridded | list[Reconstruction]) -> Surfaces:
+    """The surfaces alone."""
+    return made.sheets if isinstance(made, Gridded) else [result.surface for result in made]
+
+
+def decimate(surfaces: Surfaces, grids: Grids, params: DecimateParams) -> list[TexturedMesh]:
+    """Every layer with at most R^m x R^m vertices, and texture coordinates."""
+    if isinstance(surfaces, Sheets):
+        return decimate_sheets(surfaces, params.resolution**2, params)
+    return decimate_layers(surfaces, grids, grids.centre, params)
+
+
+def decimate_levels(
+    surfaces: Surfaces, grids: Grids, params: DecimateParams, resolutions: Sequence[int]
+) -> dict[int, list[TexturedMesh]]:
+    """The same for coarser levels of detail: R^m -> the layers with at most so many squared vertices."""
+    if isinstance(surfaces, Sheets):
+        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions], params) if resolutions else {}
+        return {r: ladder[r**2] for r in resolutions}
+    return {r: decimate(surfaces, grids, params.model_copy(update={"resolution": r})) for r in resolutions}
+
+
+def bake(
+    cameras: Sequence[Camera],
+    grids: Grids,
+    meshes: Sequence[TexturedMesh],
+    samples: Path,
+    textures: Path,
+    params: BakeParams,
+    folder: Path,
+) -> int:
+    """Textures fitted to the meshes that ship, into `folder`/textures.arrow.
+
+    Args:
+        cameras: for training.
+        samples, textures: frame stores of the textures as they were sampled, and at the size that ships. They are let
+            go before the texels are held.
+
+    Returns:
+        of how many rays they are a fit; 0 if they were left as they are.
+
+    Raises:
+        UserError: if meshes, samples and textures are not of the same layers and frames.
+    """
+    path = folder / TEXTURES
+    if params.iterations == 0:
+        shutil.copyfile(textures, path)
+        return 0
+    rays = _fit(cameras, grids, meshes, FrameStore(samples), FrameStore(textures), params, path)
+    baked = FrameStore(path)
+    if params.hold > 0 and any(frame > 0 for _, frame in baked):
+        baked = FrameStore(path.rename(folder / "baked.arrow"))
+        weights = texel_weights(rays, baked, len(cameras), params.hold_frames)
+        write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
+        baked.path.unlink()
+    return len(rays)
+
+
+def _fit(
+    cameras: Sequence[Camera],
+    grids: Grids,
+    meshes: Sequence[TexturedMesh],
+    samples: FrameStore,
+    textures: FrameStore,
+    params: BakeParams,
+    path: Path,
+) -> Codes:
+    """Write the fitted textures; the rays on the meshes that ship. What else was gathered is let go."""
+    sheets = grid_sheets(grids, None).sheets
+    _check_match(meshes, sheets, textures, samples)
+    rays = gather_rays(cameras, meshes, sheets)
+    baker = Baker(meshes, sheets, rays, textures.height, params.damping)
+    shape = (textures.height, textures.width, 4)
+    write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
+    return rays.shipped
+
+
+def _check_match(meshes: Sequence[TexturedMesh], sheets: Sheets, textures: FrameStore, samples: FrameStore) -> None:
+    layers = {len(meshes), sheets.num_layers, 1 + max(layer for layer, _ in textures.keys())}  # noqa: SIM118
+    if len(layers) > 1 or textures.keys() != samples.keys():
+        raise UserError(
+            "meshes, samples and textures do not belong together",
+            file=textures.path,
+            expected="as many layers and frames in each",
+            found=f"{sorted(layers)} layers, {len(textures.keys())} textures of {len(samples.keys())} samples",
+            remedy="run `dvc repro`, which makes them again",
+        )
