@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
@@ -9,6 +11,7 @@ from facefolds_core.config import read_stage
 from facefolds_core.export.steps import TEXTURES
 from facefolds_core.export.stores import read_centre, read_meshes, read_windows
 from facefolds_core.frame_store import FrameStore
+from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams
 from facefolds_core.paths import SubjectFolders
@@ -33,6 +36,9 @@ def compress(folders: SubjectFolders) -> str:
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
+    warning = codec_warning(level.quality.psnr_to_model if level.quality else None, params.video, params.search.noticed)
+    if warning:
+        sys.stderr.write(f"compress: {warning}\n")
     coarser = "".join(f"; {other.name} {other.bytes} bytes" for other in manifest.levels[:-1])
     return (
         f"{len(level.layers)} of {len(export.meshes)} meshes ({mesh_bytes} bytes) and {level.texture.frames} frames "

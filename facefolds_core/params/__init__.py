@@ -42,7 +42,15 @@ from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of,
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
-from facefolds_core.params.volume import CameraParams, EnvironmentParams, VolumeLevel, VolumeParams
+from facefolds_core.params.volume import (
+    CameraParams,
+    EnvironmentParams,
+    RoomParams,
+    SubjectParams,
+    VolumeLevel,
+    VolumeParams,
+    WarningParams,
+)
 
 __all__ = [
     "PRESETS",
@@ -81,10 +89,12 @@ __all__ = [
     "PruningParams",
     "ReconstructParams",
     "RefitParams",
+    "RoomParams",
     "SampleParams",
     "Section",
     "StartParams",
     "Subject",
+    "SubjectParams",
     "TextureParams",
     "TrainParams",
     "TrainSection",
@@ -92,6 +102,7 @@ __all__ = [
     "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
+    "WarningParams",
     "merged",
     "nested",
     "section_of",

@@ -92,6 +92,9 @@ class CrfSearchParams(Section):
     slope: Annotated[float, Field(gt=0, le=100)] = 0.4
     """dB that one step of the factor costs, roughly, of any encoder: for the second attempt."""
 
+    noticed: Annotated[float, Field(ge=0, le=80)] = 0.5
+    """dB below the target from which on it is said that it was missed: more than the search's own tolerance."""
+
 
 class MeterParams(Section):
     """The yardstick of packaging: rendered training views (packaging/views.py)."""

@@ -8,7 +8,14 @@ from pydantic import Field
 
 from facefolds_core.params.base import Count, Factor, Rate, Section, Seed, Share, Weight
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
-from facefolds_core.params.volume import CameraParams, EnvironmentParams, VolumeParams
+from facefolds_core.params.volume import (
+    CameraParams,
+    EnvironmentParams,
+    RoomParams,
+    SubjectParams,
+    VolumeParams,
+    WarningParams,
+)
 
 
 class GridTextureParams(Section):
@@ -129,8 +136,17 @@ class ExplicitParams(Section):
     volume: VolumeParams = VolumeParams()
     """The starting volume."""
 
+    room: RoomParams = RoomParams()
+    """What stands around the subject, with parallax."""
+
+    subject: SubjectParams = SubjectParams()
+    """Which part of the volume is the subject."""
+
     environment: EnvironmentParams = EnvironmentParams()
-    """What lies behind it."""
+    """What lies behind volume and room."""
+
+    warnings: WarningParams = WarningParams()
+    """When it is said that something is not well."""
 
     cameras: CameraParams = CameraParams()
     """What single cameras do differently."""

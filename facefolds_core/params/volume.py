@@ -18,6 +18,9 @@ class VolumeLevel(Section):
     iterations: Count
     """Adam steps."""
 
+    room: Annotated[int, Field(ge=8, le=512)] = 64
+    """Voxels along a side of the outer zone (`train.room`), coarser than the volume's: it shows what is behind."""
+
 
 class VolumeParams(Section):
     """The volume that the geometry starts from: density and colour on a grid, fitted to the images of one frame."""
@@ -63,8 +66,8 @@ class VolumeParams(Section):
     """Images are reduced until a pixel covers this many voxels at the origin: finer ones say nothing to such a grid."""
 
     levels: Annotated[Many[VolumeLevel], Field(min_length=1, max_length=16)] = (
-        VolumeLevel(resolution=48, iterations=120),
-        VolumeLevel(resolution=96, iterations=120),
+        VolumeLevel(resolution=48, iterations=120, room=48),
+        VolumeLevel(resolution=96, iterations=120, room=80),
     )
     """From coarse to fine: the coarse one finds where the subject is, the fine one its outline."""
 
@@ -76,7 +79,7 @@ class VolumeParams(Section):
     """Blocks whose voxels all have a smaller optical depth a voxel are skipped: speed."""
 
     body_depth: Weight = 0.1
-    """Optical depth of a voxel from which on it belongs to a body; all but the largest connected body is removed."""
+    """Optical depth of a voxel from which on it belongs to a body; see `train.subject`."""
 
     @model_validator(mode="after")
     def _shared_is_more(self) -> Self:
@@ -85,8 +88,70 @@ class VolumeParams(Section):
         return self
 
 
+class RoomParams(Section):
+    """The outer zone: density and colour of all space beyond the ball of `volume.reach`, contracted towards infinity. A
+    near wall has parallax; without a place of its own it becomes fog around the head. Rates are the volume's."""
+
+    needed_below: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. With 28 two of
+    three captures before near walls gain much, and the third loses parts of its head: try it, and look at the pictures
+    (docs/research/2026-11-22-rooms.md). Before a plain wall it explains nothing better, and takes up hair and
+    highlights of the subject."""
+
+    seen_rays: Factor = 1.0
+    """Colours of voxels that fewer rays have reached are those of their neighbours: behind the head there would be
+    a picture of the face, left from when the head was fog."""
+
+    fog: Factor = 1.0
+    """Optical depth at the start, from the ball to infinity: half of the volume's, behind which it lies."""
+
+    step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
+    """Between samples on a ray, voxels: no voxel is stepped over."""
+
+    farthest: Annotated[float, Field(gt=1, le=1000)] = 20.0
+    """What lies farther from the centre, in radii of the ball, is left to the far sphere: nothing moves there."""
+
+    smoothness_weight: Weight = 0.001
+    """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
+
+
+class SubjectParams(Section):
+    """Which part of the volume is the subject: the body at the cameras' common centre, without the room it touches."""
+
+    near: Length = 0.1
+    """Standard deviation of the weight, over the distance from the common centre, by which bodies are compared, units:
+    half a head."""
+
+    core: Length = 0.11
+    """What lies so near to the common centre is the subject's own, units."""
+
+    rim: Length = 0.34
+    """What lies farther from the common centre, units, behind and not below, is the room's: a wall goes on, a head
+    ends. The back of a head is 0.2 away."""
+
+    front: Length = 0.13
+    """What has a larger x, units, is the subject's own, too: a room is not before the subject."""
+
+    behind: Length = 0.09
+    """Points with a smaller x, units, are behind: the common centre may lie a little behind a face."""
+
+    below: Share = 0.35
+    """Directions that fall by more (the sine) are below: there a subject goes on, too."""
+
+    larger: Annotated[Many[Length], Field(max_length=8)] = (0.65,)
+    """Radii of the ball that are tried one after the other where the subject is cut off by `volume.reach`; only
+    where there is an outer zone."""
+
+    max_cut: Share = 0.005
+    """Share of the subject's voxels at the edge of the ball, neither behind nor below, above which it is cut off."""
+
+    room_speed: Annotated[int, Field(ge=1, le=16)] = 2
+    """The room grows by so many voxels while the subject grows by one, until they have shared the body out: a wall is
+    larger than what hangs on it."""
+
+
 class EnvironmentParams(Section):
-    """What is behind the subject: one blurred picture on a large sphere, shared by all cameras."""
+    """What is behind the room: one blurred picture on a large sphere, shared by all cameras."""
 
     rows: Annotated[int, Field(ge=2, le=4096)] = 24
     """Texels from pole to pole; twice as many around. Few: it may take up walls, not the subject."""
@@ -96,6 +161,17 @@ class EnvironmentParams(Section):
 
     learning_rate: Rate = 0.02
     """Of its colours, Adam's."""
+
+
+class WarningParams(Section):
+    """When a training that ended well is said not to be well: a line in the terminal and in fit.json."""
+
+    min_volume_psnr: Annotated[float, Field(ge=0, le=100)] = 28.0
+    """Of the starting volume on training rays, dB. 30 to 36 where the result is good, 20 to 27 where spikes stood
+    around the head or ears were cut off."""
+
+    max_lost: Share = 0.05
+    """Share of the visible surface without a place before the chosen centre."""
 
 
 class CameraParams(Section):

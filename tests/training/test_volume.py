@@ -20,6 +20,8 @@ from facefolds_core.training.volume import fit, kernel, outline, reference
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
 from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.room import Room
+from facefolds_core.training.volume.subject import subject_of
 from tests.scenes import OPAQUE, make_scene
 
 PARAMS = ExplicitParams()
@@ -111,7 +113,7 @@ def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -
         np.full(3, -0.45),
         0.01,
         PARAMS.volume.step,
-        Environment(np.zeros(3, np.float32), 1.0, PARAMS.environment),
+        Room(np.zeros(3, np.float32), 1.0, 0.45, PARAMS.room, PARAMS.environment),
         0,
         30.0,
         CameraFit.alike(1, PARAMS.cameras),
@@ -143,7 +145,7 @@ def test_what_floats_is_removed() -> None:
     both = replace(ball, grid=np.where(crumb.grid[..., :1] > ball.grid[..., :1], crumb.grid, ball.grid))
     outward = np.array([[1.0, 0.0, 0.0]])
     assert outline.profile(both, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.43, abs=0.01)
-    cleaned = outline.largest_body(both, PARAMS.volume.body_depth)
+    cleaned = subject_of(both, PARAMS)
     assert outline.profile(cleaned, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.25, abs=0.01)
 
 
@@ -177,7 +179,7 @@ def test_a_sphere_is_found_from_images_alone(tmp_path: Path, resolution: int) ->
     scene = make_scene(tmp_path, size=64)
     levels = [{"resolution": r, "iterations": 120 * resolution // 96} for r in (resolution // 2, resolution)]
     params = ExplicitParams.model_validate({"volume": {"levels": levels}})
-    volume = outline.largest_body(fit.fit_volume(scene, params, tqdm(disable=True)), PARAMS.volume.body_depth)
+    volume = subject_of(fit.fit_volume(scene, params, tqdm(disable=True)), params)
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
     voxel = 0.008 * 96 / resolution

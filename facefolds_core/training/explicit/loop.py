@@ -31,12 +31,13 @@ from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Level, plan
 from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
 from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
+from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report, pick_device
 from facefolds_core.training.trained import Trained
-from facefolds_core.training.volume.fit import Volume, fit_volume, iterations
-from facefolds_core.training.volume.outline import largest_body
+from facefolds_core.training.volume.fit import Volume, iterations
+from facefolds_core.training.volume.search import find_subject
 
 
 def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log: Path) -> TrainingReport:
@@ -62,16 +63,18 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
-        volume = largest_body(fit_volume(scene, params, bar), params.volume.body_depth)
+        volume, found = find_subject(scene, params, bar)
         cameras = choose_cameras(scene, volume.cameras)
-        for note in cameras.notes:
+        for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
         fit = fit_scene(cameras.scene, volume, params)
-        for note in fit.notes:
+        warnings = warnings_of(scene, fit, params.warnings)
+        for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
+        trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)

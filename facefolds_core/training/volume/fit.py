@@ -1,7 +1,7 @@
 """Fit a volume to the training images of one frame, without masks, mesh or any other guess of where the subject is.
 
 The box holds what enough cameras see near the scene's origin. It starts as fog, half opaque; behind it stands the
-environment (`environment.py`). Where cameras disagree the fog clears, where they agree it thickens."""
+room (`room.py`). Where cameras disagree the fog clears, where they agree it thickens."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, VolumeParams
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
-from facefolds_core.training.volume.environment import Environment
-from facefolds_core.training.volume.optimise import clear, rays_of, train
+from facefolds_core.training.volume.optimise import Rays, clear, rays_of, train
+from facefolds_core.training.volume.room import Room
 
 Array = NDArray[np.float32]
 
@@ -33,7 +33,7 @@ class Volume:
         lower: (3,) position of voxel (0, 0, 0), units.
         voxel: its side, units.
         step: between samples on a ray, voxels.
-        environment: what is behind.
+        room: what is behind.
         frame: index of the frame that it was fitted to.
         psnr: on the training rays of the last iterations, dB.
         cameras: what single training cameras do differently.
@@ -43,7 +43,7 @@ class Volume:
     lower: NDArray[np.float64]
     voxel: float
     step: float
-    environment: Environment
+    room: Room
     frame: int
     psnr: float
     cameras: CameraFit
@@ -94,44 +94,83 @@ def bounding_box(cameras: list[Camera], params: VolumeParams) -> tuple[NDArray[n
     return kept.min(0) - half, kept.max(0) + half
 
 
-def fit_volume(scene: Scene, params: ExplicitParams, bar: tqdm) -> Volume:
-    """Fit to the middle frame.
+class VolumeFit:
+    """A fit to the middle frame, level by level.
 
     Args:
-        bar: advanced by one an iteration, `iterations(params.volume)` in all.
+        scene, params: of the training.
+        outer: whether there is an outer zone with parallax (`room.py`), or the far sphere alone is behind.
+
+    Attributes:
+        psnr: on the training rays of the last iterations, dB.
 
     Raises:
-        UserError: if the cameras do not look at one place, or the numbers stop being finite.
+        UserError: if the cameras do not look at one place.
     """
-    indices = scene.indices("train")
-    cameras = [scene.cameras[i] for i in indices]
-    frame = scene.num_frames // 2
-    store = scene.open_frames()
-    images = [store.image(i, frame) for i in indices]
-    wanted = params.volume
-    lower, upper = bounding_box(cameras, wanted)
-    random = np.random.default_rng(params.seed)
-    mean = np.mean([image.mean((0, 1)) for image in images], 0) / 255
-    farthest = max(float(np.linalg.norm(c.centre)) for c in cameras)
-    environment = Environment(mean.astype(np.float32), farthest, params.environment)
-    grid, voxel, psnr = None, 0.0, 0.0
-    found = CameraFit.alike(len(cameras), params.cameras)
-    for number, level in enumerate(wanted.levels):
-        finer = float((upper - lower).max()) / (level.resolution - 1)
-        shape = tuple(np.ceil((upper - lower) / finer - 1e-6).astype(int) + 1)
-        share = _share(cameras, lower, finer, shape, wanted)
-        grid = _fog(share, mean, wanted) if grid is None else _resample(grid, voxel, shape, finer)
-        voxel = finer
+
+    def __init__(self, scene: Scene, params: ExplicitParams, outer: bool) -> None:
+        indices = scene.indices("train")
+        self.params, self.outer = params, outer
+        self.cameras = [scene.cameras[i] for i in indices]
+        self.frame = scene.num_frames // 2
+        store = scene.open_frames()
+        self.images = [store.image(i, self.frame) for i in indices]
+        self.lower, self.upper = bounding_box(self.cameras, params.volume)
+        self.random = np.random.default_rng(params.seed)
+        self.mean = np.mean([image.mean((0, 1)) for image in self.images], 0) / 255
+        farthest = max(float(np.linalg.norm(c.centre)) for c in self.cameras)
+        self.room = Room(self.mean.astype(np.float32), farthest, params.volume.reach, params.room, params.environment)
+        self.grid: Array | None = None
+        self.voxel = self.psnr = 0.0
+        self.found = CameraFit.alike(len(self.cameras), params.cameras)
+        self.rays: Rays | None = None
+
+    def run(self, number: int, bar: tqdm) -> None:
+        """One level; `bar` is advanced by one an iteration.
+
+        Raises:
+            UserError: if the numbers stop being finite.
+        """
+        wanted, level = self.params.volume, self.params.volume.levels[number]
+        finer = float((self.upper - self.lower).max()) / (level.resolution - 1)
+        shape = tuple(np.ceil((self.upper - self.lower) / finer - 1e-6).astype(int) + 1)
+        share = _share(self.cameras, self.lower, finer, shape, wanted)
+        coarser = self.grid
+        grid = _fog(share, self.mean, wanted) if coarser is None else _resample(coarser, self.voxel, shape, finer)
         grid[share == 0, 0] = -kernel.LIMIT
-        rays = rays_of(cameras, images, voxel, wanted.pixel)
-        rays = replace(rays, colours=found.corrected(rays.colours, rays.camera))
+        rays = rays_of(self.cameras, self.images, finer, wanted.pixel)
+        rays = replace(rays, colours=self.found.corrected(rays.colours, rays.camera))
         last = number == len(wanted.levels) - 1
-        psnr = train(grid, share, lower, voxel, rays, environment, level, last, wanted, random, bar)
-        rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, wanted.step * voxel)
-        found = found.refined(rgb, alpha, rays.colours, rays.camera)
-    assert grid is not None
-    clear(grid, lower, voxel, rays, environment, wanted)
-    return Volume(grid, lower, voxel, wanted.step, environment, frame, psnr, found)
+        if self.outer:
+            self.room.refine(level.room)
+        self.psnr = train(grid, share, self.lower, finer, rays, self.room, level, last, wanted, self.random, bar)
+        rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, self.lower, finer, wanted.step * finer)
+        self.found = self.found.refined(rgb, alpha, rays.colours, rays.camera)
+        self.grid, self.voxel, self.rays = grid, finer, rays
+
+    def volume(self) -> Volume:
+        """What was found so far; its grid is copied."""
+        assert self.grid is not None
+        step = self.params.volume.step
+        return Volume(self.grid.copy(), self.lower, self.voxel, step, self.room, self.frame, self.psnr, self.found)
+
+    def finish(self) -> Volume:
+        """The volume without what nothing speaks for; the room without what no camera has seen."""
+        assert self.grid is not None and self.rays is not None
+        clear(self.grid, self.lower, self.voxel, self.rays, self.room, self.params.volume)
+        rays = self.rays
+        step = self.params.volume.step * self.voxel
+        _, alpha, _ = kernel.render(rays.origins, rays.directions, self.grid, self.lower, self.voxel, step)
+        self.room.forget_unseen(rays.origins, rays.directions, 1 - alpha)
+        return self.volume()
+
+
+def fit_volume(scene: Scene, params: ExplicitParams, bar: tqdm, outer: bool = False) -> Volume:
+    """All levels, in the box that is asked for; see `VolumeFit`. `search.py` finds box and zones by itself."""
+    fit = VolumeFit(scene, params, outer)
+    for number in range(len(params.volume.levels)):
+        fit.run(number, bar)
+    return fit.finish()
 
 
 def iterations(params: VolumeParams) -> int:

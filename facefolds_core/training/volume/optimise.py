@@ -15,7 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VolumeLevel, VolumeParams
 from facefolds_core.training.volume import kernel
-from facefolds_core.training.volume.environment import Environment
+from facefolds_core.training.volume.room import Room
 
 Array = NDArray[np.float32]
 
@@ -103,13 +103,13 @@ def clear(
     lower: NDArray[np.float64],
     voxel: float,
     rays: Rays,
-    environment: Environment,
+    room: Room,
     params: VolumeParams,
 ) -> None:
     """Empty the voxels without `min_contrast`, in place: the mean over rays, by their weights there, of how far what
-    they see in the volume is from the environment behind it. What no ray reaches stays."""
+    they see in the volume is from the room behind it. What no ray reaches stays."""
     gradient, touched = kernel.empty_gradient(grid.shape)
-    background, _, _ = environment.look_up(rays.origins, rays.directions)
+    background = room.look_up(rays.origins, rays.directions)
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
     # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
@@ -132,7 +132,7 @@ def train(
     lower: NDArray[np.float64],
     voxel: float,
     rays: Rays,
-    environment: Environment,
+    room: Room,
     level: VolumeLevel,
     last: bool,
     params: VolumeParams,
@@ -149,9 +149,9 @@ def train(
             occupied = _occupied(grid[0, ..., 0], params.empty_depth)
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         origins, directions = rays.origins[chosen], rays.directions[chosen]
-        background, taps, weights = environment.look_up(origins, directions)
         part = Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
+        behind = room.look(origins, directions, jitter)
         squares, residual, transmittance = _shade(
             grid[0],
             occupied,
@@ -159,7 +159,7 @@ def train(
             voxel,
             part,
             jitter,
-            background,
+            behind.colours,
             gradient,
             touched,
             params.step,
@@ -169,9 +169,9 @@ def train(
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - 0.9 * i / level.iterations if last else 1.0
-        environment.step(taps, weights, transmittance[:, None] * residual, scale)
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
+        room.step(behind, transmittance[:, None] * residual, scale, *rates)
         kernel.adam_step(grid, gradient, touched, share, *rates, bias1, bias2, params.smoothness_weight)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,23 +35,6 @@ class Profile:
     inner: Array
     opacity: NDArray[np.float32]
     rgb: NDArray[np.float32]
-
-
-def largest_body(volume: Volume, body_depth: float) -> Volume:
-    """The volume without what floats beside its largest connected body.
-
-    Args:
-        body_depth: optical depth of a voxel from which on it belongs to a body.
-    """
-    depth = np.logaddexp(0, volume.grid[..., 0])
-    labels, count = ndimage.label(depth > body_depth)
-    if count < 2:
-        return volume
-    mass = ndimage.sum_labels(depth, labels, np.arange(1, count + 1))
-    body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=2)
-    grid = volume.grid.copy()
-    grid[~body, 0] = np.minimum(grid[~body, 0], math.log(math.expm1(1e-5)))
-    return replace(volume, grid=grid)
 
 
 def profile(volume: Volume, centre: Array, directions: Array, least: float) -> Profile:

@@ -1,0 +1,40 @@
+"""What is said of a training that ended well but is not well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.facts import fact
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.fit import Fit
+from facefolds_core.training.explicit.warnings import warnings_of
+from tests.scenes import make_scene
+
+WELL = Fit(
+    centre=np.array([-0.3, 0.0, 0.0]),
+    window=(-0.5, 0.5, -0.5, 0.5),
+    middle=np.zeros((2, 2)),
+    halfwidth=np.zeros((2, 2)),
+    trust=np.zeros((2, 2)),
+    opacity=np.zeros((2, 2)),
+    rgb=np.zeros((2, 2, 3)),
+    texels=(16, 16),
+    reasons=(),
+    notes=(),
+    losses={-0.3: 0.02, -0.4: 0.3},
+    volume_psnr=30.0,
+)
+
+
+def test_what_is_not_well_is_said_with_a_remedy(tmp_path: Path) -> None:
+    scene, params = make_scene(tmp_path, size=16), ExplicitParams().warnings
+    assert warnings_of(scene, WELL, params) == ()
+    (low,) = warnings_of(scene, replace(WELL, volume_psnr=20.1), params)
+    assert low.kind == "volume_explains_little" and "20.1 dB" in str(low) and "needed_below" in str(low)
+    (lost,) = warnings_of(scene, replace(WELL, centre=np.array([-0.4, 0.0, 0.0])), params)
+    assert "30%" in str(lost) and "train.start.centres" in str(lost)
+    guessed = replace(scene, left_out=(fact("front_guessed"),))
+    assert "`front`" in str(warnings_of(guessed, WELL, params)[0])
