@@ -1,6 +1,8 @@
 """Images of one size in one Arrow file, memory-mapped: never one file a picture.
 
-Columns: `camera` int32, `frame` int32 (indices into the scene's lists), `pixels` fixed-size binary of H*W*C bytes
+Keyed by (index, frame): what the index counts is the caller's, cameras of a scene or layers of an asset.
+
+Columns: `camera` int32 (the index, whatever it counts), `frame` int32, `pixels` fixed-size binary of H*W*C bytes
 (row-major, RGB or one channel). Height, width and channels stand in the schema's metadata. Rows may come in any order
 and need not be complete (masks exist for some images only).
 """
@@ -27,7 +29,7 @@ def write_frames(path: str | Path, shape: tuple[int, int, int], rows: Iterable[t
 
     Args:
         shape: (height, width, channels) of every image.
-        rows: (camera index, frame index, image uint8 of `shape`).
+        rows: (index, frame, image uint8 of `shape`).
     """
     size = shape[0] * shape[1] * shape[2]
     metadata = {name: str(n) for name, n in zip(("height", "width", "channels"), shape, strict=True)}
@@ -38,13 +40,13 @@ def write_frames(path: str | Path, shape: tuple[int, int, int], rows: Iterable[t
         pa.OSFile(str(temporary), "wb") as sink,
         pa.ipc.new_file(sink, schema) as writer,
     ):
-        for camera, frame, image in rows:
+        for index, frame, image in rows:
             if image.shape != shape or image.dtype != np.uint8:
                 raise ValueError(f"image of {image.dtype} {image.shape}, expected uint8 {shape}")
             pixels = pa.FixedSizeBinaryArray.from_buffers(
                 pa.binary(size), 1, [None, pa.py_buffer(np.ascontiguousarray(image))]
             )
-            columns = [pa.array([camera], pa.int32()), pa.array([frame], pa.int32()), pixels]
+            columns = [pa.array([index], pa.int32()), pa.array([frame], pa.int32()), pixels]
             writer.write_batch(pa.record_batch(columns, schema=schema))
 
 
@@ -79,22 +81,22 @@ class FrameStore:
         return key in self._images
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
-        """All (camera index, frame index) that the file holds, sorted."""
+        """All (index, frame) that the file holds, sorted."""
         return iter(self.keys())
 
     def keys(self) -> list[tuple[int, int]]:
-        """All (camera index, frame index) that the file holds, sorted."""
+        """All (index, frame) that the file holds, sorted."""
         return sorted(self._images)
 
-    def image(self, camera: int, frame: int) -> Image:
+    def image(self, index: int, frame: int) -> Image:
         """(height, width, channels) uint8, a view of the mapped file.
 
         Raises:
             UserError: if the file does not hold it.
         """
-        found = self._images.get((camera, frame))
+        found = self._images.get((index, frame))
         if found is None:
-            place = f"camera (or layer) {camera}, frame {frame}"
+            place = f"index {index} (camera or layer), frame {frame}"
             raise UserError(
                 "an image is missing in a frame store", file=self.path, place=place, remedy=remake(self.path)
             )
@@ -102,7 +104,7 @@ class FrameStore:
 
 
 def _views(table: pa.Table, shape: tuple[int, int, int]) -> dict[tuple[int, int], Image]:
-    """(camera, frame) -> the image's bytes in the mapped file.
+    """(index, frame) -> the image's bytes in the mapped file.
 
     Raises:
         ValueError, ArrowException: if the table is not what `write_frames` writes.

@@ -37,8 +37,7 @@ from facefolds_core.params import (
 from facefolds_core.scoring.evaluation import Evaluation
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
-from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.loop import fit_mlp
+from facefolds_core.training.models import fit
 from facefolds_core.training.trained import Trained
 
 
@@ -67,9 +66,7 @@ def train(scene: Scene, params: TrainParams | None = None, scratch: str | Path |
     params = ExplicitParams() if params is None else params
     with TemporaryDirectory(prefix="facefolds-train-") as temporary:
         folder = Path(temporary if scratch is None else scratch)
-        if isinstance(params, ExplicitParams):
-            return fit_explicit(scene, params, folder / "log")
-        return fit_mlp(scene, params, folder / "checkpoints", folder / "log")
+        return fit(scene, params, folder / "checkpoints", folder / "log")
 
 
 def export_asset(

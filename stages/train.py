@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_train
-from facefolds_core.params import ExplicitParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.training.explicit.loop import train_explicit
-from facefolds_core.training.loop import train
+from facefolds_core.training.models import train
 from stages.common import run_stage
 
 
 def train_stage(folders: SubjectFolders) -> str:
     params = read_train(folders.config)
     scene = read_scene(folders.scene)
-    if isinstance(params, ExplicitParams):
-        report = train_explicit(scene, params, folders.model, folders.training_log)
-    else:
-        report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)
+    report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)
     return (
         f"{report.iterations} iterations on {report.device}, {report.rays_per_second:.0f} rays/s, "
         f"PSNR {report.final_psnr:.2f} dB on training rays, model in {folders.model}"

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from facefolds_core.export.bake_kernel import OPAQUE, SCALE
+from facefolds_core.model.compositing import compositing_weights, transmittances
 
 
 def look_up(codes: Tensor, texture: Tensor) -> Tensor:
@@ -23,17 +24,14 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
 
 def visible(rgba: Tensor) -> Tensor:
     """[P, N, 4] -> the same without what lies behind less transmittance than OPAQUE, which a step leaves out."""
-    through = torch.cumprod(1 - rgba[..., 3].detach(), -1)
-    before = torch.cat([torch.ones_like(through[:, :1]), through[:, :-1]], -1)
+    before, _ = transmittances(rgba[..., 3].detach())
     return torch.where((before >= OPAQUE)[..., None], rgba, 0.0)
 
 
 def composite(rgba: Tensor) -> Tensor:
     """[P, N, 4], outermost first -> [P, 4]: rgb over black, transmittance."""
-    through = torch.cumprod(1 - rgba[..., 3], -1)
-    before = torch.cat([torch.ones_like(through[:, :1]), through[:, :-1]], -1)
-    rgb = ((before * rgba[..., 3])[..., None] * rgba[..., :3]).sum(1)
-    return torch.cat([rgb, through[:, -1:]], -1)
+    weights, transmittance = compositing_weights(rgba[..., 3])
+    return torch.cat([(weights[..., None] * rgba[..., :3]).sum(1), transmittance[:, None]], -1)
 
 
 def accumulate(codes: Tensor, target: Tensor, texture: Tensor) -> tuple[Tensor, Tensor]:
@@ -50,8 +48,7 @@ def accumulate(codes: Tensor, target: Tensor, texture: Tensor) -> tuple[Tensor, 
     (gradient,) = torch.autograd.grad(0.5 * residual.square().sum(), texture, retain_graph=True)
     # Derivatives of a ray's four numbers by its layers' rgb and alpha, then |J| times the row's sum, at the texels.
     alpha, behind = rgba[..., 3].detach(), torch.zeros_like(rgba[:, 0, :3])
-    through = torch.cumprod(1 - alpha, -1)
-    before = torch.cat([torch.ones_like(through[:, :1]), through[:, :-1]], -1)
+    before, _ = transmittances(alpha)
     colour = before * alpha
     opacity, rest = torch.zeros_like(colour), torch.ones_like(alpha[:, 0])
     for n in reversed(range(alpha.shape[1])):

@@ -21,6 +21,7 @@ from facefolds_core.export.sheets import Array, directions, sheet_faces, sheet_m
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams
+from facefolds_core.rendering.compositing import transmittance_before
 
 _USUAL = DecimateParams()
 
@@ -78,8 +79,7 @@ def _meshes(
 def contribution(opacity: NDArray[np.uint8], least: float) -> Array:
     """(N, n, n) compositing weights of the layers seen from outside towards c, at least `least` times the opacity."""
     alpha = opacity / 255.0
-    through = np.concatenate([np.ones_like(alpha[:1]), np.cumprod(1 - alpha, 0)[:-1]])
-    return np.asarray(alpha * np.maximum(through, least))
+    return np.asarray(alpha * np.maximum(transmittance_before(alpha, 0), least))
 
 
 def _positions(sheets: Sheets, layer: int, towards: Array) -> Array:

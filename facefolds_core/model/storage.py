@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -108,12 +109,18 @@ _SPEC: TypeAdapter[ModelSpec | ExplicitSpec] = TypeAdapter(Spec)
 
 def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
     """An untrained model; its random numbers come from torch's global generator."""
-    if isinstance(spec, ExplicitSpec):
-        blank = torch.ones(spec.nodes)
-        return RadianceManifolds(
-            RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
-            GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames),
-        )
+    return BUILDERS[spec.kind](spec)
+
+
+def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
+    blank = torch.ones(spec.nodes)
+    return RadianceManifolds(
+        RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
+        GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames),
+    )
+
+
+def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
     manifolds = MlpManifolds(
         spec.centre,
         spec.levels,
@@ -135,6 +142,10 @@ def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
         spec.view_frequencies,
     )
     return RadianceManifolds(manifolds, textures)
+
+
+BUILDERS: dict[str, Callable[[Any], RadianceManifolds]] = {"explicit": _build_explicit, "mlp": _build_mlp}
+"""Kind of a model -> what builds it of its spec."""
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:

@@ -25,6 +25,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import ViewEffectParams
 from facefolds_core.progress import progress
+from facefolds_core.rendering.compositing import FrontToBack
 from facefolds_core.rendering.effects import bilinear, to_eye
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture, sample_texture
@@ -158,21 +159,20 @@ def _equations(
     looked_up = [bilinear(view.hits.st[0, hit[:, i], i], size) for i, size in enumerate(sizes)]
     parts = []
     for frame, photo in view.photos.items():
-        through, rgb = np.ones(len(hit), np.float32), np.zeros((len(hit), 3), np.float32)
+        light, rgb = FrontToBack(len(hit)), np.zeros((len(hit), 3), np.float32)
         rows, columns, values = [], [], []
         for i, (texels, weights) in enumerate(looked_up):
             rays = np.flatnonzero(hit[:, i])
             rgba = sample_texture(textures[frame][i], view.hits.st[0, rays, i])
-            w = through[rays] * rgba[:, 3]
+            w = light.add(rays, rgba[:, 3])
             rgb[rays] += w[:, None] * rgba[:, :3]
-            through[rays] *= 1 - rgba[:, 3]
             use = w > params.min_weight
             rows.append(np.repeat(rays[use], 4))
             columns.append((starts[i] + texels[use]).ravel())
             values.append((w[use, None] * weights[use]).ravel())
         shape = (len(hit), int(starts[-1]))
         triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        kept = np.flatnonzero(1 - through > params.min_opacity)
+        kept = np.flatnonzero(1 - light.transmittance > params.min_opacity)
         weights_matrix = sparse.csr_matrix(triplets, shape, dtype=np.float32)[kept]
         along = [sparse.diags(view.eye[kept, k]) @ weights_matrix for k in range(3)]
         parts.append(Equations(sparse.hstack(along).tocsr(), (photo - rgb)[kept]))

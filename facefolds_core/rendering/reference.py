@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.compositing import FrontToBack
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 
 Image = NDArray[np.float32]
@@ -122,16 +123,14 @@ def composite(
     if len(textures) != hits.hit.shape[2]:
         raise ValueError(f"{len(textures)} textures for {hits.hit.shape[2]} layers")
     rgb = np.zeros((*hits.hit.shape[:2], 3), np.float32)
-    transmittance = np.ones(hits.hit.shape[:2], np.float32)
+    light = FrontToBack(hits.hit.shape[:2])
     for i, texture in enumerate(textures):
         hit = hits.hit[..., i]
         rgba = sample_texture(texture, hits.st[..., i, :][hit])
-        through = transmittance[hit]
         colour = rgba[:, :3] if added is None else np.clip(rgba[:, :3] + added[i], 0, 1)
-        rgb[hit] += (through * rgba[:, 3])[:, None] * colour
-        transmittance[hit] = through * (1 - rgba[:, 3])
-    rgb += transmittance[..., None] * np.asarray(background, np.float32)
-    return rgb, 1 - transmittance
+        rgb[hit] += light.add(hit, rgba[:, 3])[:, None] * colour
+    rgb += light.transmittance[..., None] * np.asarray(background, np.float32)
+    return rgb, 1 - light.transmittance
 
 
 def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:

@@ -12,6 +12,7 @@ from facefolds_core.asset import Asset
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_directions
 from facefolds_core.rendering import Hits
+from facefolds_core.rendering.compositing import FrontToBack
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 from facefolds_core.rendering.reference import Mesh, Texture, sample_texture
 from facefolds_core.scoring.metrics import Array
@@ -29,12 +30,11 @@ SECTION_RAYS = 181
 def weights(hits: Hits, textures: Sequence[Texture]) -> NDArray[np.float32]:
     """w_i = alpha_i prod_{k<i} (1 - alpha_k) of each pixel and layer, (H, W, N)."""
     result = np.zeros(hits.hit.shape, np.float32)
-    transmittance = np.ones(hits.hit.shape[:2], np.float32)
+    light = FrontToBack(hits.hit.shape[:2])
     for i, texture in enumerate(textures):
         hit = hits.hit[..., i]
         alpha = sample_texture(texture[..., 3:], hits.st[..., i, :][hit])[:, 0]
-        result[..., i][hit] = transmittance[hit] * alpha
-        transmittance[hit] *= 1 - alpha
+        result[..., i][hit] = light.add(hit, alpha)
     return result
 
 

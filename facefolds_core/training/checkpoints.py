@@ -78,19 +78,21 @@ def _state_tensors(state: TrainingState) -> dict[str, Tensor]:
     return tensors
 
 
-def save_checkpoint(state: TrainingState, mark: str, folder: Path) -> Path:
+def save_checkpoint(state: TrainingState, fingerprint: str, folder: Path) -> Path:
     """Write `checkpoint.safetensors` into `folder`, whole or not at all; replaces the one before.
 
     Args:
-        mark: the run's `fingerprint`.
+        fingerprint: the run's `fingerprint`.
     """
     path = folder / CHECKPOINT
     numbers = {"iteration": state.iteration, "seconds": state.seconds, "psnr": state.psnr}
-    write_tensors(path, _state_tensors(state), {"fingerprint": mark} | {name: repr(x) for name, x in numbers.items()})
+    write_tensors(
+        path, _state_tensors(state), {"fingerprint": fingerprint} | {name: repr(x) for name, x in numbers.items()}
+    )
     return path
 
 
-def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
+def load_checkpoint(state: TrainingState, fingerprint: str, folder: Path) -> None:
     """Continue from the checkpoint in `folder`: `state` becomes what it was when `save_checkpoint` saw it.
 
     Raises:
@@ -99,11 +101,11 @@ def load_checkpoint(state: TrainingState, mark: str, folder: Path) -> None:
     path = folder / CHECKPOINT
     remedy = f"delete {path} to train from the start, or restore the configuration that it was made with"
     tensors, metadata = read_tensors(path, remedy)
-    if metadata.get("fingerprint") != mark:
+    if metadata.get("fingerprint") != fingerprint:
         raise UserError(
             "a checkpoint of another configuration",
             file=path,
-            expected=f"fingerprint {mark}",
+            expected=f"fingerprint {fingerprint}",
             found=f"fingerprint {metadata.get('fingerprint')}",
             remedy=remedy,
         )

@@ -48,14 +48,14 @@ def learning_rates(params: MlpParams, iteration: int) -> dict[str, float]:
     }
 
 
-def model_spec(params: MlpParams, start: Start, num_frames: int, mark: str) -> ModelSpec:
+def model_spec(params: MlpParams, start: Start, num_frames: int, fingerprint: str) -> ModelSpec:
     shared = set(ModelSpec.model_fields) & set(MlpParams.model_fields)
     return ModelSpec(
         centre=SPHERE_CENTRE,
         levels=start.levels,
         radius=start.radius,
         num_frames=num_frames,
-        fingerprint=mark,
+        fingerprint=fingerprint,
         **params.model_dump(include=shared),
     )
 
@@ -117,14 +117,14 @@ class TrainingRun:
     Attributes:
         state, sampler: see there.
         spec: of the model.
-        mark: the run's `fingerprint`.
+        fingerprint: the run's `fingerprint`.
         checkpoints: folder of this run's checkpoint.
     """
 
     state: TrainingState
     sampler: RaySampler
     spec: ModelSpec
-    mark: str
+    fingerprint: str
     checkpoints: Path
 
 
@@ -139,12 +139,12 @@ def begin(scene: Scene, params: MlpParams, checkpoints: Path) -> TrainingRun:
     """
     device = pick_device(params.device)
     start = find_start(scene, params)
-    mark = fingerprint(params, scene)
-    spec = model_spec(params, start, scene.num_frames, mark)
+    own = fingerprint(params, scene)
+    spec = model_spec(params, start, scene.num_frames, own)
     state = new_state(params, spec, device)
-    run = TrainingRun(state, RaySampler(scene, state.model.centre, spec.radius, device), spec, mark, checkpoints / mark)
+    run = TrainingRun(state, RaySampler(scene, state.model.centre, spec.radius, device), spec, own, checkpoints / own)
     if (run.checkpoints / CHECKPOINT).exists():
-        load_checkpoint(state, mark, run.checkpoints)
+        load_checkpoint(state, own, run.checkpoints)
         print(f"train: continuing from iteration {state.iteration} ({run.checkpoints / CHECKPOINT})")
     else:
         _move_to_mesh(state, params, start)
@@ -208,7 +208,7 @@ def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path
         patiently(lambda: trained.save(model_folder))
     except OSError:
         with suppress(OSError):  # the one before stays
-            save_checkpoint(run.state, run.mark, run.checkpoints)
+            save_checkpoint(run.state, run.fingerprint, run.checkpoints)
         raise
     shutil.rmtree(run.checkpoints, ignore_errors=True)
     return trained.report
@@ -274,7 +274,7 @@ def _finish(run: TrainingRun, params: MlpParams, log: Path) -> float:
 def _checkpoint(run: TrainingRun) -> None:
     """Save one; where the disk fails the one before stays, and training goes on: there may be room at its end."""
     try:
-        save_checkpoint(run.state, run.mark, run.checkpoints)
+        save_checkpoint(run.state, run.fingerprint, run.checkpoints)
     except OSError as error:
         if not is_disk_error(error):
             raise

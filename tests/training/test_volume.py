@@ -49,29 +49,45 @@ def _problem(rays: int = 200) -> dict[str, np.ndarray]:
     }
 
 
-def _shade(p: dict[str, np.ndarray], veil: float, solid: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _shade(
+    p: dict[str, np.ndarray], opacity_weight: float, binarisation_weight: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     grid, rays = p["grid"], len(p["origins"])
     gradient, touched = kernel.empty_gradient(grid.shape)
-    residual, through = np.empty((rays, 3), np.float32), np.empty(rays, np.float32)
+    residual, transmittance = np.empty((rays, 3), np.float32), np.empty(rays, np.float32)
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     squares = kernel.shade(
-        *p.values(), occupied, LOWER, VOXEL, 0.7 * VOXEL, 200, gradient, touched, residual, through, veil, solid
+        *p.values(),
+        occupied,
+        LOWER,
+        VOXEL,
+        0.7 * VOXEL,
+        200,
+        gradient,
+        touched,
+        residual,
+        transmittance,
+        opacity_weight,
+        binarisation_weight,
     )
-    return gradient.sum(0), residual, through, squares
+    return gradient.sum(0), residual, transmittance, squares
 
 
 @pytest.mark.parametrize(
-    "veil, solid", [(0.0, 0.0), (PARAMS.volume.opacity_weight, PARAMS.volume.binarisation_weight), (0.02, 0.05)]
+    "opacity_weight, binarisation_weight",
+    [(0.0, 0.0), (PARAMS.volume.opacity_weight, PARAMS.volume.binarisation_weight), (0.02, 0.05)],
 )
-def test_shading_matches_autograd(veil: float, solid: float) -> None:
+def test_shading_matches_autograd(opacity_weight: float, binarisation_weight: float) -> None:
     p = _problem()
-    gradient, residual, through, squares = _shade(p, veil, solid)
+    gradient, residual, transmittance, squares = _shade(p, opacity_weight, binarisation_weight)
     tensors = {name: torch.from_numpy(value).double() for name, value in p.items()}
-    expected = reference.shade(*tensors.values(), torch.from_numpy(LOWER), VOXEL, 0.7 * VOXEL, veil, solid)
+    expected = reference.shade(
+        *tensors.values(), torch.from_numpy(LOWER), VOXEL, 0.7 * VOXEL, opacity_weight, binarisation_weight
+    )
     # Worst seen 4e-7, 6e-7 and 2e-7: the reference leaves out clear samples and what lies behind opaque ones, too.
     np.testing.assert_allclose(gradient, expected[0].numpy(), atol=5e-6)
     np.testing.assert_allclose(residual, expected[1].numpy(), atol=5e-6)
-    np.testing.assert_allclose(through, expected[2].numpy(), atol=5e-6)
+    np.testing.assert_allclose(transmittance, expected[2].numpy(), atol=5e-6)
     assert squares == pytest.approx(float(expected[3]), rel=1e-6)
 
 
@@ -79,9 +95,9 @@ def test_shading_matches_autograd(veil: float, solid: float) -> None:
 def test_shading_at_extreme_densities(density: float) -> None:
     p = _problem(50)
     p["grid"][..., 0] = density
-    gradient, _, through, squares = _shade(p, 0.1, 0.1)
+    gradient, _, transmittance, squares = _shade(p, 0.1, 0.1)
     assert np.isfinite(gradient).all() and math.isfinite(squares)
-    assert ((through >= 0) & (through <= 1)).all()
+    assert ((transmittance >= 0) & (transmittance <= 1)).all()
 
 
 def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Volume:

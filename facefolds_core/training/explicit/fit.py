@@ -14,6 +14,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
 from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
+from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.training.volume.fit import Volume, seen_share
 from facefolds_core.training.volume.outline import (
     Profile,
@@ -153,8 +154,8 @@ def fit_window(volume: Volume, centre: Array, vertices: Array | None, params: St
     """Box around the directions that hold the subject: the volume's, and those of mesh vertices (K, V, 3) before c."""
     uv = np.linspace(-1, 1, 192)
     directions, least = window_directions(FULL_WINDOW, len(uv), len(uv)), params.subject_opacity
-    solid = profile(volume, centre, directions, least).opacity >= least
-    held = [np.stack(np.meshgrid(uv[::-1], uv, indexing="ij"), -1)[solid]]
+    opaque = profile(volume, centre, directions, least).opacity >= least
+    held = [np.stack(np.meshgrid(uv[::-1], uv, indexing="ij"), -1)[opaque]]
     if vertices is not None:
         offset = vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3) - centre
         offset = offset[offset[:, 0] > 0]
@@ -265,8 +266,7 @@ def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
     Returns:
         (rows, columns) to be added to the middle radius, units.
     """
-    before = np.cumprod(np.concatenate([np.ones_like(alpha[..., :1]), 1 - alpha[..., :-1]], -1), -1)
-    weights = (alpha * before).astype(np.float64)
+    weights = (alpha * transmittance_before(alpha, -1)).astype(np.float64)
     mass = weights.sum(-1)
     middle = 0.5 * (radii[..., 0] + radii[..., -1])
     moment = (weights * (radii - middle[..., None])).sum(-1)

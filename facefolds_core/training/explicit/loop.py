@@ -226,7 +226,7 @@ class _Trainer:
         rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
-    def result(self, mark: str) -> tuple[RadianceManifolds, ExplicitSpec]:
+    def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""
         assert self.state is not None
         state, n = self.state, self.params.layers
@@ -262,7 +262,7 @@ class _Trainer:
             texels=(h, w),
             num_layers=last - first + 1,
             num_frames=self.scene.num_frames,
-            fingerprint=mark,
+            fingerprint=fingerprint,
         )
         return RadianceManifolds(manifolds, textures), spec
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.model.compositing import compositing_weights, transmittances
 from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2, EPSILON
 from facefolds_core.training.explicit.shading_kernel import OPAQUE
 
@@ -34,11 +34,10 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
 
 
-def visible(alpha: Tensor, faint: float) -> Tensor:
-    """[R, N] bool: layers with at least `faint` of alpha that do not lie behind less transmittance than OPAQUE."""
-    through = (1 - torch.where(alpha >= faint, alpha, 0.0)).cumprod(1)
-    before = torch.cat([torch.ones_like(alpha[:, :1]), through[:, :-1]], 1)
-    return (alpha >= faint) & (before >= OPAQUE)
+def visible(alpha: Tensor, min_alpha: float) -> Tensor:
+    """[R, N] bool: layers with at least `min_alpha` of alpha that do not lie behind less transmittance than OPAQUE."""
+    before, _ = transmittances(torch.where(alpha >= min_alpha, alpha, 0.0))
+    return (alpha >= min_alpha) & (before >= OPAQUE)
 
 
 def contributions(codes: Tensor, texture: Tensor) -> Tensor:
@@ -48,7 +47,7 @@ def contributions(codes: Tensor, texture: Tensor) -> Tensor:
     y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
     j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
     alpha = look_up(codes, texture)[..., 3]
-    before = torch.cat([torch.ones_like(alpha[:, :1]), (1 - alpha).cumprod(1)[:, :-1]], 1)
+    before, _ = transmittances(alpha)
     n = torch.arange(layers, device=texture.device).expand_as(i)
     hit = (codes[..., 0] > 0) & visible(alpha, 0.0)
     peak = texture.new_zeros(height * width * layers)
@@ -65,23 +64,25 @@ def shade(
     target: Tensor,  # [R, 3] in [0, 1]
     background: Tensor,  # [R, 3]
     texture: Tensor,  # [H, W, N, 4]
-    veil: float,
-    solid: float,
+    opacity_weight: float,
+    binarisation_weight: float,
     rate: float,
-    faint: float,
+    min_alpha: float,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
     texture = texture.detach().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
-        alpha = torch.where(visible(rgba[..., 3].detach(), faint), rgba[..., 3], 0.0)
-        weights, through = compositing_weights(alpha)
-        colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * background
+        alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha), rgba[..., 3], 0.0)
+        weights, transmittance = compositing_weights(alpha)
+        colour = (weights[..., None] * rgba[..., :3]).sum(1) + transmittance[:, None] * background
         squares = (colour - target).square().sum()
-        nearly = through.clamp(max=0.5)
-        loss = 0.5 * squares + (veil * (1 - through) + solid * nearly * (1 - nearly)).sum()
+        nearly = transmittance.clamp(max=0.5)
+        loss = (
+            0.5 * squares + (opacity_weight * (1 - transmittance) + binarisation_weight * nearly * (1 - nearly)).sum()
+        )
         (gradient,) = torch.autograd.grad(loss, texture)
-    moved = background - rate * (through**3)[:, None] * (colour - target)
+    moved = background - rate * (transmittance**3)[:, None] * (colour - target)
     return gradient, moved.detach().clamp(0, 1), squares.detach()
 
 

@@ -48,12 +48,14 @@ def shade(  # type: ignore[no-untyped-def]
     background,  # (C, H W, 3) float32, updated in place
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
     gradient,  # (N, H, W, 4), added to
-    veil,  # weight of opacity
-    solid,  # weight of rays that are nearly, but not quite, opaque
+    opacity_weight,  # weight of opacity
+    binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
     rate,  # of the background
-    faint,  # layers with less alpha are left out
+    min_alpha,  # layers with less alpha are left out
 ):
-    """Differentiates the sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid t (1 - t), t = min(T, 1/2).
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t).
+
+    T is the transmittance, t = min(T, 1/2).
 
     Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     C = sum_i w_i c_i + T B. Each pixel's background moves by -rate T^3 (C - I): in proportion to the cube of the
@@ -63,7 +65,7 @@ def shade(  # type: ignore[no-untyped-def]
     squares = np.zeros((count + BLOCK - 1) // BLOCK)
     index = np.empty((layers, CHUNK), np.int32)
     wish = np.empty((layers, CHUNK, 6), np.float32)
-    prices = (np.float32(veil), np.float32(solid), np.float32(rate), np.float32(faint))
+    terms = (np.float32(opacity_weight), np.float32(binarisation_weight), np.float32(rate), np.float32(min_alpha))
     for start in range(0, count, CHUNK):
         own = min(CHUNK, count - start)
         for block in prange((own + BLOCK - 1) // BLOCK):
@@ -76,7 +78,7 @@ def shade(  # type: ignore[no-untyped-def]
                 images,
                 background,
                 texture,
-                prices,
+                terms,
                 index[:, first:last],
                 wish[:, first:last],
             )
@@ -98,14 +100,14 @@ def _shade(
     images: Any,
     background: Any,
     texture: Any,
-    prices: Any,
+    terms: Any,
     index: Any,
     wish: Any,
 ) -> Any:
     """A block of R rays: texels before their crossings (N, R), -1 where there is none, and what is wanted there
     (N, R, 6): fractions of row and column, gradient of rgba. Returns the sum of |C - I|^2."""
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    veil, solid, rate, faint = prices
+    opacity_weight, binarisation_weight, rate, min_alpha = terms
     one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
     layer = np.empty(layers, np.int64)
     c = np.empty((layers, 4), np.float32)
@@ -113,7 +115,7 @@ def _shade(
     total = 0.0
     for k in range(rays.shape[0]):
         p = rays[k]
-        through, r0, r1, r2 = one, zero, zero, zero
+        transmittance, r0, r1, r2 = one, zero, zero, zero
         m = 0
         for n in range(layers):
             index[n, k] = -1
@@ -123,34 +125,34 @@ def _shade(
             j, b = _corner(codes[p, n, 0], width)
             i, a = _corner(codes[p, n, 1], height)
             alpha = _tap(texture, i, j, n, 3, a, b)
-            if alpha < faint:
+            if alpha < min_alpha:
                 continue
             index[n, k] = i * width + j
             wish[n, k, 0], wish[n, k, 1] = a, b
             for q in range(3):
                 c[m, q] = _tap(texture, i, j, n, q, a, b)
             c[m, 3] = alpha
-            layer[m], before[m] = n, through
-            light = through * alpha
+            layer[m], before[m] = n, transmittance
+            light = transmittance * alpha
             r0 += light * c[m, 0]
             r1 += light * c[m, 1]
             r2 += light * c[m, 2]
-            through *= one - alpha
+            transmittance *= one - alpha
             m += 1
-            if through < OPAQUE:
+            if transmittance < OPAQUE:
                 break
         cam, pix = camera[p], pixel[p]
         s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
-        d0 = r0 + through * s0 - images[cam, pix, 0] * inverse
-        d1 = r1 + through * s1 - images[cam, pix, 1] * inverse
-        d2 = r2 + through * s2 - images[cam, pix, 2] * inverse
+        d0 = r0 + transmittance * s0 - images[cam, pix, 0] * inverse
+        d1 = r1 + transmittance * s1 - images[cam, pix, 1] * inverse
+        d2 = r2 + transmittance * s2 - images[cam, pix, 2] * inverse
         total += d0 * d0 + d1 * d1 + d2 * d2
-        step = rate * through * through * through
+        step = rate * transmittance * transmittance * transmittance
         background[cam, pix, 0] = min(max(s0 - step * d0, zero), one)
         background[cam, pix, 1] = min(max(s1 - step * d1, zero), one)
         background[cam, pix, 2] = min(max(s2 - step * d2, zero), one)
         # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
-        push = veil - solid * max(one - 2 * through, zero)
+        push = opacity_weight - binarisation_weight * max(one - 2 * transmittance, zero)
         rest = one
         for q in range(m - 1, -1, -1):
             n, alpha, light = layer[q], c[q, 3], before[q]
@@ -176,13 +178,13 @@ def contributions(codes, rays, texture, peak):  # type: ignore[no-untyped-def]
         own = min(CHUNK, count - start)
         for k in prange(own):
             p = rays[start + k]
-            through = np.float32(1.0)
+            transmittance = np.float32(1.0)
             for n in range(layers):
-                before[n, k] = through if through >= OPAQUE else np.float32(0.0)
-                if codes[p, n, 0] > 0 and through >= OPAQUE:
+                before[n, k] = transmittance if transmittance >= OPAQUE else np.float32(0.0)
+                if codes[p, n, 0] > 0 and transmittance >= OPAQUE:
                     j, b = _corner(codes[p, n, 0], width)
                     i, a = _corner(codes[p, n, 1], height)
-                    through *= 1 - _tap(texture, i, j, n, 3, a, b)
+                    transmittance *= 1 - _tap(texture, i, j, n, 3, a, b)
         for task in prange(layers):
             n = spread(task, layers)
             for k in range(own):

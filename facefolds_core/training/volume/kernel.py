@@ -88,11 +88,13 @@ def shade(  # type: ignore[no-untyped-def]
     gradient,  # (PARTS, X, Y, Z, 4), added to
     touched,  # (PARTS, X, Y) bool, set where the gradient is added to
     residual,  # (R, 3) out: C - I
-    through,  # (R,) out: transmittance
-    veil,  # weight of opacity
-    solid,  # weight of rays that are nearly, but not quite, opaque
+    transmittance,  # (R,) out: transmittance
+    opacity_weight,  # weight of opacity
+    binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
 ):
-    """Differentiates the sum over rays of 0.5 |C - I|^2 + veil (1 - T) + solid t (1 - t), t = min(T, 1/2).
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t).
+
+    T is the transmittance, t = min(T, 1/2).
 
     A sample has alpha = 1 - exp(-softplus(raw) step / voxel). Returns the sum of |C - I|^2.
     """
@@ -138,14 +140,14 @@ def shade(  # type: ignore[no-untyped-def]
                     c[q] += t * a * value[q + 1]
                 t *= 1 - a
                 m += 1
-            through[r] = t
+            transmittance[r] = t
             behind = np.empty(3, np.float32)
             for q in range(3):
                 behind[q] = background[r, q]
                 residual[r, q] = c[q] + t * background[r, q] - target[r, q]
                 total += residual[r, q] * residual[r, q]
             # From the back: `behind` is the colour, `after` the transmittance of all that lies behind sample n.
-            push = np.float32(veil - solid * max(1 - 2 * t, np.float32(0.0)))
+            push = np.float32(opacity_weight - binarisation_weight * max(1 - 2 * t, np.float32(0.0)))
             after = np.float32(1.0)
             for n in range(m - 1, -1, -1):
                 a, light = alpha[n], before[n]

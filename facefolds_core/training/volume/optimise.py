@@ -74,7 +74,7 @@ def _shade(
     binarisation_weight: float,
 ) -> tuple[float, Array, Array]:
     """`kernel.shade` with steps of so many voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
-    residual, through = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
+    residual, transmittance = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
     samples = int(math.sqrt(3) * max(grid.shape) / step) + 2
     squares: float = kernel.shade(
         rays.origins,
@@ -91,11 +91,11 @@ def _shade(
         gradient,
         touched,
         residual,
-        through,
+        transmittance,
         opacity_weight,
         binarisation_weight,
     )
-    return squares, residual, through
+    return squares, residual, transmittance
 
 
 def clear(
@@ -152,7 +152,7 @@ def train(
         part = Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
         jitter = random.random(count, np.float32)
         behind = room.look(origins, directions, jitter)
-        squares, residual, through = _shade(
+        squares, residual, transmittance = _shade(
             grid[0],
             occupied,
             lower,
@@ -171,7 +171,7 @@ def train(
         scale = 1 - 0.9 * i / level.iterations if last else 1.0
         bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
-        room.step(behind, through[:, None] * residual, scale, *rates)
+        room.step(behind, transmittance[:, None] * residual, scale, *rates)
         kernel.adam_step(grid, gradient, touched, share, *rates, bias1, bias2, params.smoothness_weight)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.model.compositing import compositing_weights, transmittances
 from facefolds_core.training.volume.kernel import CLEAR, OPAQUE
 
 
@@ -34,8 +34,8 @@ def shade(
     lower: Tensor,  # [3]
     voxel: float,
     step: float,
-    veil: float,
-    solid: float,
+    opacity_weight: float,
+    binarisation_weight: float,
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """As `kernel.shade` with all blocks occupied.
 
@@ -52,12 +52,12 @@ def shade(
     rgba = sample(grid, origins[:, None] + s[..., None] * directions[:, None], lower, voxel)
     alpha = 1 - torch.exp(-torch.nn.functional.softplus(rgba[..., 0]) * step / voxel)
     alpha = torch.where((s < far[:, None]) & (alpha >= CLEAR), alpha, 0.0)
-    before = torch.cat([torch.ones_like(alpha[:, :1]), (1 - alpha.detach()).cumprod(1)[:, :-1]], 1)
+    before, _ = transmittances(alpha.detach())
     alpha = torch.where(before >= OPAQUE, alpha, 0.0)
-    weights, through = compositing_weights(alpha)
-    residual = (weights[..., None] * rgba[..., 1:]).sum(1) + through[:, None] * background - target
+    weights, transmittance = compositing_weights(alpha)
+    residual = (weights[..., None] * rgba[..., 1:]).sum(1) + transmittance[:, None] * background - target
     squares = residual.square().sum()
-    nearly = through.clamp(max=0.5)
-    loss = 0.5 * squares + (veil * (1 - through) + solid * nearly * (1 - nearly)).sum()
+    nearly = transmittance.clamp(max=0.5)
+    loss = 0.5 * squares + (opacity_weight * (1 - transmittance) + binarisation_weight * nearly * (1 - nearly)).sum()
     (gradient,) = torch.autograd.grad(loss, grid)
-    return gradient, residual.detach(), through.detach(), squares.detach()
+    return gradient, residual.detach(), transmittance.detach(), squares.detach()
