@@ -273,5 +273,11 @@ def _resample(values: Tensor, old: tuple[int, int], new: tuple[int, int]) -> Ten
     """[B, M, ...] on one grid -> the same on another, bilinear between texel centres."""
     rest = values.shape[2:]
     image = values.reshape(len(values), *old, -1).permute(0, 3, 1, 2)
-    image = torch.nn.functional.interpolate(image, size=new, mode="bilinear", align_corners=False)
+    # torch rounds the ends of what a thread gets differently: on one thread the result is that of any number of cores.
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        image = torch.nn.functional.interpolate(image, size=new, mode="bilinear", align_corners=False)
+    finally:
+        torch.set_num_threads(threads)
     return image.permute(0, 2, 3, 1).reshape(len(values), -1, *rest).contiguous()
