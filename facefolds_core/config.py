@@ -49,6 +49,13 @@ def read_train(folder: Path) -> TrainParams:
     return _read(TypeAdapter[TrainParams](TrainSection), folder / "train.json")
 
 
+class LevelResolutions(Section):
+    """`levels.json`: what `decimate` needs to know of the coarser levels of detail (`compress.levels`)."""
+
+    mesh_resolutions: tuple[int, ...]
+    """R^m of each, no number twice."""
+
+
 def read_level_resolutions(folder: Path) -> tuple[int, ...]:
-    """R^m of the coarser levels of detail (`compress.levels`), each once: all that `decimate` needs to know of them."""
-    return _read(TypeAdapter(tuple[int, ...]), folder / "levels.json")
+    """R^m of the coarser levels of detail, each once."""
+    return _read(TypeAdapter(LevelResolutions), folder / "levels.json").mesh_resolutions

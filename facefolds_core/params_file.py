@@ -147,7 +147,8 @@ def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
     core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
     values: dict[str, Any] = {"subject": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
-    values["levels"] = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
+    resolutions = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
+    values["levels"] = {"mesh_resolutions": resolutions}
     for name, value in values.items():
         write_json(folder / f"{name}.json", value)
     return [folder / f"{name}.json" for name in values]

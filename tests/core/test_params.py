@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-from facefolds_core.config import read_stage, read_subject, read_train
+from facefolds_core.config import read_level_resolutions, read_stage, read_subject, read_train
 from facefolds_core.errors import UserError
 from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
 from facefolds_core.params_file import load_params, write_configs
@@ -113,3 +114,13 @@ def test_a_garbled_stage_config_is_a_user_error(tmp_path: Path) -> None:
     (tmp_path / "texture.json").write_text("{")
     with pytest.raises(UserError, match=r"texture\.json"):
         read_stage(TextureParams, tmp_path)
+
+
+def test_every_file_of_the_configuration_is_an_object(tmp_path: Path) -> None:
+    """The report reads them all."""
+    levels = "[{name: small, mesh_resolution: 16, texture_resolution: 64, crf: 30}]"
+    path = tmp_path / "params.yaml"
+    path.write_text(f"subjects: {{a: {{source: actor, path: x}}}}\ncompress: {{levels: {levels}}}\n")
+    written = write_configs(load_params(path), "a", tmp_path / "config")
+    assert {type(json.loads(file.read_text())) for file in written} == {dict}
+    assert read_level_resolutions(tmp_path / "config") == (16,)
