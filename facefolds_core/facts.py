@@ -1,7 +1,7 @@
 """What a user should know of a step: records, with one place that words them.
 
-A scene says what of its capture it left out, a training what happened to it. Code asks a fact's kind and values; people
-read `str(fact)`. Files hold both: the record, and its words beside it.
+A scene says what of its capture it left out, a training why it chose as it did and what happened to it. Code asks a
+fact's kind and values; people read `str(fact)`. Files hold both: the record, and its words beside it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,17 @@ WORDS = {
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
-    # of a training
+    # of a training: why it chose as it did
+    "centre_chosen": "centre: of the candidates whose hemispheres lose least of the visible surface, within {tie:.0%}, "
+    "the one farthest back (it loses {lost:.1%})",
+    "window_chosen": "window: directions in which the volume is at least {opacity:.0%} opaque (and the tracked mesh, "
+    "where there is one), and {margin} on each side",
+    "middle_from_volume": "middle radius: the volume, where half of its opacity is reached from outside",
+    "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the volume lies over {reach} "
+    "outside it",
+    "halfwidth_chosen": "halfwidth: {least}, more where the volume is blurred or far from the middle, at most {most}",
+    "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
+    # of a training: what happened
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
     "the others see as the median camera does; check its calibration",
     "gains": "cameras differ in exposure or white balance; taken out: gains r {r[0]:.2f} to {r[1]:.2f}, "

@@ -123,10 +123,7 @@ def context(subject: Subject) -> dict[str, Any]:
         **layers(subject),
         "textures": textures(subject.asset),
         "curves": curves(facts),
-        "fit_notes": [
-            *(facts.fit or {}).get("reasons", []),
-            *(worded(event) for event in (facts.fit or {}).get("events", [])),
-        ],
+        "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "waterfall": tables.waterfall(facts.waterfall),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),

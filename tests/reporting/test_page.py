@@ -62,7 +62,11 @@ def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
 
 
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
-    assert "centre: &lt;the middle&gt;" in page_of(subject)
+    assert "level 3: &lt;diverged&gt;" in page_of(subject)
+
+
+def test_what_was_fitted_is_worded(subject: SubjectFolders) -> None:
+    assert "<li>texels: 1.5 pixels each" in page_of(subject)
 
 
 @pytest.mark.parametrize(

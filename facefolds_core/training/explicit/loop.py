@@ -275,7 +275,7 @@ class _Trainer:
             "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
             "layers": spec.num_layers,
             "texels": list(spec.texels),
-            "reasons": list(self.fit.reasons),
+            "reasons": [reason.to_json() for reason in self.fit.reasons],
             "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
             "volume_psnr": self.fit.volume_psnr,
             "cameras": self.cameras.summary,
