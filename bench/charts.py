@@ -282,8 +282,9 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
         axes.legend(loc="lower right")
 
 
-def waterfall(found: Mapping[str, Sequence[Mapping[str, Any]]], path: Path) -> None:
+def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """A row of bars a subject: PSNR against the photos, what each step gained or lost, and the bytes."""
+    found = {name: [row for row in rows if row["subject"] == name] for name in sorted({r["subject"] for r in rows})}
     with figure_of(path, 9, 4.2 * len(found), dpi=120) as figure:
         for axes, (subject, steps) in zip(figure.subplots(len(found), squeeze=False)[:, 0], found.items(), strict=True):
             values = [step["psnr"] for step in steps]

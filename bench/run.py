@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from facefolds_core.scoring.perceptual import Perceptual
 
 Sections = Mapping[str, Mapping[str, Any]]
-STAGES = (
-    *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
-    *("decimate", "texture", "bake", "compress", "evaluate"),
-)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,9 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from facefolds_core.cli import COMMANDS, app, view
+from facefolds_core.files import read_json
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.waterfall import STEPS
 from facefolds_core.sweeps.table import read_runs
 from tests.pipeline.tiny import TinyProject
 
@@ -76,6 +79,14 @@ def test_report(project: TinyProject) -> None:
     assert [name for name in written if f">{name}<" not in page] == []
     scores = json.loads((project.root / "data" / "actor" / "metrics.json").read_text())
     assert f"{scores['asset']['psnr_subject']:.2f}" in page
+
+
+def test_waterfall(project: TinyProject) -> None:
+    facefolds("waterfall", "--frames", "1")
+    steps = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)["steps"]
+    assert [step["name"] for step in steps] == list(STEPS)
+    shipped = json.loads((project.root / ASSET / "manifest.json").read_text())["levels"][-1]
+    assert steps[-1]["mesh_bytes"] == sum(layer["bytes"] for layer in shipped["layers"])
 
 
 def test_view(project: TinyProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,5 +78,5 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
         {"name": name, "psnr": 25.0 - i, "triangles": 0, "mesh_bytes": 0, "texture_bytes": i}
         for i, name in enumerate(STEPS)
     ]
-    write_json(folders.root / "waterfall" / "waterfall.json", {"subject": "spheres", "steps": steps})
+    write_json(folders.waterfall, {"subject": "spheres", "steps": steps})
     return folders
