@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from facefolds_core.params.base import Count, Factor, Length, Many, Pixels, Rate, Section, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Length, Many, Pixels, Rate, Section, Share, Weight
 
 
 class VolumeLevel(Section):
@@ -55,6 +55,13 @@ class VolumeParams(Section):
 
     colour_learning_rate: Rate = 0.03
     """Of colours, Adam's."""
+
+    final_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """To this part of themselves both rates fall along the last level."""
+
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps. The second is lower than the usual 0.999:
+    there are 240 steps."""
 
     rays: Count = 16384
     """In one step."""
@@ -114,6 +121,9 @@ class RoomParams(Section):
     smoothness_weight: Weight = 0.001
     """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
 
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
+
 
 class SubjectParams(Section):
     """Which part of the volume is the subject: the body at the cameras' common centre, without the room it touches."""
@@ -161,6 +171,9 @@ class EnvironmentParams(Section):
 
     learning_rate: Rate = 0.02
     """Of its colours, Adam's."""
+
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
 
 
 class WarningParams(Section):

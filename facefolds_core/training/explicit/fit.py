@@ -91,7 +91,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     middle = extrapolate(known).clip(geometry.min_radius)
     widths = spread(seen, middle, geometry, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
-    radius = float(np.quantile(middle[opacity >= start.subject_opacity], 0.9))
+    radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         centre=centre,
