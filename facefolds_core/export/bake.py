@@ -120,13 +120,13 @@ class Baker:
         sheets: that they came from.
         rays: of the training cameras.
         size: texels a side of the shipped textures.
-        damping: in a step's denominator, see `BakeParams`.
+        params: `damping` and `min_light` of the steps.
     """
 
     def __init__(
-        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, damping: float = _USUAL.damping
+        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, params: BakeParams = _USUAL
     ) -> None:
-        self.rays, self._damping = rays, damping
+        self.rays, self._params = rays, params
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
         self._sums: Float = np.zeros((len(meshes), size, size, 6), np.float32)
 
@@ -147,8 +147,8 @@ class Baker:
         values = moved.astype(np.float32) / np.float32(255)
         shown = values.copy()
         for _ in range(iterations):
-            accumulate(self.rays.shipped, target, shown, self._sums)
-            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._damping, shown.reshape(-1, 4))
+            accumulate(self.rays.shipped, target, shown, self._sums, self._params.min_light)
+            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._params.damping, shown.reshape(-1, 4))
         return np.stack([_finished(image) for image in shown])
 
 

@@ -49,7 +49,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "sweeps/recommend.py": ("INDIFFERENT",),
     },
     "compiled in: part of a kernel's machine code and its tests; a kernel with arguments instead was not measured": {
-        "export/bake_kernel.py": ("OPAQUE", "_scatter"),
+        "export/bake_kernel.py": ("_scatter",),
         "export/hold_kernel.py": ("_scatter",),
         "scatter.py": ALL,
         "export/collapse_kernel.py": ("TERMS", "MOST_NEIGHBOURS"),
