@@ -19,13 +19,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.export.bake_kernel import SCALE, accumulate, render, true_positions, update
+from facefolds_core.export.bake_kernel import accumulate, render, true_positions, update
 from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.hit_codes import encode
 from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.rendering.raster import cast_mesh
@@ -91,7 +92,7 @@ def cast_codes(camera: Camera, meshes: Sequence[TexturedMesh]) -> Codes:
         hit = np.zeros((camera.height, camera.width), bool)
         st = np.zeros((camera.height, camera.width, 2), np.float32)
         cast_mesh(camera, mesh, hit, st)
-        codes[hit.reshape(-1), layer] = np.rint(1 + SCALE * st[hit].clip(0, 1))
+        codes[hit.reshape(-1), layer] = encode(st[hit])
     return codes
 
 

@@ -8,22 +8,11 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
-SCALE = 65534.0
-"""Texture coordinates in 16 bits: code = 1 + SCALE s, 0 where a ray misses the layer."""
-
-
 _scatter = scatter_of(6)
-
-
-@inlined
-def _corner(code, size):  # type: ignore[no-untyped-def]
-    """16-bit texture coordinate -> index of the texel before it, and the fraction beyond its centre; clamped."""
-    x = min(max((code - 1) * (size / SCALE) - 0.5, 0.0), size - 1.0)
-    i = min(int(x), size - 2)
-    return i, np.float32(x - i)
 
 
 @inlined
@@ -46,8 +35,8 @@ def render(codes, texture, out):  # type: ignore[no-untyped-def]
         for n in range(codes.shape[1]):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             alpha = _tap(texture, n, i, j, 3, a, b) * scale
             weight = through * alpha * scale
             r0 += weight * _tap(texture, n, i, j, 0, a, b)
@@ -110,8 +99,8 @@ def _residuals(codes: Any, target: Any, texture: Any, min_light: Any, index: Any
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             alpha = _tap(texture, n, i, j, 3, a, b)
             if alpha <= zero:
                 continue

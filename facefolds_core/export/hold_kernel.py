@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.export.bake_kernel import _corner, _tap
+from facefolds_core.export.bake_kernel import _tap
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
@@ -51,8 +52,8 @@ def _weigh(codes: Any, texture: Any, min_light: Any, index: Any, wish: Any) -> N
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             index[n, p] = i * width + j
             wish[n, p, 0], wish[n, p, 1] = a, b
             layer[m], before[m] = n, through

@@ -28,7 +28,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "captures/sources/transforms.py": ("FPS", "PIXEL_CENTRES"),
         "pictures.py": ALL,
         "engines/godot.py": ("FORMAT", "VERSION"),
-        "export/bake_kernel.py": ("SCALE",),
+        "hit_codes.py": ("SCALE",),
         "export/between.py": ("GREY",),
         "geometry/sphere_uv.py": ("FULL_WINDOW",),
         "model/storage.py": ("SCALES_1",),

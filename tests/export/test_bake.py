@@ -10,13 +10,14 @@ import torch
 
 from facefolds_core.export import bake_reference
 from facefolds_core.export.bake import Baker, cast_codes, gather_rays, reproject, reprojection
-from facefolds_core.export.bake_kernel import SCALE, accumulate, render, update
+from facefolds_core.export.bake_kernel import accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.sampling import sample_grids, texture_rows
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
+from facefolds_core.hit_codes import SCALE
 from facefolds_core.params import BakeParams
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import look_at_origin

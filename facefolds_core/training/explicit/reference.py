@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
 from facefolds_core.training.adam import EPSILON, Betas
 
@@ -18,8 +19,8 @@ def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: 
 def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     """Bilinear rgba [R, N, 4] at 16-bit positions [R, N, 2] (int32); alpha 0 where missed (code 0)."""
     height, width, layers, _ = texture.shape
-    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
-    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    x = ((codes[..., 0] - 1) * (width / SCALE) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / SCALE) - 0.5).clamp(0, height - 1)
     j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
     b, a = (x - j)[..., None], (y - i)[..., None]
     flat = texture.reshape(-1, 4)
@@ -42,8 +43,8 @@ def visible(alpha: Tensor, min_alpha: float, min_light: float) -> Tensor:
 def contributions(codes: Tensor, texture: Tensor, min_light: float) -> Tensor:
     """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [N, H, W]."""
     height, width, layers, _ = texture.shape
-    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
-    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    x = ((codes[..., 0] - 1) * (width / SCALE) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / SCALE) - 0.5).clamp(0, height - 1)
     j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
     alpha = look_up(codes, texture)[..., 3]
     before, _ = transmittances(alpha)

@@ -10,20 +10,13 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
 Array = NDArray[Any]
 
 _scatter = scatter_of(4)
-
-
-@inlined
-def _corner(code, size):  # type: ignore[no-untyped-def]
-    """16-bit position over the window -> index of the texel before it, and the fraction beyond its centre."""
-    x = min(max((code - 1) * (size / 65534.0) - 0.5, 0.0), size - 1.0)
-    i = min(int(x), size - 2)
-    return i, np.float32(x - i)
 
 
 @inlined
@@ -36,7 +29,7 @@ def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
 
 @kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
-    codes,  # (P, N, 2) uint16: 1 + 65534 s, 1 + 65534 t of the crossing with each layer; 0 where missed
+    codes,  # (P, N, 2) uint16 (`hit_codes`): crossings with each layer
     camera,  # (P,) int32
     pixel,  # (P,) int32
     rays,  # (R,) int64, which of the P to shade, none twice
@@ -125,8 +118,8 @@ def _shade(
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             alpha = _tap(texture, i, j, n, 3, a, b)
             if alpha < min_alpha:
                 continue
@@ -185,8 +178,8 @@ def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-unt
             for n in range(layers):
                 before[n, k] = transmittance if transmittance >= min_light else np.float32(0.0)
                 if codes[p, n, 0] > 0 and transmittance >= min_light:
-                    j, b = _corner(codes[p, n, 0], width)
-                    i, a = _corner(codes[p, n, 1], height)
+                    j, b = corner(codes[p, n, 0], width)
+                    i, a = corner(codes[p, n, 1], height)
                     transmittance *= 1 - _tap(texture, i, j, n, 3, a, b)
         for task in prange(layers):
             n = spread(task, layers)
@@ -194,8 +187,8 @@ def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-unt
                 p = rays[start + k]
                 if codes[p, n, 0] == 0 or before[n, k] == 0:
                     continue
-                j, b = _corner(codes[p, n, 0], width)
-                i, a = _corner(codes[p, n, 1], height)
+                j, b = corner(codes[p, n, 0], width)
+                i, a = corner(codes[p, n, 1], height)
                 for tap in range(4):
                     di, dj = tap >> 1, tap & 1
                     w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]
