@@ -30,7 +30,7 @@ COMMANDS = {
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
-EXTRAS = {"report": "report", "waterfall": "pipeline", "collect": "pipeline", "recommend": "pipeline"}
+EXTRAS = {"report": "report", "waterfall": "train", "collect": "pipeline", "recommend": "pipeline"}
 """Commands that need more than the base -> the extra that brings it."""
 
 
