@@ -14,6 +14,7 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import ActorOptions, frame_times, make_rig, render
 from facefolds_core.captures.assembly import plan_scene, write_plan
@@ -90,6 +91,12 @@ def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **su
     capture = SOURCES[source].read(root, entry, CaptureParams())
     params = NormalizeParams()
     return write_plan(plan_scene(capture, "filmed", entry, params, folder), params)
+
+
+def save_jpeg(path: Path, image: Image) -> None:
+    """As good as JPEG gets: 48 dB and more."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Pillow.fromarray(image).save(path, quality=100, subsampling=0)
 
 
 def relating(found: list[Camera], expected: list[Camera]) -> Similarity:

@@ -25,6 +25,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "captures/krt.py": ALL,
         "captures/sources/multiface.py": ALL,
         "captures/scene.py": ALL,
+        "captures/sources/actorshq.py": ALL,
         "captures/sources/transforms.py": ("FPS", "PIXEL_CENTRES"),
         "pictures.py": ALL,
         "engines/godot.py": ("FORMAT", "VERSION"),
