@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 from unittest.mock import patch
 
 import numpy as np
@@ -116,7 +117,7 @@ def check_same(
     names: Mapping[str, str] | None = None,
     *,
     lossless: bool = True,
-    mattes: bool = False,
+    mattes: Literal["", "held", "all"] = "",
     tolerance: float = 1e-6,
 ) -> None:
     """AssertionError unless the scene has all cameras and frames of the film, and its pixels.
@@ -124,7 +125,7 @@ def check_same(
     Args:
         names: the scene's name of a camera -> the film's; None where they are the same.
         lossless: pixels must be equal; else PSNR > 45 dB, each picture.
-        mattes: the held-out cameras' must be there, too, and equal (lossless) or within 45 dB.
+        mattes: the held-out cameras' masks, or all cameras' mattes too, must be equal (lossless) or within 45 dB.
         tolerance: of w2c (median distance of the cameras: 1) and of K over the picture's width.
     """
     by_name = {camera.name: c for c, camera in enumerate(truth.cameras)}
@@ -149,12 +150,16 @@ def check_same(
                 store.image(i, k), truth.images[c, k], lossless, f"camera {scene.cameras[i].name}, frame {k}"
             )
     if mattes:
-        masks = scene.open_masks()
-        assert masks is not None, "no mattes"
-        for i in scene.indices("holdout"):
+        masks, all_mattes = scene.open_masks(), scene.open_mattes()
+        assert masks is not None, "no masks"
+        for i in range(len(order)):
             for k in range(truth.frames):
                 place = f"matte of camera {scene.cameras[i].name}, frame {k}"
-                _check_picture(masks.image(i, k)[..., 0], truth.mattes[order[i], k], lossless, place)
+                if scene.splits[i] == "holdout":
+                    _check_picture(masks.image(i, k)[..., 0], truth.mattes[order[i], k], lossless, place)
+                if mattes == "all":
+                    assert all_mattes is not None, "no mattes"
+                    _check_picture(all_mattes.image(i, k)[..., 0], truth.mattes[order[i], k], lossless, place)
 
 
 def _check_picture(found: Image, expected: Image, lossless: bool, place: str) -> None:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
-from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera, check_camera
@@ -22,7 +22,7 @@ from facefolds_core.params import Subject
 from facefolds_core.reading import is_folder
 
 Array = NDArray[np.float64]
-Photos = Mapping[str, Mapping[str, Path]]
+Photos = Mapping[str, Mapping[str, Picture]]
 """Camera -> frame -> picture."""
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -62,9 +62,9 @@ def natural(path: Path | str) -> tuple[tuple[int, int | str], ...]:
     return tuple((0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part)
 
 
-def pictures_in(folder: Path) -> dict[str, Path]:
+def pictures_in(folder: Path) -> dict[str, Picture]:
     """Stem -> PNG or JPEG file."""
-    return {path.stem: path for path in inside(folder) if path.suffix.lower() in SUFFIXES}
+    return {path.stem: FilePicture(path) for path in inside(folder) if path.suffix.lower() in SUFFIXES}
 
 
 def gather(
@@ -83,7 +83,7 @@ def gather(
     Args:
         photos: all pictures, also of cameras that nobody calibrated.
         subject: its `frames`, `fps` and `pixel_centres` are used.
-        masks: true opacity, where the layout has it.
+        masks: opacity, where the layout has it: training may use it, held-out pictures are scored by it.
         fps: where the subject leaves it null.
         pixel_centres: of the layout, likewise.
 
@@ -105,7 +105,7 @@ def gather(
     sizes = {}
     for one in used:
         frame, picture = next(iter(photos[one.name].items()))
-        sizes[one.name] = image_size(picture, f"camera {one.name}, frame {frame}")
+        sizes[one.name] = picture.size(f"camera {one.name}, frame {frame}")
     common = Counter(sizes.values()).most_common(1)[0][0]
     facts += [
         fact("other_size", camera=name, size=list(size), common=list(common))
@@ -120,16 +120,19 @@ def gather(
     if scaled:
         facts.append(fact("k_is_scaled", cameras=scaled, size=list(common)))
     keys = [(c, f) for c, one in enumerate(used) for f, frame in enumerate(frames) if frame in photos[one.name]]
-    opacity = masks or {}
+    opacity = {
+        (c, f): masks[used[c].name][frames[f]] for c, f in keys if masks and frames[f] in masks.get(used[c].name, ())
+    }
     return Capture(
         root,
         tuple(view_of(one, common, centres) for one in used),
         tuple(frames),
         frame_rate(subject, fps, len(frames)),
         {(c, f): photos[used[c].name][frames[f]] for c, f in keys},
-        {(c, f): opacity[used[c].name][frames[f]] for c, f in keys if frames[f] in opacity.get(used[c].name, ())},
+        opacity,
         None,
         (*left_out, *facts),
+        mattes=opacity,
     )
 
 

@@ -28,7 +28,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def test_multiface_brings_the_film_back(scene: Scene) -> None:
-    check_same(scene, film(), mattes=True)
+    check_same(scene, film(), mattes="held")
 
 
 def test_so_does_transforms_json_whose_axes_are_others(tmp_path: Path) -> None:
@@ -57,7 +57,7 @@ def test_what_is_wrong_is_seen(scene: Scene, what: str) -> None:
         truth = replace(truth, mattes=255 - truth.mattes)
     names = {name: truth.names[1 - c] if c < 2 else name for c, name in enumerate(truth.names)}
     with pytest.raises(AssertionError):
-        check_same(scene, truth, names if what == "names" else None, mattes=True)
+        check_same(scene, truth, names if what == "names" else None, mattes="held")
 
 
 def test_a_loss_of_a_grey_level_is_within_the_limit_for_videos(scene: Scene) -> None:

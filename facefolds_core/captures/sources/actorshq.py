@@ -23,6 +23,7 @@ import numpy as np
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, gather, inside, pictures_in
+from facefolds_core.captures.picture import Picture
 from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import HUGE
@@ -61,11 +62,11 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
     return gather(root, calibrations, photos, subject, masks=masks, fps=FPS, pixel_centres=PIXEL_CENTRES)
 
 
-def _pictures(camera: Path, kind: str) -> dict[str, Path]:
+def _pictures(camera: Path, kind: str) -> dict[str, Picture]:
     """Frame -> file, of Cam001_rgb000000.jpg."""
     pattern = re.compile(rf"{re.escape(camera.name)}_{kind}(\d+)")
-    found = {pattern.fullmatch(stem): path for stem, path in pictures_in(camera).items()}
-    return {match[1]: path for match, path in found.items() if match}
+    found = {pattern.fullmatch(stem): picture for stem, picture in pictures_in(camera).items()}
+    return {match[1]: picture for match, picture in found.items() if match}
 
 
 def _table(path: Path) -> list[Calibration]:

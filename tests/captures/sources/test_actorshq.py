@@ -46,7 +46,7 @@ def read(root: Path, **subject: object) -> Capture:
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
     truth = film()
     scene = scene_of(filmed, "actorshq", tmp_path / "scene", truth.names, fps=truth.fps)
-    check_same(scene, truth, lossless=False, mattes=True)
+    check_same(scene, truth, lossless=False, mattes="all")
 
 
 def test_an_example_by_hand(tmp_path: Path) -> None:
