@@ -18,6 +18,12 @@ WORDS = {
     # of a capture
     "camera_without_images": "camera {camera}: in KRT, but has no images",
     "camera_without_calibration": "camera {camera}: has images, but is not in KRT",
+    "no_images": "camera {camera}: calibrated, but has no pictures",
+    "uncalibrated": "camera {camera}: has pictures, but no calibration",
+    "other_size": "camera {camera}: its pictures are {size[0]} x {size[1]}, those of most cameras {common[0]} x "
+    "{common[1]}",
+    "k_is_scaled": "note: K is for larger or smaller pictures than {size[0]} x {size[1]}; scaled ({cameras})",
+    "masks_chosen": "note: masks are those of the folder {chosen}; {others} are not read",
     "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
     "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
     "frame_without_images": "frame {frame}: in frame_list.txt, but no camera has an image",
