@@ -32,6 +32,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "captures/sources/ava256.py": ALL,
         "captures/sources/nersemble.py": ALL,
         "captures/sources/neural3d.py": ALL,
+        "captures/colmap_model.py": ALL,
         "captures/videos.py": ("_DISCARDED",),
         "captures/sources/transforms.py": ("FPS", "PIXEL_CENTRES"),
         "pictures.py": ALL,
@@ -80,6 +81,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
     "limits of a reader or validator: what is beyond is damage, whoever made it": {
         "asset/audio.py": ("LONGER",),
         "captures/agreement.py": ALL,
+        "captures/arrangement.py": ALL,
         "captures/capture.py": ALL,
         "captures/sound.py": ("RATES",),
         "captures/sources/transforms.py": ("LATEST",),
