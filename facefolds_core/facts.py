@@ -18,6 +18,15 @@ WORDS = {
     # of a capture
     "camera_without_images": "camera {camera}: in KRT, but has no images",
     "camera_without_calibration": "camera {camera}: has images, but is not in KRT",
+    "no_images": "camera {camera}: calibrated, but has no pictures",
+    "uncalibrated": "camera {camera}: has pictures, but no calibration",
+    "other_size": "camera {camera}: its pictures are {size[0]} x {size[1]}, those of most cameras {common[0]} x "
+    "{common[1]}",
+    "k_is_scaled": "note: K is for larger or smaller pictures than {size[0]} x {size[1]}; scaled ({cameras})",
+    "masks_chosen": "note: masks are those of the folder {chosen}; {others} are not read",
+    "calibration_varies": "note: the pictures of {cameras} cameras were calibrated one by one; the mean of each camera "
+    "is used (farthest from it: {pixels:.2f} pixels on the subject, camera {worst})",
+    "other_models": "note: sparse/0 is read; COLMAP's other models ({others}) do not hang together with it",
     "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
     "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
     "frame_without_images": "frame {frame}: in frame_list.txt, but no camera has an image",
@@ -35,6 +44,7 @@ WORDS = {
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
+    "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
     "centre_chosen": "centre: of the candidates whose hemispheres lose least of the visible surface, within {tie:.0%}, "
     "the one farthest back (it loses {lost:.1%})",
