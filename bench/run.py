@@ -93,7 +93,8 @@ def training_of(folders: SubjectFolders) -> dict[str, Any]:
 def score_model(
     folder: Path, scene: Scene, times: Mapping[int, float], perceptual: Perceptual, device: torch.device
 ) -> Iterator[tuple[str, int, Means]]:
-    """The model without its view branch on the held-out cameras, as `evaluate` scores its variant `diffuse`.
+    """The model without its view branch, as `evaluate` scores its variant `diffuse`: on the cameras for validation, or
+    on the held-out ones where there are none.
 
     Args:
         folder: of the model.
@@ -109,7 +110,7 @@ def score_model(
 
     model = load_model(folder, device)
     truths, masks = scene.open_frames(), scene.open_masks()
-    for index in scene.indices("holdout"):
+    for index in scene.indices(scene.choice_split):
         view = ModelView(model, scene.cameras[index])
         for k, time in times.items():
             if (index, k) in truths:

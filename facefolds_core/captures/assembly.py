@@ -151,7 +151,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
         UserError: if an image is damaged.
     """
     scene, capture = plan.scene, plan.capture
-    masked = [row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks]
+    masked = [row for row in plan.rows if scene.splits[row.camera] != "train" and row.source in capture.masks]
     with atomic_folder(scene.folder) as temporary:
         shape = (scene.height, scene.width, 3)
         write_frames(temporary / "frames.arrow", shape, _photos(plan, params))
