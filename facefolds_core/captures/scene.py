@@ -5,6 +5,8 @@ A folder with
 - `frames.arrow`: all images, one row per (camera, frame) (`frames.FrameStore`);
 - `masks.arrow`: true opacity of images of cameras that do not train, where the capture has it (same format, one
   channel);
+- `plates.arrow`: a clean plate, the picture without the subject, of cameras for which the capture has one (frame 0);
+- `mattes.arrow`: opacity that training may use, of any camera and frame, where the capture has it (one channel);
 - `surface.npz`: tracked mesh in normalised coordinates, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32;
 - `audio.wav`: the sound from the first frame on, where the capture has it.
@@ -105,6 +107,16 @@ class Scene:
     def open_masks(self) -> FrameStore | None:
         """True opacity (0..255, one channel) of some scored images, or None where the capture has none."""
         path = self.folder / "masks.arrow"
+        return FrameStore(path) if is_there(path) else None
+
+    def open_plates(self) -> FrameStore | None:
+        """Clean plates, (camera, 0) -> the picture without the subject, of some cameras; None where there is none."""
+        path = self.folder / "plates.arrow"
+        return FrameStore(path) if is_there(path) else None
+
+    def open_mattes(self) -> FrameStore | None:
+        """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""
+        path = self.folder / "mattes.arrow"
         return FrameStore(path) if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:

@@ -19,6 +19,7 @@ from facefolds_core.captures.capture import Capture, Sound, View, closest_rotati
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
@@ -60,13 +61,13 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     views, note = _views(used, photos, root, subject)
     left_out += [note] if note else []
     images = {
-        (c, f): photos[view.name][name]
+        (c, f): FilePicture(photos[view.name][name])
         for c, view in enumerate(views)
         for f, name in enumerate(frames)
         if name in photos[view.name]
     }
     masks = {
-        (c, f): path
+        (c, f): FilePicture(path)
         for c, f in images
         if is_there(path := root / "masks" / segment / views[c].name / f"{frames[f]}.png")
     }

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files import read_json
@@ -109,7 +110,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
     views = tuple(_view(name, members[0], centres, path) for name, members in groups.items())
     position = {name: f for f, name in enumerate(frames)}
-    images: dict[tuple[int, int], Path] = {}
+    images: dict[tuple[int, int], Picture] = {}
     for c, members in enumerate(groups.values()):
         for entry in members:
             name = frame_of[entry.place]
@@ -118,7 +119,7 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
                     raise wrong(
                         path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label
                     )
-                images[c, position[name]] = entry.image
+                images[c, position[name]] = FilePicture(entry.image)
     rate = frame_rate(subject, FPS, len(frames))
     return Capture(path.parent, views, tuple(frames), rate, images, {}, None, tuple(left_out))
 
