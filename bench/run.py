@@ -104,7 +104,7 @@ def score_model(
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
     from facefolds_core.model import load_model
-    from facefolds_core.scoring.evaluation import score_images
+    from facefolds_core.scoring.images import score_images
     from facefolds_core.scoring.metrics import shown
     from facefolds_core.scoring.model_view import ModelView
 
