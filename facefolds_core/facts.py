@@ -75,10 +75,27 @@ WORDS = {
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in front of the centre "
     "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres, or look at fit.png for what is no "
     "subject",
+    "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: "
+    "finer quantisation gives no more; finer textures (texture.resolution) or fewer specks in them (fit.png) do",
+    "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
+    "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
+    "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
+    "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
+    "one training's cannot be compared with another's. Give masks of the scored cameras (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }
 """Kind -> its words."""
+
+
+WARNINGS = frozenset(
+    {
+        *("pictures_disagree", "front_guessed", "camera_contradicts", "mesh_is_off", "cut_by_the_ball"),
+        *("volume_explains_little", "surface_without_a_place", "front_is_guessed"),
+        *("codec_misses", "stands_still", "matte_is_found"),
+    }
+)
+"""Kinds that ask for something to be done; the others are told for the record."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from facefolds_core.params.compress import (
     VideoCodec,
     ViewEffectParams,
 )
-from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
     BackgroundParams,
     DivergenceParams,
@@ -91,6 +91,7 @@ __all__ = [
     "RefitParams",
     "RoomParams",
     "SampleParams",
+    "ScoreWarningParams",
     "Section",
     "StartParams",
     "Subject",
