@@ -68,10 +68,12 @@ WORDS = {
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
+    "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
+    "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
-    "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. Before a near, bright "
-    "or cluttered room try `train: {{room: {{needed_below: 28}}}}`",
+    "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
+    "mattes help (docs/guide/subjects.md)",
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in front of the centre "
     "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres, or look at fit.png for what is no "
     "subject",

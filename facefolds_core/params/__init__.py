@@ -49,6 +49,7 @@ from facefolds_core.params.volume import (
     SubjectParams,
     VolumeLevel,
     VolumeParams,
+    WallParams,
     WarningParams,
 )
 
@@ -103,6 +104,7 @@ __all__ = [
     "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
+    "WallParams",
     "WarningParams",
     "merged",
     "nested",
