@@ -116,6 +116,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
         "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
         "camera_map": camera_map(scene) if scene else None,
+        "validating": scene is not None and "validate" in scene.splits,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
         "angles": tables.angles(seen) if seen else [],
         "views": record.on_sheet if record else 0,
@@ -201,7 +202,7 @@ def error_stops() -> str:
 def camera_map(scene: Scene) -> Markup:
     return charts.camera_map(
         [
-            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split == "holdout")
+            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split)
             for camera, split in zip(scene.cameras, scene.splits, strict=True)
         ]
     )
