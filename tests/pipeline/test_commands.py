@@ -82,7 +82,7 @@ def test_report(project: TinyProject) -> None:
 
 
 def test_waterfall(project: TinyProject) -> None:
-    facefolds("waterfall", "--frames", "1")
+    facefolds("waterfall", "data/actor", "--frames", "1")
     steps = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)["steps"]
     assert [step["name"] for step in steps] == list(STEPS)
     shipped = json.loads((project.root / ASSET / "manifest.json").read_text())["levels"][-1]
@@ -123,7 +123,7 @@ def test_collect_and_recommend(checkout: TinyProject, tmp_path: Path) -> None:
     (own,) = (run for run in read_runs(tmp_path / "sweep.parquet") if run.subject == "actor")
     scores = json.loads((checkout.root / "data" / "actor" / "metrics.json").read_text())
     assert own.figures["psnr_subject"] == scores["asset"]["psnr_subject"]
-    assert "workspace" in facefolds("recommend", tmp_path / "sweep.parquet", "--max-bytes", "1e9")
+    assert "workspace" in facefolds("recommend", tmp_path / "sweep.parquet", "--subject", "actor", "--max-bytes", "1e9")
 
 
 def test_doctor() -> None:

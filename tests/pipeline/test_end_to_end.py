@@ -62,7 +62,7 @@ def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
 
 def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
     before = project.params
-    project.write_params(before.replace("compress: {}", "compress: {frame_rate_factor: 2}"))
+    project.write_params(before.replace("compress:\n", "compress:\n  frame_rate_factor: 2\n"))
     status, output = project.repro("evaluate@actor")
     assert status == 0, output
     assert stages_run(output) == ["configure", "compress@actor", "evaluate@actor"]
