@@ -237,7 +237,9 @@ def test_garbled_json_names_line_and_column(tmp_path: Path) -> None:
 
 def test_missing_transforms(tmp_path: Path) -> None:
     (tmp_path / "c").mkdir()
-    assert refused(tmp_path / "c", "transforms").file == tmp_path / "c" / "transforms.json"
+    error = refused(tmp_path / "c", "transforms")
+    assert error.file == tmp_path / "c"
+    assert "transforms.json" in str(error.expected)
 
 
 def test_no_image_of_transforms_exists(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def test_a_source_that_is_none_is_refused_with_the_names() -> None:
     with pytest.raises(KeyError):
         SOURCES["_actor"]
     with pytest.raises(ValidationError, match=r"'actor', .*'multiface'.* 'transforms'"):
-        Subject(source="colmap", path="x")
+        Subject(source="banana", path="x")
 
 
 def test_every_codec_is_what_its_file_says() -> None:
