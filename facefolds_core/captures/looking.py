@@ -84,7 +84,8 @@ def _contents(path: Path) -> tuple[str, str]:
 
 def _needs() -> str:
     """The layouts that are read."""
-    first = [f"{name}: {(SOURCES[name].__doc__ or '').splitlines()[0].rstrip('.')}" for name in SOURCES.names]
+    names = [name for name in SOURCES.names if hasattr(SOURCES[name], "recognise")]
+    first = [f"{name}: {(SOURCES[name].__doc__ or '').splitlines()[0].rstrip('.')}" for name in names]
     return "bring it into a layout that is read: " + "; ".join(first)
 
 

@@ -114,6 +114,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "cli/render.py": ALL,
         "engines/godot.py": ("QUALITY",),
         "rendering/reference.py": ("BLACK",),
+        "captures/appraisal.py": ALL,
         "captures/front.py": ("WELL_BESIDE",),
         "reporting/build.py": ALL,
         "reporting/charts.py": ALL,
