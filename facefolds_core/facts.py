@@ -47,6 +47,7 @@ WORDS = {
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
+    "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
     "the others see as the median camera does; check its calibration",

@@ -208,7 +208,7 @@ def _plates(plan: Plan) -> Negatives:
     capture = plan.capture
     view_of = {row.camera: row.source[0] for row in plan.rows}
     return [
-        Negative((camera, 0), view, capture.plates[view], f"clean plate of camera {capture.views[view].name}")
+        Negative((camera, 0), view, capture.plates[view], capture.plate_place(view))
         for camera, view in view_of.items()
         if view in capture.plates
     ]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.images import Colour
 from facefolds_core.captures.lens import Lens
 from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
@@ -30,12 +31,12 @@ class View:
     Attributes:
         camera: a pinhole without distortion, in the capture's world, for full-size images.
         lens: how to get the pinhole image from the photo; None where the photo is one.
-        colour: (3, 3) what brings the camera's linear RGB to that of the others; None where the photo needs none.
+        colour: what brings the camera's colours to those of the others; None where they need nothing.
     """
 
     camera: Camera
     lens: Lens | None = None
-    colour: Array | None = None
+    colour: Colour | None = None
 
     @property
     def name(self) -> str:
@@ -108,6 +109,10 @@ class Capture:
     def place(self, camera: int, frame: int) -> str:
         """Words for one image, for messages."""
         return f"camera {self.views[camera].name}, frame {self.frame_ids[frame]}"
+
+    def plate_place(self, camera: int) -> str:
+        """Words for a clean plate."""
+        return f"clean plate of camera {self.views[camera].name}"
 
 
 def select_frames(
@@ -210,7 +215,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
 
 def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
-    """(width, height) of all images in use, from their headers (masks, mattes and plates included).
+    """(width, height) of all images in use, from their headers (masks and mattes included).
 
     Raises:
         UserError: if a header cannot be read or sizes differ; names the file and the size of the others.
@@ -221,8 +226,6 @@ def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence
             place = capture.place(c, f)
             pictures = [(capture.images[c, f], place)]
             pictures += [(of[c, f], place) for of in (capture.masks, capture.mattes) if (c, f) in of]
-            if f == frames[0] and c in capture.plates:
-                pictures.append((capture.plates[c], f"clean plate of camera {capture.views[c].name}"))
             for picture, where in pictures:
                 size = picture.size(where)
                 expected = expected or size
@@ -231,7 +234,23 @@ def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence
                     raise wrong_size(picture.file, where, size, f"{expected[0]} x {expected[1]}, as {first}")
     if expected is None:
         raise ValueError("no cameras or frames to check")
+    for c in cameras:
+        if c in capture.plates:
+            check_plate_size(capture, c, capture.plates[c].size(capture.plate_place(c)))
     return expected
+
+
+def check_plate_size(capture: Capture, camera: int, size: tuple[int, int]) -> None:
+    """UserError unless a clean plate of `size` (width, height) has the shape of the camera's images.
+
+    It may be larger or smaller, for both are averaged down; but not where a lens is taken out.
+    """
+    view = capture.views[camera]
+    width, height = view.camera.width, view.camera.height
+    if size == (width, height) or (view.lens is None and abs(size[0] * height / (size[1] * width) - 1) < 0.005):
+        return
+    file, expected = capture.plates[camera].file, f"{width} x {height}, as the camera's images"
+    raise wrong_size(file, capture.plate_place(camera), size, expected)
 
 
 def wrong_size(file: Path, place: str, size: tuple[int, int], expected: str) -> UserError:

@@ -21,7 +21,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import Capture, wrong_size
+from facefolds_core.captures.capture import Capture, check_plate_size, wrong_size
 from facefolds_core.captures.images import corrected_colour, display_colour, downsample, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.picture import Picture, VideoFrame, decoded
@@ -68,9 +68,9 @@ def photos(
 
     def finish(negative: Negative, photo: Image) -> Image:
         values = downsample(photo, width, height)
-        matrix = capture.views[negative.view].colour
-        if matrix is not None:
-            values = corrected_colour(values, matrix)
+        colour = capture.views[negative.view].colour
+        if colour is not None:
+            values = corrected_colour(values, colour)
         return to_8bit(display_colour(values) if params.display_colour else values)
 
     return _developed(capture, negatives, "rgb", finish)
@@ -89,7 +89,9 @@ def _developed(
     def develop(negative: Negative, photo: Image) -> Row:
         camera = capture.views[negative.view].camera
         size = photo.shape[1], photo.shape[0]
-        if size != (camera.width, camera.height):
+        if negative.picture is capture.plates.get(negative.view):
+            check_plate_size(capture, negative.view, size)
+        elif size != (camera.width, camera.height):
             expected = f"{camera.width} x {camera.height}, as its header says"
             raise wrong_size(negative.picture.file, negative.place, size, expected)
         lens = capture.views[negative.view].lens

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.krt import scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
+from facefolds_core.captures.videos import Video, check_together, frame_names
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera, check_camera
-from facefolds_core.params import Subject
+from facefolds_core.params import FrameRange, Subject
 from facefolds_core.reading import is_folder
 
 Array = NDArray[np.float64]
@@ -65,6 +66,26 @@ def natural(path: Path | str) -> tuple[tuple[int, int | str], ...]:
 def pictures_in(folder: Path) -> dict[str, Picture]:
     """Stem -> PNG or JPEG file."""
     return {path.stem: FilePicture(path) for path in inside(folder) if path.suffix.lower() in SUFFIXES}
+
+
+def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
+    """Frames of videos that run side by side.
+
+    Args:
+        files: camera -> video.
+        subject: its `frames` tell how many are used.
+
+    Returns:
+        camera -> frame -> picture, and frames a second.
+
+    Raises:
+        UserError: as `check_together`.
+    """
+    videos = [Video(path, name) for name, path in files.items()]
+    stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
+    count, rate = check_together(videos, stop)
+    names = frame_names(count)
+    return {v.camera: {name: VideoFrame(v, i) for i, name in enumerate(names)} for v in videos}, float(rate)
 
 
 def gather(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -166,20 +167,36 @@ def display_colour(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return (np.clip(np.sqrt(gained) - 15 / 255, 0, 1) * 255).astype(np.float32)
 
 
-def corrected_colour(values: NDArray[np.float32], matrix: NDArray[np.float64]) -> NDArray[np.float32]:
-    """A camera's colours brought to those of the others: `matrix` applied to linear light.
+@dataclass(frozen=True, eq=False)
+class Colour:
+    """What brings a camera's colours to those of the others: matrix @ RGB + offset, RGB a column in 0..1.
 
-    Values are linearised by the sRGB curve (IEC 61966-2-1), multiplied, clipped to 0..1 and put back on the curve.
+    Attributes:
+        matrix: (3, 3).
+        offset: (3,).
+        linear: whether it is for linear light, else for values on the sRGB curve.
+    """
+
+    matrix: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    linear: bool
+
+
+def corrected_colour(values: NDArray[np.float32], colour: Colour) -> NDArray[np.float32]:
+    """Colours corrected, clipped to 0..1; linear light is reached by the sRGB curve (IEC 61966-2-1) and left by it.
 
     Args:
         values: (H, W, 3), 0..255.
-        matrix: (3, 3), linear RGB column = matrix @ linear RGB column.
 
     Returns:
         (H, W, 3), 0..255.
     """
-    linear = np.where(values <= 0.04045 * 255, values / (255 * 12.92), ((values / 255 + 0.055) / 1.055) ** 2.4)
-    mixed = np.clip(linear @ matrix.T.astype(np.float32), 0, 1)
+    matrix, offset = colour.matrix.T.astype(np.float32), colour.offset.astype(np.float32)
+    coded = values / np.float32(255)
+    if not colour.linear:
+        return np.asarray(np.clip(coded @ matrix + offset, 0, 1) * 255, np.float32)
+    light = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    mixed = np.clip(light @ matrix + offset, 0, 1)
     coded = np.where(mixed <= 0.0031308, mixed * 12.92, 1.055 * mixed ** (1 / 2.4) - 0.055)
     return np.asarray(coded * 255, np.float32)
 

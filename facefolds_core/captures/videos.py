@@ -18,6 +18,7 @@ from typing import Any, Literal, cast
 import av
 import numpy as np
 from av.error import FFmpegError
+from av.video.reformatter import Interpolation, VideoReformatter
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
@@ -78,7 +79,7 @@ class Video:
     def frames(self, indices: Sequence[int], channels: Channels, threads: int = 1) -> Iterator[Image]:
         """Some of its frames, decoded in one go; all before the last one are decoded.
 
-        Colours are converted as FFmpeg does (BT.601 where the file says nothing), chroma is interpolated.
+        Colours are converted as FFmpeg, and with it OpenCV, does by default (BT.601 where the file says nothing).
 
         Args:
             indices: positions, increasing.
@@ -95,6 +96,7 @@ class Video:
         with _opened(self) as (container, stream):
             stream.codec_context.thread_count = threads
             stream.thread_type = "AUTO"
+            reformatter = VideoReformatter()
             try:
                 for frame in container.decode(stream):
                     if frame.is_corrupt:
@@ -104,7 +106,7 @@ class Video:
                             position, f"{frame.width} x {frame.height} pixels, not {size[0]} x {size[1]}"
                         )
                     if position == following:
-                        yield _pixels(frame, channels)
+                        yield _pixels(frame, reformatter, channels)
                         following = next(wanted, None)
                         if following is None:
                             return
@@ -261,7 +263,7 @@ def _check_turn(video: Video, container: Any, stream: Any) -> None:
         )
 
 
-def _pixels(frame: Any, channels: Channels) -> Image:
+def _pixels(frame: Any, reformatter: VideoReformatter, channels: Channels) -> Image:
     """(H, W, 3) RGB, or (H, W, 1) of a grey one: its green channel, full range."""
-    rgb: Image = frame.to_ndarray(format="rgb24", interpolation="ACCURATE_RND")
+    rgb = cast(Image, reformatter.reformat(frame, format="rgb24", interpolation=Interpolation.BICUBIC).to_ndarray())
     return rgb if channels == "rgb" else np.ascontiguousarray(rgb[..., 1:2])

@@ -50,9 +50,9 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
     assert scene.open_masks() is None
 
 
-def test_a_plate_of_another_size_is_refused(tmp_path: Path) -> None:
+def test_a_plate_of_another_shape_is_refused(tmp_path: Path) -> None:
     write_multiface(tmp_path)
-    save(tmp_path / "plates" / "400002.png", pattern(20, 32, 0))
+    save(tmp_path / "plates" / "400002.png", pattern(20, 30, 0))
     with pytest.raises(UserError, match="different sizes") as caught:
         normalized(tmp_path, tmp_path / "scene")
     assert "clean plate of camera 400002" in str(caught.value)

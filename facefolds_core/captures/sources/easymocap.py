@@ -24,16 +24,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, gather, inside, pictures_in
+from facefolds_core.captures.gathering import Calibration, footage, gather, inside, pictures_in
 from facefolds_core.captures.images import decode_mask
 from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
-from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
+from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.values import short
-from facefolds_core.captures.videos import Video, check_together, frame_names
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.params import CaptureParams, FrameRange, Subject
+from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import is_regular
 
 FPS = 30.0
@@ -132,8 +131,7 @@ def _lacks(path: Path, key: str) -> UserError:
 def _videos(root: Path, subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
     """Camera -> frame -> picture, and frames a second."""
     files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in VIDEOS}
-    videos = [Video(path, name) for name, path in files.items()]
-    if not videos:
+    if not files:
         pickle = is_regular(root / "annots.npy")
         raise UserError(
             "neither pictures nor videos",
@@ -142,10 +140,7 @@ def _videos(root: Path, subject: Subject) -> tuple[dict[str, dict[str, Picture]]
             found=shorten([path.name for path in inside(root)]) or "nothing",
             remedy="copy the pictures" + (" (annots.npy is a pickle: it is not read)" if pickle else ""),
         )
-    stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
-    count, rate = check_together(videos, stop)
-    names = frame_names(count)
-    return {v.camera: {name: VideoFrame(v, i) for i, name in enumerate(names)} for v in videos}, float(rate)
+    return footage(files, subject)
 
 
 def _masks(root: Path, names: list[str]) -> tuple[dict[str, dict[str, Picture]], list[Fact]]:
