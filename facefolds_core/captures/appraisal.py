@@ -112,7 +112,9 @@ def _entry(said: Recognised, subject: Subject, capture: Capture, plan: Plan) -> 
     default = HoldoutEvery(every=12)
     masked = [view.name for c, view in enumerate(capture.views) if any((c, f) in capture.masks for f in range(3))]
     masked = [name for name in masked if name in names]
-    if 0 < len(masked) < len(names):
+    if "holdout" in said.keys:
+        pass
+    elif 0 < len(masked) < len(names):
         yield f"    holdout: [{', '.join(map(_quoted, masked))}]  # those that have masks to score by"
     elif len(names) < default.every:
         yield f"    holdout: [{_quoted(_between(plan))}]  # a camera that others stand around"
@@ -140,6 +142,8 @@ def _name(path: Path) -> str:
 
 def _quoted(value: object) -> str:
     """For YAML: plain where nothing else can be read into it."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_quoted, value))}]"
     text = str(value)
     plain = re.fullmatch(r"[A-Za-z/.][\w/.-]*", text) and text.lower() not in ("yes", "no", "on", "off", "true", "null")
     return text if plain else "'" + text.replace("'", "''") + "'"
