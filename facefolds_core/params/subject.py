@@ -91,7 +91,7 @@ class Subject(Overrides):
     """Camera names, or {every: n}: cameras for scoring only; [] holds out none."""
 
     front: str | None = None
-    """For captures without a tracked mesh, the name of a camera that faces the subject upright; null finds the front."""
+    """For captures without a tracked mesh, a camera that faces the subject upright; null finds the front."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

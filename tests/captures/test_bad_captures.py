@@ -320,6 +320,18 @@ def test_a_scene_that_is_there_survives_a_failed_run(tmp_path: Path) -> None:
     assert sorted(path.name for path in folders.root.iterdir()) == ["scene"]
 
 
+def test_the_front_that_was_found_is_said_before_what_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    value = json.loads(path.read_text())
+    value["frames"] += [{**value["frames"][0], "file_path": f"images/none{i}.png"} for i in range(9)]
+    path.write_text(json.dumps(value))
+    run(tmp_path / "c", "transforms")
+    said = capsys.readouterr().out.splitlines()
+    assert "taken to face where most cameras stand" in said[1]
+
+
 def test_it_says_what_was_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = write_multiface(tmp_path / "c")
     made.image("400002", "000006").unlink()
