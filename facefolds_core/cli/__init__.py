@@ -21,6 +21,7 @@ COMMANDS = {
     "validate": "Check an asset whole, and say what is wrong with it.",
     "export": "Write an asset as another program can read it.",
     "export-godot": "The same as `export godot`.",
+    "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
     "report": "A page that tells all about a subject.",
     "collect": "One table of the experiments of `dvc exp run`.",
     "recommend": "The best configuration within a budget, of such a table.",
@@ -29,7 +30,7 @@ COMMANDS = {
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
-EXTRAS = {"report": "report", "collect": "pipeline", "recommend": "pipeline"}
+EXTRAS = {"submission": "train", "report": "report", "collect": "pipeline", "recommend": "pipeline"}
 """Commands that need more than the base -> the extra that brings it."""
 
 

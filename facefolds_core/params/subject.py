@@ -82,7 +82,7 @@ class Subject(Overrides):
     """Folder of the capture; for "actor" the generator's package."""
 
     segment: str | None = None
-    """Multiface segment; null takes the only one."""
+    """Multiface and ava-256: the segment; NeRSemble: the sequence. Null takes the only one."""
 
     frames: FrameRange | Many[str] | None = None
     """A range of positions, or a list of frame names; null takes all."""
