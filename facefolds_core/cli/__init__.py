@@ -25,7 +25,7 @@ COMMANDS = {
     "report": "A page that tells all about a subject.",
     "collect": "One table of the experiments of `dvc exp run`.",
     "recommend": "The best configuration within a budget, of such a table.",
-    "doctor": "Is all here that the pipeline needs? Mends what a killed DVC leaves.",
+    "doctor": "Is all here that the pipeline needs? Mends what a killed DVC leaves. What is in a folder?",
 }
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
