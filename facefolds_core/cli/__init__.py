@@ -21,6 +21,7 @@ COMMANDS = {
     "validate": "Check an asset whole, and say what is wrong with it.",
     "export": "Write an asset as another program can read it.",
     "export-godot": "The same as `export godot`.",
+    "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
@@ -30,7 +31,7 @@ COMMANDS = {
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
-EXTRAS = {"report": "report", "waterfall": "train", "collect": "pipeline", "recommend": "pipeline"}
+EXTRAS = {"scores": "train", "report": "report", "waterfall": "train", "collect": "pipeline", "recommend": "pipeline"}
 """Commands that need more than the base -> the extra that brings it."""
 
 
