@@ -90,7 +90,7 @@ def test_waterfall(project: TinyProject) -> None:
 
 
 def test_view(project: TinyProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of the asset made last; ended at once."""
+    """Ended at once."""
 
     class Interrupted(threading.Event):
         def wait(self, timeout: float | None = None) -> bool:
@@ -99,7 +99,7 @@ def test_view(project: TinyProject, tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "index.html").write_text("the player")
     monkeypatch.setattr(view, "find_player", lambda: tmp_path)
     monkeypatch.setattr(view, "threading", SimpleNamespace(Event=Interrupted))  # others need the real one
-    said = facefolds("view", "--no-browser")
+    said = facefolds("view", ASSET, "--no-browser")
     assert str((project.root / ASSET).resolve()) in said and "view: ended" in said
 
 
