@@ -123,6 +123,11 @@ class RoomParams(Section):
     fog: Factor = 1.0
     """Optical depth at the start, from the ball to infinity: half of the volume's, behind which it lies."""
 
+    surface_depth: Factor = 2.0
+    """The subject's surface lies at most so many voxels beneath where a tenth of the opacity is reached from outside.
+    Of what is sharp in the volume half of it is reached 1.5 voxels beneath; a plaster head is fog, a sixth of a unit
+    deep."""
+
     step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
     """Between samples on a ray, voxels: no voxel is stepped over."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,11 @@ class Profile:
     inner: Array
     opacity: NDArray[np.float32]
     rgb: NDArray[np.float32]
+
+    def skin(self, depth: float) -> Profile:
+        """The same with radii at most `depth`, units, beneath `outer`: a smooth pale thing is solid, but looks the same
+        from all sides whether it is solid or fog, and half of a fog's opacity lies deep within."""
+        return replace(self, radius=np.fmax(self.radius, self.outer - depth))
 
 
 def profile(volume: Volume, centre: Array, directions: Array, least: float) -> Profile:
