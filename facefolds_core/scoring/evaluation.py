@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
+from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.scoring.analysis import Sums
 from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
@@ -77,8 +76,8 @@ def evaluate(
         for index in held_out:
             camera = scene.cameras[index]
             frames = [k for k in range(scene.num_frames) if (index, k) in truths]
-            hits = caster.cast(camera)
-            for k, textures, images in _rendered(model, asset, hits, camera, frames, params.background, step):
+            views = _Views(scene, model, asset, caster, index, step)
+            for k, textures, images in _rendered(views, asset, frames, params.background, step):
                 frame = scene.frame_ids[k]
                 _check_finite(images, camera.name, frame)
                 pictures = {variant: shown(image) for variant, image in images.items()}
@@ -93,7 +92,7 @@ def evaluate(
                 worst = panel if worst is None else min(worst, panel, key=lambda one: one.rank)
                 if k in on_sheet:
                     panels.append(panel)
-                    sums.add_picture(camera, hits, textures, pictures["asset"] - truth, mask)
+                    sums.add_picture(views.seen_by, views.hits, textures, pictures["asset"] - truth, mask)
                 bar.update()
     if worst is None:
         raise UserError(
@@ -144,26 +143,55 @@ def subject_box(mask: Array) -> tuple[slice, slice] | None:
     )
 
 
+class _Views:
+    """What one held-out camera sees of model and asset: found once for a head that stands still, else frame by frame.
+
+    The model stands where the scene's poses say; the asset where its own track does: what ships is scored.
+
+    Attributes:
+        seen_by: the camera in the frame of the asset's meshes.
+        hits: there.
+        model: the model's view.
+        added: what view effects add, or None.
+    """
+
+    def __init__(
+        self, scene: Scene, model: RadianceManifolds, asset: Asset, caster: AssetCaster, index: int, step: int
+    ) -> None:
+        self._scene, self._model, self._asset, self._caster = scene, model, asset, caster
+        self._index, self._step = index, step
+        self._maps = asset.effects()
+        self._turn_model(0)
+        self._turn_asset(0)
+
+    def _turn_model(self, k: int) -> None:
+        self.model = ModelView(self._model, self._scene.camera_in_head(self._index, k))
+
+    def _turn_asset(self, k: int) -> None:
+        self.seen_by = self._asset.camera_in_head(self._scene.cameras[self._index], k * self._step)
+        self.hits = self._caster.cast(self.seen_by)
+        self.added = None if self._maps is None else added_colours(self.hits, to_eye(self.seen_by), self._maps)
+
+    def turn(self, k: int) -> None:
+        """To frame `k` of the scene."""
+        if self._scene.poses is not None:
+            self._turn_model(k)
+        if self._asset.track is not None:
+            self._turn_asset(k)
+
+
 def _rendered(
-    model: RadianceManifolds,
-    asset: Asset,
-    hits: Hits,
-    camera: Camera,
-    frames: list[int],
-    background: tuple[float, float, float],
-    step: int,
+    views: _Views, asset: Asset, frames: list[int], background: tuple[float, float, float], step: int
 ) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, NDArray[np.float32]]]]:
     """The asset's textures, and the variants' images (H, W, 3) over `background`, of each of the scene's `frames`."""
-    view = ModelView(model, camera)
-    maps = asset.effects()
-    added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
-        with_view, without_view, alpha = view.render(float(k))
+        views.turn(k)
+        with_view, without_view, alpha = views.model.render(float(k))
         behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
-        picture, _ = composite(hits, textures, background)
+        picture, _ = composite(views.hits, textures, background)
         images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": picture}
-        if added is not None:
-            images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
+        if views.added is not None:
+            images[WITH_EFFECTS], _ = composite(views.hits, textures, background, views.added)
         yield k, textures, images
 
 

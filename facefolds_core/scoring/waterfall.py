@@ -84,9 +84,11 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
     cameras = scene.indices("holdout")
     with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
         for index in cameras:
-            view = ModelView(model, scene.cameras[index])
-            hits = [source.hits(scene.cameras[index]) for source in sources]
             for k in frames:
+                if k == frames[0] or scene.poses is not None:
+                    camera = scene.camera_in_head(index, k)
+                    view = ModelView(model, camera)
+                    hits = [source.hits(camera) for source in sources]
                 truth = truths.image(index, k) / 255.0
                 has_mask = masks is not None and (index, k) in masks
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None

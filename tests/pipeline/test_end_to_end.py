@@ -108,7 +108,7 @@ def test_a_killed_training_resumes(project: TinyProject) -> None:
 
 def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
     """The one whose training was killed."""
-    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames, one camera an image
+    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames
 
 
 def test_the_explicit_model_runs_to_the_end(project: TinyProject) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -81,10 +82,10 @@ def write_capture(
         folder: replaced if it exists.
         params: cameras, frames, size, seed.
         progress: called after each of the cameras x frames pictures.
-        options: see `ActorOptions`.
+        options: see `ActorOptions`; by default as `params` have it.
         rig: other cameras than those of `make_rig`.
     """
-    options = options or ActorOptions()
+    options = options or ActorOptions(head_motion=math.radians(params.head_motion))
     rig = rig or make_rig(params)
     with atomic_folder(folder) as temporary:
         (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")
