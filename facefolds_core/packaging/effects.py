@@ -142,13 +142,10 @@ def _views(
         for together in [list(frames)] if scene.poses is None else [[k] for k in frames]:
             camera = scene.camera_in_head(index, together[0])
             hits = cast_layers(camera, meshes)
-            count = hits.hit.shape[2]
-            seen = np.flatnonzero(hits.hit.any(2))
-            chosen = np.sort(rng.choice(seen, min(rays, len(seen)), replace=False))
-            part = Hits(hits.hit.reshape(1, -1, count)[:, chosen], hits.st.reshape(1, -1, count, 2)[:, chosen])
+            chosen = hits.choose(rng, rays)
             shown = {k: _photo(photos.image(index, k), chosen) for k in together if (index, k) in photos}
             if shown:
-                of_camera.append(Pixels(part, to_eye(camera).reshape(-1, 3)[chosen], shown))
+                of_camera.append(Pixels(hits.at(chosen), to_eye(camera).reshape(-1, 3)[chosen], shown))
         if of_camera:
             views.append(of_camera)
     return views

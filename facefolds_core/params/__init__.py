@@ -18,7 +18,7 @@ from facefolds_core.params.compress import (
     VideoCodec,
     ViewEffectParams,
 )
-from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
     BackgroundParams,
     DivergenceParams,
@@ -50,6 +50,7 @@ from facefolds_core.params.volume import (
     SubjectParams,
     VolumeLevel,
     VolumeParams,
+    WallParams,
     WarningParams,
 )
 
@@ -94,6 +95,7 @@ __all__ = [
     "RefitParams",
     "RoomParams",
     "SampleParams",
+    "ScoreWarningParams",
     "Section",
     "StartParams",
     "Subject",
@@ -105,6 +107,7 @@ __all__ = [
     "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
+    "WallParams",
     "WarningParams",
     "merged",
     "nested",

@@ -1,9 +1,10 @@
-"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity for every camera."""
+"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity, clean plates."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -26,6 +27,11 @@ Progress = Callable[[], None]
 def frame_times(params: CaptureParams) -> NDArray[np.float64]:
     """(frames,) seconds within the performance: one full cycle, so that the clip loops (of 12 frames: k / 30)."""
     return np.arange(params.frames) / params.frames * PERIOD
+
+
+def options_of(params: CaptureParams) -> ActorOptions:
+    """What the parameters say of the actor."""
+    return ActorOptions(head_motion=math.radians(params.head_motion))
 
 
 def frame_name(position: int) -> str:
@@ -51,10 +57,12 @@ def _write_png(path: Path, image: NDArray[np.uint8]) -> None:
     path.write_bytes(data.tobytes())
 
 
-def _write_picture(folder: Path, camera: str, frame: str, picture: Picture) -> None:
+def _write_picture(folder: Path, camera: str, frame: str, picture: Picture, mattes: bool) -> None:
     _write_png(folder / "images" / SEGMENT / camera / f"{frame}.png", picture.rgb[..., ::-1])
     mask = np.rint(255 * picture.opacity).astype(np.uint8)
     _write_png(folder / "masks" / SEGMENT / camera / f"{frame}.png", mask)
+    if mattes:
+        _write_png(folder / "mattes" / SEGMENT / camera / f"{frame}.png", mask)
 
 
 def _write_mesh(folder: Path, frame: str, mesh: TrackedMesh, head_to_world: NDArray[np.float64]) -> None:
@@ -85,18 +93,22 @@ def write_capture(
         options: see `ActorOptions`; by default as `params` have it.
         rig: other cameras than those of `make_rig`.
     """
-    options = options or ActorOptions(head_motion=math.radians(params.head_motion))
+    options = options or options_of(params)
     rig = rig or make_rig(params)
     with atomic_folder(folder) as temporary:
         (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")
         frames = [(frame_name(k), float(time)) for k, time in enumerate(frame_times(params))]
         listing = "".join(f"{SEGMENT} {name}\n" for name, _ in frames)
         (temporary / "frame_list.txt").write_text(listing, encoding="utf-8")
+        if params.plates:
+            for camera in rig.cameras:
+                plate = render(camera, 0.0, replace(options, away=1.0), params.seed)
+                _write_png(temporary / "plates" / f"{camera.name}.png", plate.rgb[..., ::-1])
         for name, time in frames:
             rotation, translation = head_pose(time, options.head_motion)
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)
             _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time, options.nose), head_to_world)
             for camera in rig.cameras:
-                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed))
+                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed), params.mattes)
                 if progress:
                     progress()

@@ -32,7 +32,7 @@ def first_background(scene: Scene, images: Images, volume: Volume, params: Backg
         mean, covered = _clear_mean(scene, images, volume, params, frames)
     for image, hidden, index in zip(mean, covered, images.cameras, strict=True):
         at, along = _lattice(scene.camera_in_head(index, volume.frame), params)
-        image[hidden] = _enlarged(volume.room.look_up(at, along), scene.cameras[index], params)[hidden]
+        image[hidden] = _enlarged(volume.behind(at, along), scene.cameras[index], params)[hidden]
     return torch.from_numpy(mean.reshape(len(mean), h * w, 3).astype(np.float32))
 
 
