@@ -247,9 +247,11 @@ def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
 
 def _check_turn(video: Video, container: Any, stream: Any) -> None:
     """Refuse a tag that turns the picture: K and width and height refer to what is stored, players show another."""
+    stream.codec_context.thread_count = 1
     try:
-        frame = next(container.decode(stream))
-    except (FFmpegError, StopIteration) as error:
+        packet = next(container.demux(stream))
+        frame = [*stream.codec_context.decode(packet), *stream.codec_context.decode(None)][0]
+    except (FFmpegError, StopIteration, IndexError) as error:
         raise video.refused("a damaged video", "a first frame", str(error) or "none", frame=0) from None
     finally:
         container.seek(0)
