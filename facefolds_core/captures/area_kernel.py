@@ -16,14 +16,16 @@ from facefolds_core.jit import kernel
 
 
 @kernel(nogil=True)
-def _area_mean(flat: NDArray[np.uint8], channels: int, height: int, width: int, whole: bool) -> Any:
-    """(H, W * channels) uint8 -> (height, width * channels) float32: mean of the pixels that each target covers.
+def _area_mean(
+    data: NDArray[np.uint8], pitch: int, rows: int, columns: int, channels: int, height: int, width: int, whole: bool
+) -> Any:
+    """Rows of columns * channels bytes -> (height, width * channels) float32: mean of what each target covers.
 
     Args:
+        data: bytes, a row each `pitch`.
         whole: round to whole numbers, halves to even.
     """
-    rows, size = flat.shape
-    columns = size // channels
+    size = columns * channels
     tall, wide = rows / height, columns / width
     most = math.ceil(wide) + 1
     shares = np.zeros((width, most), np.float32)
@@ -42,7 +44,7 @@ def _area_mean(flat: NDArray[np.uint8], channels: int, height: int, width: int, 
         summed[:] = np.float32(0)
         for row in range(int(low), min(rows, math.ceil(high - 1e-9))):
             weight = np.float32((min(high, row + 1.0) - max(low, row)) / tall)
-            line = flat[row]
+            line = data[row * pitch : row * pitch + size]
             for x in range(size):
                 summed[x] += weight * np.float32(line[x])
         for j in range(width):
@@ -72,6 +74,10 @@ def area_mean(image: NDArray[np.uint8], width: int, height: int, whole: bool = F
     Args:
         whole: round to whole numbers, halves to even.
     """
-    channels = image.shape[2]
-    flat = np.ascontiguousarray(image).reshape(len(image), -1)
-    return np.asarray(_area_mean(flat, channels, height, width, whole)).reshape(height, width, channels)
+    rows, columns, channels = image.shape
+    if image.strides[1:] != (channels, 1):
+        image = np.ascontiguousarray(image)
+    pitch = image.strides[0]
+    data = np.lib.stride_tricks.as_strided(image, ((rows - 1) * pitch + columns * channels,), (1,), writeable=False)
+    sums = _area_mean(data, pitch, rows, columns, channels, height, width, whole)
+    return np.asarray(sums).reshape(height, width, channels)

@@ -16,3 +16,13 @@ def test_it_is_what_opencv_computes(size: tuple[int, int], channels: int) -> Non
     found = area_mean(image, *size)
     assert (found.shape, found.dtype) == ((size[1], size[0], channels), np.float32)
     np.testing.assert_allclose(found, downsample(image, *size), atol=1e-3)
+
+
+def test_padded_rows_are_read_in_place() -> None:
+    padded = np.random.default_rng(0).integers(0, 256, (30, 50, 3), dtype=np.uint8)
+    np.testing.assert_array_equal(area_mean(padded[:, :40], 13, 11), area_mean(padded[:, :40].copy(), 13, 11))
+
+
+def test_whole_numbers_are_the_nearest() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (30, 40, 3), dtype=np.uint8)
+    np.testing.assert_array_equal(area_mean(image, 20, 15, whole=True), np.round(area_mean(image, 20, 15)))
