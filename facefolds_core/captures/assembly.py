@@ -154,9 +154,9 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     """
     scene, capture = plan.scene, plan.capture
     width, height = scene.width, scene.height
-    held = [row for row in plan.rows if scene.splits[row.camera] == "holdout"]
+    scored = [row for row in plan.rows if scene.splits[row.camera] != "train"]
     opacity = {
-        "masks": _negatives(held, capture.masks, lambda c, f: f"mask of {capture.place(c, f)}"),
+        "masks": _negatives(scored, capture.masks, lambda c, f: f"mask of {capture.place(c, f)}"),
         "mattes": _negatives(plan.rows, capture.mattes, lambda c, f: f"matte of {capture.place(c, f)}"),
     }
     shown = _negatives(plan.rows, capture.images, capture.place)
