@@ -76,12 +76,12 @@ def photos(
             values = corrected_colour(values, colour)
         return to_8bit(display_colour(values) if params.display_colour else values)
 
-    return _developed(capture, negatives, "rgb", finish)
+    return _developed(capture, negatives, "rgb", width, finish)
 
 
 def opacities(capture: Capture, negatives: Sequence[Negative], width: int, height: int) -> Iterator[Row]:
     """Masks or mattes (height, width, 1); raises like `photos`."""
-    return _developed(capture, negatives, "opacity", lambda one, mask: _averaged_8bit(one, mask, width, height))
+    return _developed(capture, negatives, "opacity", width, lambda one, mask: _averaged_8bit(one, mask, width, height))
 
 
 def _averaged(negative: Negative, photo: Image, width: int, height: int) -> NDArray[np.float32]:
@@ -106,7 +106,11 @@ def _quickly(negative: Negative, photo: Image, width: int, height: int) -> bool:
 
 
 def _developed(
-    capture: Capture, negatives: Sequence[Negative], channels: Channels, finish: Callable[[Negative, Image], Image]
+    capture: Capture,
+    negatives: Sequence[Negative],
+    channels: Channels,
+    width: int,
+    finish: Callable[[Negative, Image], Image],
 ) -> Iterator[Row]:
     """Rows of the scene, a bounded number of them ahead of who asks."""
 
@@ -135,7 +139,8 @@ def _developed(
     threads = -(-cores // LANES)
 
     def lane(wanted: Sequence[Negative]) -> Iterator[Row]:
-        pictures = decoded([(negative.picture, negative.place) for negative in wanted], channels, threads)
+        fine = 4 * width > 3 * capture.views[wanted[0].view].camera.width
+        pictures = decoded([(negative.picture, negative.place) for negative in wanted], channels, threads, fine)
         for negative, photo in zip(wanted, pictures, strict=True):
             with working:
                 row = develop(negative, photo)
