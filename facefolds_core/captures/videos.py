@@ -247,9 +247,11 @@ def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
 
 def _check_turn(video: Video, container: Any, stream: Any) -> None:
     """Refuse a tag that turns the picture: K and width and height refer to what is stored, players show another."""
+    stream.codec_context.thread_count = 1
     try:
-        frame = next(container.decode(stream))
-    except (FFmpegError, StopIteration) as error:
+        packet = next(container.demux(stream))
+        frame = [*stream.codec_context.decode(packet), *stream.codec_context.decode(None)][0]
+    except (FFmpegError, StopIteration, IndexError) as error:
         raise video.refused("a damaged video", "a first frame", str(error) or "none", frame=0) from None
     finally:
         container.seek(0)
@@ -265,5 +267,8 @@ def _check_turn(video: Video, container: Any, stream: Any) -> None:
 
 def _pixels(frame: Any, reformatter: VideoReformatter, channels: Channels) -> Image:
     """(H, W, 3) RGB, or (H, W, 1) of a grey one: its green channel, full range."""
-    rgb = cast(Image, reformatter.reformat(frame, format="rgb24", interpolation=Interpolation.BICUBIC).to_ndarray())
+    converted = reformatter.reformat(frame, format="rgb24", interpolation=Interpolation.BICUBIC)
+    plane = converted.planes[0]  # its rows are padded: seen in place, for copying costs as much as converting
+    rows: Image = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[: converted.height]
+    rgb = rows[:, : 3 * converted.width].reshape(converted.height, converted.width, 3)
     return rgb if channels == "rgb" else np.ascontiguousarray(rgb[..., 1:2])
