@@ -52,7 +52,8 @@ class ImageScore:
 class Panel:
     """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores.
 
-    `mask` is the subject's opacity (H, W), or None where neither capture nor scene has one.
+    `mask` is the subject's opacity (H, W) by which it is scored, None where none is known; `over` the asset over the
+    camera's clean plate, where there is one.
     """
 
     camera: str
@@ -63,6 +64,12 @@ class Panel:
     model_score: ImageScore
     asset_score: ImageScore
     mask: Array | None = None
+    over: Array | None = None
+
+    @property
+    def shown(self) -> Array:
+        """The asset over the plate, else over the background colour."""
+        return self.asset if self.over is None else self.over
 
     @property
     def rank(self) -> tuple[bool, float]:
