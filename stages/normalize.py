@@ -29,8 +29,8 @@ def summary(plan: Plan) -> str:
 
 
 def left_out(scene: Scene) -> list[str]:
-    """The first lines on what is odd in the scene, then on what it does not have."""
-    lines = sorted(scene.left_out, key=lambda one: not str(one).startswith("note: "))
+    """The first lines on what the scene does not have, and on what is odd in it: notes come first."""
+    lines = sorted(map(str, scene.left_out), key=lambda line: not line.startswith("note:"))
     shown = [f"  {line}" for line in lines[:SHOWN]]
     if len(lines) > SHOWN:
         shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")

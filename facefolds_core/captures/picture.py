@@ -105,8 +105,7 @@ class Hdf5Picture:
     dataset: str
 
     def size(self, place: str) -> tuple[int, int]:
-        data = self._bytes(place)
-        return _size_of(data, lambda: data, self.file, self._at(place), FORMATS)
+        return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), FORMATS)
 
     def rgb(self, place: str) -> Image:
         return rgb_of(self._bytes(place), self.file, self._at(place))
@@ -117,10 +116,13 @@ class Hdf5Picture:
     def _at(self, place: str) -> str:
         return f"{place} ({self.dataset})"
 
-    def _bytes(self, place: str) -> bytes:
+    def _bytes(self, place: str, most: int | None = None) -> bytes:
         try:
             value = open_hdf5(self.file)[self.dataset]
-            data = value[()] if isinstance(value, h5py.Dataset) else None
+            part = (
+                slice(most) if isinstance(value, h5py.Dataset) and value.shape[:1] and value.dtype.itemsize == 1 else ()
+            )
+            data = value[part] if isinstance(value, h5py.Dataset) else None
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise _wrong(self.file, self._at(place), "cannot read an image", str(error)) from None
         if data is None or np.asarray(data).dtype.kind not in "uiSV":

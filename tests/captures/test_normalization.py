@@ -118,11 +118,19 @@ def test_cameras_beyond_the_angles_are_culled_and_named(tmp_path: Path) -> None:
     assert [(one.kind, one.camera) for one in scene.left_out[1:]] == [("culled", "400002"), ("culled", "400004")]
 
 
-@pytest.mark.parametrize(("every", "held"), [(2, ["b", "d"]), (3, ["c"]), (5, ["e"]), (9, [])])
+@pytest.mark.parametrize(("every", "held"), [(2, ["b", "d"]), (3, ["c"]), (5, ["e"])])
 def test_every_nth_camera_is_held_out(every: int, held: list[str]) -> None:
     subject = Subject(source="transforms", path=".", holdout=HoldoutEvery(every=every))
     splits = split_cameras("abcde", subject, [], "capture")
     assert [name for name, split in zip("abcde", splits, strict=True) if split == "holdout"] == held
+
+
+def test_too_few_cameras_for_a_hold_out_are_refused_before_anything_is_trained() -> None:
+    subject = Subject(source="transforms", path=".")
+    with pytest.raises(UserError, match="too few cameras to hold one out") as caught:
+        split_cameras("abcde", subject, [], "capture")
+    assert "['c']" in str(caught.value)
+    assert split_cameras("abcde", subject.model_copy(update={"holdout": ()}), [], "capture") == ("train",) * 5
 
 
 @pytest.mark.parametrize(
