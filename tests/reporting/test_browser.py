@@ -145,11 +145,11 @@ def test_without_script_the_first_picture_is_shown(open_report: Open) -> None:
 
 
 def test_any_frame_of_the_film_is_shown_by_its_name(open_report: Open) -> None:
-    page = open_report()
-    page.wait_for_function("document.querySelector('#film').readyState >= 2")
-    page.evaluate("document.querySelector('#film').pause()")
-    slider = page.get_by_role("slider", name="Frame")
-    slider.fill("2")
-    page.wait_for_function("!document.querySelector('#film').seeking")
+    page = open_report(reduced_motion="reduce")  # it does not play by itself
+    film = page.locator("#film")
+    film.evaluate("v => v.readyState >= 2 || new Promise((done) => v.addEventListener('loadeddata', done))")
+    assert film.evaluate("v => v.paused")
+    page.get_by_role("slider", name="Frame").fill("2")
+    film.evaluate("v => !v.seeking || new Promise((done) => v.addEventListener('seeked', done))")
     assert page.locator("#frame-name").inner_text() == "000002"
-    assert page.evaluate("Math.floor(document.querySelector('#film').currentTime * 30)") == 2
+    assert film.evaluate("v => Math.floor(v.currentTime * 30)") == 2
