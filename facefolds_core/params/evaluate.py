@@ -42,6 +42,9 @@ class EvaluateParams(Section):
     film_crf: Annotated[int, Field(ge=0, le=51)] = 18
     """Constant rate factor of these films, of libx264: smaller is finer."""
 
+    cvvdp_frames: Count = 60
+    """Of each camera that CVVDP judges, where it is installed: they are held in memory together."""
+
     fresh_views: Natural = 0
     """For the embedded actor: so many new views, filmed for the purpose and scored by their angle; 0 films none."""
 

@@ -61,7 +61,7 @@ GROUPS: dict[str, dict[str, tuple[str, int]]] = {
         "psnr_band_over_plate": ("along it, over the plate", 2),
     },
     "matte": {"matte_iou": ("IoU", 3), "matte_sad": ("SAD", 2)},
-    "over time": {"temporal": ("share explained", 2), "flicker": ("flicker", 4)},
+    "over time": {"temporal": ("share explained", 2), "flicker": ("flicker", 4), "cvvdp": ("CVVDP, JOD", 2)},
     "whole frame": {key: (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
 }
 """Group -> metric -> its name and its digits; the whole frame comes last."""

@@ -25,6 +25,7 @@ from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.scoring.analysis import Sums as SeenSums
+from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
 from facefolds_core.scoring.images import Rendering, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
@@ -94,22 +95,25 @@ def evaluate(
     found, changes = [], {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
         for split in SCORED:
-            sums = []
+            sums, judged = [], []
             for index in scene.indices(split):
                 film, hits = Film(), scorer.caster.cast(scene.cameras[index])
+                screening = Screening(perceptual.cvvdp, params.cvvdp_frames)
                 shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
                 with shown_split.roll(scene.cameras[index].name) as roll:
                     for k, shot in scorer.shots(split, index, hits):
                         found += shot.scores
                         if shot.panel.mask is not None:
                             film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
+                            screening.add(shot.pictures, shot.panel.truth, shot.panel.mask)
                         if split == "holdout":
                             show.add(k, shot, scene.cameras[index], hits, scorer.kind)
                         if roll is not None:
                             roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
                         bar.update()
                 sums.append(film.sums())
-            changes[split] = _changes(sums)
+                judged.append(screening.judge(scene.fps))
+            changes[split] = _changes(sums, mean_jod(judged))
     if show.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
@@ -137,10 +141,13 @@ class _Show:
             self.seen.add_picture(camera, hits, shot.textures, panel.asset - panel.truth, known)
 
 
-def _changes(films: Sequence[dict[str, Sums]]) -> dict[str, Change]:
+def _changes(films: Sequence[dict[str, Sums]], jod: Mapping[str, float]) -> dict[str, Change]:
     """By variant, over all cameras."""
     variants = dict.fromkeys(variant for film in films for variant in film)
-    return {variant: change_of(film[variant] for film in films if variant in film) for variant in variants}
+    return {
+        variant: change_of((film[variant] for film in films if variant in film), jod.get(variant))
+        for variant in variants
+    }
 
 
 class _Scorer:

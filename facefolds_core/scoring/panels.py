@@ -19,7 +19,7 @@ REGION_METRICS = ("psnr_interior", "psnr_band", "psnr_band_over_plate")
 MATTE_METRICS = ("matte_sad", "matte_mse", "matte_gradient", "matte_iou")
 ALL_METRICS = (*METRICS, *SUBJECT_METRICS, *FOUND_METRICS, *PLATE_METRICS, *REGION_METRICS, *MATTE_METRICS)
 """Of each picture; docs/reference/metrics.md defines them."""
-FILM_METRICS = ("temporal", "flicker")
+FILM_METRICS = ("temporal", "flicker", "cvvdp")
 """Of each variant, over all frames of its cameras."""
 HEADLINES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
 """The first that is there says most of the asset."""
