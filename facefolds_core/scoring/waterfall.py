@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.sheets import full_meshes
 from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, read_sheets, read_surfaces
