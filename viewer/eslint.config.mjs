@@ -8,5 +8,6 @@ export default [
     languageOptions: { globals: { ...globals.browser } },
     rules: { eqeqeq: ["error", "always", { null: "ignore" }], "no-var": "error", "prefer-const": "error" },
   },
+  { files: ["src/draco/decoder.js"], languageOptions: { globals: { DRACO_BYTES: "readonly" } } },
   { files: ["build.mjs", "test/**"], languageOptions: { globals: { ...globals.node } } },
 ];
