@@ -220,6 +220,25 @@ class Photo(Poster):
     w2c: tuple[Row, Row, Row]
 
 
+class FilmedView(Part):
+    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
+
+    Attributes:
+        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
+        elevation: the range of the training cameras, degrees.
+    """
+
+    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
+    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
+
+    @field_validator("azimuth", "elevation")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not value[0] <= value[1] <= value[0] + 360:
+            raise ValueError("from the lower to the higher angle, at most a full turn")
+        return value
+
+
 class Compositing(Part):
     """How the layers are put together."""
 
@@ -236,6 +255,7 @@ class Manifest(Part):
         levels: coarsest first; the last is the full one.
         audio: of the sequence; it is in the MP4 files too.
         photos: for comparison.
+        view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
@@ -249,7 +269,15 @@ class Manifest(Part):
     audio: StoredFile | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
+    view: Annotated[FilmedView | None, Field(exclude_if=lambda view: view is None)] = None
     manifest_sha256: Sha256 = _UNSEALED
+
+    @field_validator("view")
+    @classmethod
+    def _absent_or_whole(cls, value: FilmedView | None) -> FilmedView:
+        if value is None:
+            raise ValueError("the filmed range, or no such key")
+        return value
 
     @property
     def full(self) -> Level:
@@ -268,6 +296,7 @@ def manifest_schema() -> dict[str, Any]:
     schema = Manifest.model_json_schema(mode="serialization")
     layer = schema["$defs"]["Layer"]
     layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
+    schema["properties"]["view"] = {"$ref": "#/$defs/FilmedView"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
 
 

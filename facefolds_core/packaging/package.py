@@ -17,6 +17,7 @@ from PIL import Image
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.effects import EffectsPicture
+from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Level,
@@ -205,7 +206,7 @@ def _crf(
 def _with_extras(
     folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
 ) -> Manifest:
-    """Add sound, a poster and photos."""
+    """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
         path = folder / f"audio{scene.audio.suffix}"
@@ -213,6 +214,7 @@ def _with_extras(
         update["audio"] = StoredFile(**_stored(path))
     cameras = training_cameras(scene)
     if cameras:
+        update["view"] = filmed_view(cameras)
         update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras), jpeg_quality)
     return manifest.model_copy(update=update)
 

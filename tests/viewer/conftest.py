@@ -19,7 +19,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving import serving
 from tests.viewer.fixtures import rich_asset
 
-PATIENCE = 60_000
+PATIENCE = 15_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
 ELEMENT = "document.querySelector('facefolds-player')"
 
@@ -105,6 +105,15 @@ class Player:
             return JSON.stringify([height, width, btoa(text)]);"""
         height, width, data = json.loads(str(self.run(code, given)))
         return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255
+
+
+def page_of_yours(player: Player, body: str) -> None:
+    """Open a page with `body` and the module of the player, without any policy, from the player's own server."""
+    script = '<script type="module" src="facefolds-player.js"></script>'
+    head = '<!doctype html><meta name="viewport" content="width=device-width">'
+    html = f'{head}<link rel="icon" href="data:,">{script}<body style="margin:0">{body}</body>'
+    player.page.route("**/yours.html", lambda route: route.fulfill(body=html, content_type="text/html"))
+    player.page.goto(f"{player.address}yours.html")
 
 
 NewPlayer = Callable[..., Player]

@@ -322,7 +322,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.layers = this.layers.map(() => true);
     this.loop = this.getAttribute("loop") !== "false";
     this.speed = Number(this.getAttribute("speed")) || 1;
-    this.level = this.getAttribute("level") ?? "auto";
+    this.level = this.levels.includes(this.getAttribute("level")) ? this.getAttribute("level") : "auto";
     this.resetView();
   }
 

@@ -1,0 +1,40 @@
+"""Which directions a capture has filmed its subject from: the manifest's `view`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from facefolds_core.asset.manifest import FilmedView
+from facefolds_core.geometry.cameras import Camera
+
+_DIGITS = 2
+"""Of the degrees that are written: more than any calibration knows."""
+
+
+def filmed_view(cameras: Iterable[Camera]) -> FilmedView | None:
+    """The smallest arc of azimuths and the range of elevations that hold all cameras, as seen from the origin.
+
+    Args:
+        cameras: in normalised coordinates: the subject is at the origin and faces +x.
+
+    Returns:
+        degrees; None without cameras. A camera at the origin has no direction and is left out.
+    """
+    centres = np.array([camera.centre for camera in cameras], np.float64).reshape(-1, 3)
+    centres = centres[np.linalg.norm(centres, axis=1) > 0]
+    if not len(centres):
+        return None
+    x, y, z = centres.T
+    elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    azimuth = np.sort(np.degrees(np.arctan2(y, x)))
+    gaps = np.diff(azimuth, append=azimuth[0] + 360)
+    widest = int(np.argmax(gaps))
+    low = float(azimuth[(widest + 1) % len(azimuth)])
+    width = 360 - float(gaps[widest])
+    low -= 360 * round((low + width / 2) / 360)  # the arc's middle within half a turn of the front
+    return FilmedView(
+        azimuth=(round(low, _DIGITS), round(low + width, _DIGITS)),
+        elevation=(round(float(elevation.min()), _DIGITS), round(float(elevation.max()), _DIGITS)),
+    )
