@@ -300,12 +300,18 @@ def manifest_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
 
 
-def write_manifest(manifest: Manifest, path: Path) -> Manifest:
-    """Write the manifest with its own checksum; returns it as written."""
+def sealed(manifest: Manifest) -> tuple[str, str]:
+    """The text of the manifest's file, with its own checksum in it, and that checksum."""
     value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
     text = json.dumps(value, indent=1, allow_nan=False) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()
-    write_text(path, text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'))
+    return text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'), digest
+
+
+def write_manifest(manifest: Manifest, path: Path) -> Manifest:
+    """Write the manifest with its own checksum; returns it as written."""
+    text, digest = sealed(manifest)
+    write_text(path, text)
     return manifest.model_copy(update={"manifest_sha256": digest})
 
 

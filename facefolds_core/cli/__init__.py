@@ -20,6 +20,7 @@ COMMANDS = {
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
     "export": "Write an asset as another program can read it.",
+    "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
     "report": "A page that tells all about a subject.",
     "collect": "One table of the experiments of `dvc exp run`.",

@@ -83,10 +83,23 @@ def test_one_finger_scrolls_the_page_upright_and_turns_across(new_player: NewPla
     player.wait("e.ready")
     assert player.run("return getComputedStyle(e.shadowRoot.querySelector('canvas')).touchAction") == "pan-y"
     client = player.page.context.new_cdp_session(player.page)
-    swipe = {"x": 200, "y": 200, "speed": 600}
-    client.send("Input.synthesizeScrollGesture", {**swipe, "yDistance": -120, "gestureSourceType": "touch"})
+    touch = lambda kind, *points: client.send(  # noqa: E731
+        "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
+    )
+    touch("touchStart", (200, 200))
+    for k in range(1, 13):
+        touch("touchMove", (200, 200 - 10 * k))
+    touch("touchEnd")
     player.page.wait_for_function("() => scrollY > 50")
-    assert player.run("return Math.abs(e.player.view.goal.azimuth) < 1")
+    assert player.run("return [e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [0, 0]
+    player.page.wait_for_timeout(1000)  # the page has come to rest
+    player.page.evaluate("() => scrollTo(0, 0)")
+    touch("touchStart", (200, 150))
+    for k in range(1, 9):
+        touch("touchMove", (200 - 10 * k, 150))
+    touch("touchEnd")
+    player.wait("e.player.view.goal.azimuth > 5")
+    assert player.page.evaluate("() => scrollY") == 0
 
 
 def test_twenty_players_share_one_context_and_give_it_back(new_player: NewPlayer, rich: Path) -> None:

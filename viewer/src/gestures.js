@@ -3,6 +3,7 @@
  * so is the wheel unless the player has the focus or Ctrl is held. Two fingers, and horizontal strokes, are the view's.
  */
 
+const SLOP = 6; // CSS pixels that a finger moves before it is known where to
 const WHEEL = 0.0012; // a pixel of the wheel, as a share of the distance
 
 /** @param {HTMLElement} surface @param {import("./view.js").View} view */
@@ -21,16 +22,28 @@ export function connectGestures(surface, view) {
     return [x - box.x - box.width / 2, y - box.y - box.height / 2];
   };
 
+  const lift = (event) => {
+    if (pointers.delete(event.pointerId) && !pointers.size) view.rest();
+  };
+
   on("pointerdown", (event) => {
     if (view.exact || event.button > 2) return;
     surface.setPointerCapture(event.pointerId);
     const pans = event.button > 0 || event.ctrlKey || event.metaKey || event.shiftKey;
-    pointers.set(event.pointerId, { ...spot(event), pans });
+    // A finger's stroke is the page's until it turns out to go across.
+    const undecided = event.pointerType === "touch" && getComputedStyle(surface).touchAction !== "none";
+    pointers.set(event.pointerId, { ...spot(event), pans, undecided });
     view.touched();
   });
   on("pointermove", (event) => {
     const held = pointers.get(event.pointerId);
     if (!held) return;
+    if (held.undecided && pointers.size === 1) {
+      const [across, along] = [Math.abs(event.clientX - held.x), Math.abs(event.clientY - held.y)];
+      if (Math.max(across, along) < SLOP) return;
+      if (along > across) return lift(event);
+    }
+    for (const pointer of pointers.values()) pointer.undecided = false;
     const before = [...pointers.values()].map((point) => ({ ...point }));
     const [dx, dy] = [event.clientX - held.x, event.clientY - held.y];
     Object.assign(held, spot(event));
@@ -44,9 +57,6 @@ export function connectGestures(surface, view) {
       view.zoom(Math.max(1, gap(before)) / Math.max(1, gap(after)), ...fromMiddle(to));
     }
   });
-  const lift = (event) => {
-    if (pointers.delete(event.pointerId) && !pointers.size) view.rest();
-  };
   on("pointerup", lift);
   on("pointercancel", lift);
   on("lostpointercapture", lift);

@@ -77,6 +77,7 @@ export function connectBar(element) {
       control.disabled = still;
   };
   player.addEventListener("frame", showFrame);
+  for (const name of ["share", "embed"]) root.querySelector(`[data-do="${name}"]`).hidden = !element.shareable;
   player.addEventListener("ready", () => {
     compare.hidden = player.manifest.photos.length === 0;
     showFrame();
