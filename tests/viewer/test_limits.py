@@ -81,6 +81,19 @@ def test_the_head_stands_above_the_bar_at_every_size(player: Player) -> None:
         assert low - high > 0.3 * min(width, bar["y"]), (width, height)
 
 
+def test_the_sheet_of_a_phone_leaves_the_face_in_sight(player: Player) -> None:
+    player.page.set_viewport_size({"width": 390, "height": 700})
+    player.wait("e.player.size[0] === 390")
+    player.button("Settings")
+    panel = player.page.locator(".panel")
+    panel.wait_for()
+    player.page.wait_for_timeout(200)
+    box = panel.bounding_box()
+    assert box
+    high, low = lowest_and_highest(player)
+    assert 0 < high < low <= box["y"] + 1
+
+
 def test_a_view_that_somebody_chose_stays_when_the_size_changes(player: Player) -> None:
     player.run("e.player.view.set({azimuth: 20, elevation: 5, distance: 0.8, target: [0, 0, 0]})")
     player.page.set_viewport_size({"width": 400, "height": 640})

@@ -191,7 +191,7 @@ export class View {
 
   /** Pixels that the controls leave. */
   #room() {
-    return [this.size[0], Math.max(0.4 * this.size[1], this.size[1] - this.inset)];
+    return [this.size[0], Math.max(0.3 * this.size[1], this.size[1] - this.inset)];
   }
 
   /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera null: back to the orbit */

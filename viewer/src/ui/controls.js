@@ -12,7 +12,7 @@ const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
 export function connectControls(element) {
   const { player, shadowRoot: root } = element;
   const stage = root.querySelector(".stage");
-  const bar = root.querySelector(".bar");
+  const [bar, panel] = [".bar", ".panel"].map((name) => root.querySelector(name));
   element.comparison = new Comparison(element);
   connectBar(element);
   connectPanel(element);
@@ -21,11 +21,13 @@ export function connectControls(element) {
   connectGesturesOf(element);
   const idle = connectIdle(element);
   const resizing = new ResizeObserver(() => {
-    const below = bar.offsetHeight ? stage.clientHeight - bar.offsetTop : 0;
+    // The bar, and on a phone the open sheet of the settings: the head stands above them.
+    const sheet = panel.offsetHeight && panel.offsetTop > stage.clientHeight / 3;
+    const top = sheet ? panel.offsetTop : bar.offsetTop;
+    const below = bar.offsetHeight ? stage.clientHeight - top : 0;
     player.resize(stage.clientWidth, stage.clientHeight, Math.min(RATIO, devicePixelRatio), below);
   });
-  resizing.observe(stage);
-  resizing.observe(bar);
+  for (const part of [stage, bar, panel]) resizing.observe(part);
   return () => {
     resizing.disconnect();
     idle();
