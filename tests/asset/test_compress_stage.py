@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.effects import EffectsPicture
+from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
