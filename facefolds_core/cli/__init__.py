@@ -23,6 +23,7 @@ COMMANDS = {
     "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
     "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
+    "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
@@ -34,6 +35,7 @@ COMMANDS = {
 
 EXTRAS = {
     "submission": "train",
+    "scores": "train",
     "report": "report",
     "waterfall": "train",
     "collect": "pipeline",
