@@ -19,7 +19,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving import serving
 from tests.viewer.fixtures import rich_asset
 
-PATIENCE = 15_000
+PATIENCE = 60_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
 ELEMENT = "document.querySelector('facefolds-player')"
 

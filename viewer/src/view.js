@@ -84,13 +84,16 @@ export class View {
 
   /** The first view: all that there is, from the front. @param {{low: number[], high: number[], centre: number[]}} box */
   setHome({ low, high, centre }) {
-    const [width, height] = this.#room();
-    const short = Math.min(width, height);
-    const fits = (extent, side) => (extent * short) / (2 * HALF * FILLED * side);
-    const across = Math.max(fits(high[1] - low[1], width), fits(high[2] - low[2], height));
-    const distance = clamp(across + 0.5 * (high[0] - centre[0]), DISTANCES);
+    const away = this.distanceFor(high[1] - low[1], high[2] - low[2]);
+    const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
     this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
     if (this.atHome && !this.exact) this.reset();
+  }
+
+  /** From how far something of that width and height fills the free part of the canvas. */
+  distanceFor(across, tall) {
+    const [width, height] = this.#room();
+    return (Math.min(width, height) * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
   }
 
   reset() {

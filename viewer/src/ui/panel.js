@@ -63,18 +63,18 @@ export function connectPanel(element) {
   for (const name of ["ready", "change"]) player.addEventListener(name, showState);
 }
 
-/** Pulls the layers apart; the first time turns aside and goes back, so that all of them are seen; and back at the end. */
+/** Pulls the layers apart, turns aside and fits them, so that all are seen; goes back at the end. */
 export function pullApart(element, amount) {
   const { view, renderer } = element.player;
-  const before = element.spread;
+  if (!element.spread && amount) element.together = view.get();
   element.spread = amount;
-  if (!before && amount) {
-    renderer.setSpread(1);
-    const { radius } = renderer.bounds();
-    renderer.setSpread(amount);
-    element.together = view.get();
-    view.glide({ azimuth: ASIDE, distance: Math.max(view.goal.distance, 2.4 * radius), target: [0, 0, 0] });
-  } else if (before && !amount && element.together) {
+  if (amount) {
+    const { low, high, centre } = renderer.bounds();
+    const [depth, width, tall] = high.map((value, i) => value - low[i]);
+    const angle = (ASIDE * Math.PI) / 180;
+    const away = view.distanceFor(depth * Math.sin(angle) + width * Math.cos(angle), tall);
+    view.glide({ azimuth: ASIDE, distance: away + (depth / 2) * Math.cos(angle), target: centre });
+  } else if (element.together) {
     view.glide(element.together);
     element.together = null;
   }
