@@ -16,3 +16,9 @@ export function viewFrom(right, up, back, position) {
   const row = (axis) => [...axis, -(axis[0] * position[0] + axis[1] * position[1] + axis[2] * position[2])];
   return fromRows([row(right), row(up), row(back), [0, 0, 0, 1]]);
 }
+
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b @returns {Matrix} a b */
+export const multiplied = (a, b) =>
+  Array.from({ length: 16 }, (_, i) =>
+    [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * (i >> 2) + k], 0),
+  );

@@ -40,6 +40,7 @@ export class Player extends EventTarget {
     this.stale = false; // the canvas needs drawing
     this.lost = false; // the graphics context
     this.onScreen = true;
+    this.immersed = false; // a headset draws
     this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
@@ -243,7 +244,7 @@ export class Player extends EventTarget {
 
   /** Asks for an animation frame, if anything moves and anybody sees it. */
   wake() {
-    if (this.request || this.closed || this.lost || !this.level || !this.onScreen) return;
+    if (this.request || this.closed || this.lost || !this.level || !this.onScreen || this.immersed) return;
     if (!this.playing && !this.stale) return;
     this.request = requestAnimationFrame((now) => this.#tick(now));
   }
@@ -253,9 +254,7 @@ export class Player extends EventTarget {
     if (this.lost) return;
     const began = performance.now();
     const seconds = this.before ? Math.min(LONGEST_STEP, (now - this.before) / 1000) : 1 / 60;
-    if (this.level.source.playsItself) this.#follow();
-    else if (this.playing) this.#advance(seconds);
-    this.sound?.follow(this.playing, this.playback);
+    this.moveOn(seconds);
     const moving = this.view.update(seconds);
     if (this.stale || moving || this.view.swaying) this.draw();
     while (this.drawn.length && now - this.drawn[0] > RATE_OVER) this.drawn.shift();
@@ -263,6 +262,22 @@ export class Player extends EventTarget {
     this.busy = (performance.now() - began) / 1000;
     this.wake();
     this.before = this.request ? now : 0;
+  }
+
+  /** Lets time pass: shows the frame that is due. */
+  moveOn(seconds) {
+    if (this.level.source.playsItself) this.#follow();
+    else if (this.playing) this.#advance(Math.min(LONGEST_STEP, seconds));
+    this.sound?.follow(this.playing, this.playback);
+  }
+
+  /** While a headset asks for the pictures, the page's own rest. */
+  setImmersed(on) {
+    this.immersed = on;
+    cancelAnimationFrame(this.request);
+    this.request = 0;
+    if (!on) this.invalidate();
+    this.say("change");
   }
 
   #advance(seconds) {

@@ -33,6 +33,7 @@ export function connectBar(element) {
     picture: () => savePicture(element),
     embed: () => element.openEmbed(),
     dismiss: () => dismiss(element),
+    vr: () => toggleVr(element, find('[data-do="vr"]')),
   };
   element.actions = actions;
   root.querySelector(".stage").addEventListener("click", (event) => {
@@ -79,11 +80,27 @@ export function connectBar(element) {
   player.addEventListener("frame", showFrame);
   for (const name of ["share", "embed"]) root.querySelector(`[data-do="${name}"]`).hidden = !element.shareable;
   player.addEventListener("ready", () => {
+    if (navigator.xr)
+      import("../xr.js").then(async ({ offersVr }) => (find('[data-do="vr"]').hidden = !(await offersVr())));
     compare.hidden = player.manifest.photos.length === 0;
     showFrame();
   });
   for (const name of ["play", "pause", "change", "ready"]) player.addEventListener(name, showState);
   showState();
+}
+
+async function toggleVr(element, button) {
+  const { player } = element;
+  if (player.immersed) return player.immersion.end();
+  if (!element.ready) return;
+  const { Immersion } = await import("../xr.js");
+  player.immersion = new Immersion(player, () => button.setAttribute("aria-pressed", "false"));
+  try {
+    await player.immersion.start();
+    button.setAttribute("aria-pressed", "true");
+  } catch (error) {
+    element.overlays.say(`The headset cannot be used: ${error.message}`, 8000);
+  }
 }
 
 async function share(element) {
