@@ -12,7 +12,10 @@ import pytest
 from tests.viewer.conftest import NewPlayer
 
 EMULATOR = """import { XRDevice, metaQuest3 } from "iwer";
-window.headset = new XRDevice(metaQuest3); headset.installRuntime({ forceInstall: true }); headset.stereoEnabled = true; headset.ipd = 0.064;
+window.headset = new XRDevice(metaQuest3);
+headset.installRuntime({ forceInstall: true });
+headset.stereoEnabled = true;
+headset.ipd = 0.064;
 """
 LOOK = """
     const half = (rect) => { const [x, y, w, h] = rect; const data = new Uint8Array(4 * w * h);

@@ -7,6 +7,7 @@ import { Adaptation } from "../src/adapt.js";
 import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
 import { Playback } from "../src/playback.js";
+import { droppedAsset } from "../src/ui/drop.js";
 import { decode, encode } from "../src/viewstate.js";
 
 /** three's own arithmetic, to hold ours against. */
@@ -198,4 +199,25 @@ test("a level that is too much is left, and tried again after a longer wait", ()
   assert.ok(adaptation.wait >= 2 * wait);
   adaptation.restart();
   assert.deepEqual(played(adaptation, wait, 1 / 60, 0.004), []); // not so soon again
+});
+
+/** What a browser gives for a folder that is dropped; its reader gives a few entries at a time. */
+const folderEntry = (path, children) => ({
+  fullPath: path,
+  createReader() {
+    const left = [...children];
+    return { readEntries: (resolve) => resolve(left.splice(0, 2)) };
+  },
+});
+const fileEntry = (path) => ({ fullPath: path, isFile: true, file: (resolve) => resolve(new Blob([path])) });
+
+test("a folder that is dropped is read whole; files of folders inside it are none of the asset's", async () => {
+  const inner = folderEntry("/a/old", [fileEntry("/a/old/manifest.json"), fileEntry("/a/old/x.drc")]);
+  const names = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"];
+  const entry = folderEntry("/a", [inner, ...names.map((name) => fileEntry(`/a/${name}`))]);
+  const found = await droppedAsset({ items: [{ webkitGetAsEntry: () => entry }], files: [] });
+  assert.deepEqual([...found.keys()].sort(), [...names].sort());
+  assert.equal(await found.get("manifest.json").text(), "/a/manifest.json");
+  const empty = { items: [{ webkitGetAsEntry: () => folderEntry("/b", []) }], files: [] };
+  await assert.rejects(droppedAsset(empty), /no manifest\.json/);
 });
