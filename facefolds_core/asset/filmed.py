@@ -9,9 +9,6 @@ import numpy as np
 from facefolds_core.asset.manifest import FilmedView
 from facefolds_core.geometry.cameras import Camera
 
-_DIGITS = 2
-"""Of the degrees that are written: more than any calibration knows."""
-
 
 def filmed_view(cameras: Iterable[Camera]) -> FilmedView | None:
     """The smallest arc of azimuths and the range of elevations that hold all cameras, as seen from the origin.
@@ -34,7 +31,5 @@ def filmed_view(cameras: Iterable[Camera]) -> FilmedView | None:
     low = float(azimuth[(widest + 1) % len(azimuth)])
     width = 360 - float(gaps[widest])
     low -= 360 * round((low + width / 2) / 360)  # the arc's middle within half a turn of the front
-    return FilmedView(
-        azimuth=(round(low, _DIGITS), round(low + width, _DIGITS)),
-        elevation=(round(float(elevation.min()), _DIGITS), round(float(elevation.max()), _DIGITS)),
-    )
+    rounded = [round(float(angle), 2) for angle in (low, low + width, elevation.min(), elevation.max())]
+    return FilmedView(azimuth=(rounded[0], rounded[1]), elevation=(rounded[2], rounded[3]))

@@ -28,11 +28,11 @@ LOOK = """
     const { gl } = e.player.renderer.graphics;
     const seen = []; const draw = e.player.renderer.render.bind(e.player.renderer);
     e.player.renderer.render = (projection, view, rect, target) => { draw(projection, view, rect, target);
-      seen.push({ ...half(rect), focal: projection[0], shift: projection[8], x: view[12] }); };
+      if (e.player.immersed) seen.push({ ...half(rect), focal: projection[0], shift: projection[8], x: view[12] }); };
     e.background = '#00ff00';
     e.shadowRoot.querySelector('[data-do="vr"]').click();
     await new Promise((done) => e.player.addEventListener('immersed', done, { once: true }));
-    const first = seen.slice();
+    const first = seen.slice(-2);
     const frame = e.frame; e.play();
     await new Promise((done) => { const wait = () => e.frame !== frame ? done() : setTimeout(wait, 20); wait(); });
     await e.player.immersion.end();
