@@ -74,8 +74,6 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     rows, columns = _nodes(window, geometry.nodes)
     directions = window_directions(window, rows, columns)
     seen = profile(volume, centre, directions, start.subject_opacity)
-    if volume.room.outer:
-        seen = seen.skin(params.room.surface_depth * volume.voxel)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
         known = seen.radius
