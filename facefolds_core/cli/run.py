@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 from dask.utils import parse_bytes
+from dvc.config import Config
 
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
@@ -30,7 +31,7 @@ def command(
     scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:8786, or slurm, pbs, sge, lsf, ...")] = None,
     memory: Annotated[str, typer.Option(help="What a job needs: 14GB. Left out: not looked at.")] = "0",
     gpu: Annotated[int, typer.Option(help="GPUs that a job needs.", min=0)] = 0,
-    remote: Annotated[str | None, typer.Option(help="DVC remote for results, even where the cache is shared.")] = None,
+    remote: Annotated[bool, typer.Option("--remote", help="Results through DVC's default remote in any case.")] = False,
     to: Annotated[str, typer.Option(help="The last stage.")] = "evaluate",
     out: Annotated[Path, typer.Option(help="Table of a sweep: .parquet or .csv.")] = Path("sweep.parquet"),
 ) -> None:
@@ -49,7 +50,7 @@ def command(
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
-            _record(root, outcomes, to, remote or (scheduler and _default_remote(root)))
+            _record(root, outcomes, remote or (scheduler is not None and _has_remote(root)))
             write_summary(Path("data"), [_row(outcome) for outcome in outcomes])
         _print_table(outcomes)
         if any(outcome.error for outcome in outcomes):
@@ -57,7 +58,7 @@ def command(
 
 
 def _run_all(
-    root: Path, todo: Sequence[Job], scheduler: str | None, jobs: int, needs: Mapping[str, float], remote: str | None
+    root: Path, todo: Sequence[Job], scheduler: str | None, jobs: int, needs: Mapping[str, float], remote: bool
 ) -> list[Outcome]:
     """Outcomes in the order of `todo`; each is told of when it comes."""
 
@@ -81,18 +82,15 @@ def _run_all(
     return [found[job] for job in todo]
 
 
-def _default_remote(root: Path) -> str | None:
-    from dvc.config import Config
-
-    name = Config(str(root / ".dvc"))["core"].get("remote")
-    return None if name is None else str(name)
+def _has_remote(root: Path) -> bool:
+    return Config(str(root / ".dvc"))["core"].get("remote") is not None
 
 
-def _record(root: Path, outcomes: Sequence[Outcome], stage: str, remote: str | None) -> None:
+def _record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> None:
     good = [outcome.job.target for outcome in outcomes if not outcome.error]
     if not good:
         return
-    ran, error = record(root, good, remote)
+    ran, error = record(root, good, pull)
     if ran:
         typer.echo(f"run: note: not found in the cache, so made here: {', '.join(ran)}")
     if error:

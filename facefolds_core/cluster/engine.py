@@ -85,7 +85,7 @@ def run_jobs(
     jobs: Sequence[Job],
     *,
     needs: Mapping[str, float] | None = None,
-    remote: str | None = None,
+    remote: bool = False,
     tell: Callable[[Mapping[str, str]], None] = lambda event: None,
 ) -> Iterator[Outcome]:
     """Run jobs on a cluster; outcomes in the order in which they come.

@@ -84,19 +84,19 @@ def sweep_jobs(
     return jobs
 
 
-def record(root: Path, targets: Sequence[str], remote: str | None) -> tuple[list[str], str]:
+def record(root: Path, targets: Sequence[str], pull: bool) -> tuple[list[str], str]:
     """`dvc repro` of what is all in the cache: files into the project's folder, one dvc.lock.
 
     It waits for another DVC that is at work in the folder.
 
     Args:
-        remote: the DVC remote that the results came through, if they did.
+        pull: the results came through DVC's default remote.
 
     Returns:
         stages that ran nevertheless, and an error, or "".
     """
     command = [sys.executable, "-m", "dvc", "--wait-for-lock", "repro", *targets]
-    if remote:
+    if pull:
         command.insert(-len(targets), "--pull")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     while True:

@@ -32,7 +32,7 @@ class Project(WorkerPlugin):
         cache: DVC's cache folder.
         mark: name of a file in it; who sees that shares the cache.
         remotes: of DVC's settings, with whole addresses.
-        remote: the DVC remote that results travel through: where the cache is not shared, or `always`.
+        remote: DVC's default remote, through which results travel: where the cache is not shared, or `always`.
     """
 
     name: str
@@ -106,17 +106,15 @@ class Project(WorkerPlugin):
         settings.setdefault("cache", {})["dir"] = str(cache)
         for name, values in self.remotes.items():
             settings.setdefault(f'remote "{name}"', {}).update(values)
-        if self.remote is not None:
-            settings["core"]["remote"] = self.remote
         settings.write()
 
 
-def snapshot(root: Path, run: str, remote: str | None) -> Project:
+def snapshot(root: Path, run: str, always: bool) -> Project:
     """The project as it is now, what is not committed included; git is not needed.
 
     Args:
         run: a name for it.
-        remote: results travel through this DVC remote even where the cache is shared; None to see at the worker.
+        always: results travel through DVC's default remote even where the cache is shared.
 
     Raises:
         UserError: if it is not a DVC project, or has no such remote.
@@ -125,9 +123,9 @@ def snapshot(root: Path, run: str, remote: str | None) -> Project:
         raise UserError("not a DVC project", file=root, remedy="run the command in the project's root folder")
     config = Config(str(root / ".dvc"))
     remotes = {name: {"url": str(values["url"])} for name, values in config["remote"].items()}
-    if remote is not None and remote not in remotes:
-        known = ", ".join(remotes) or "none"
-        raise UserError("no such DVC remote", expected=known, found=remote, remedy="`dvc remote add NAME URL` adds one")
+    remote = config["core"].get("remote")
+    if always and remote is None:
+        raise UserError("no default DVC remote", file=root, remedy="`dvc remote add -d NAME URL` adds one")
     paths = [root / name for name in FILES]
     for folder in CODE:
         paths += [path for path in sorted((root / folder).rglob("*")) if path.suffix not in LEFT_OUT]
@@ -140,6 +138,6 @@ def snapshot(root: Path, run: str, remote: str | None) -> Project:
         cache=Path(config["cache"].get("dir") or root / ".dvc" / "cache").resolve(),
         mark=f".{run}",
         remotes=remotes,
-        remote=remote or config["core"].get("remote"),
-        always=remote is not None,
+        remote=remote,
+        always=always,
     )
