@@ -27,6 +27,7 @@ PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WO
 repro: $(READY)
 	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc --wait-for-lock repro
+	@echo && $(BIN)/facefolds scores
 
 check: $(READY)
 	$(PYTEST) -m "not (slow or pipeline or browser or nightly)"
@@ -69,7 +70,7 @@ bench: $(READY)
 	$(BIN)/python -m bench.speed_accuracy
 
 charts: repro
-	$(BIN)/python -m bench.export_waterfall --chart
+	$(BIN)/facefolds waterfall
 	$(BIN)/python -m bench.sweeps queue rate
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc exp run --run-all
 	$(BIN)/python -m bench.sweeps collect

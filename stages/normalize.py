@@ -19,21 +19,22 @@ SHOWN = 5
 def summary(plan: Plan) -> str:
     """One line on the scene."""
     scene = plan.scene
-    train, held = len(scene.indices("train")), len(scene.indices("holdout"))
+    train, checked, held = (len(scene.indices(split)) for split in ("train", "validate", "holdout"))
+    aside = f"{checked} validate, {held} holdout" if checked else f"{held} holdout"
     culled = sum(one.kind == "culled" for one in scene.left_out)
     return (
-        f"{len(scene.cameras)} cameras ({train} train, {held} holdout; {culled} culled), {scene.num_frames} frames, "
+        f"{len(scene.cameras)} cameras ({train} train, {aside}; {culled} culled), {scene.num_frames} frames, "
         f"{scene.width} x {scene.height} pixels, in {scene.folder}"
     )
 
 
 def left_out(scene: Scene) -> list[str]:
-    """The first lines on what the scene does not have, and on what is odd in it."""
-    lines = scene.left_out
+    """The first lines on what the scene does not have, and on what is odd in it: notes come first."""
+    lines = sorted(map(str, scene.left_out), key=lambda line: not line.startswith("note:"))
     shown = [f"  {line}" for line in lines[:SHOWN]]
     if len(lines) > SHOWN:
         shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")
-    return [f"normalize: left out, and notes ({len(lines)}):", *shown] if lines else []
+    return [f"normalize: notes, and what is left out ({len(lines)}):", *shown] if lines else []
 
 
 def normalize(folders: SubjectFolders) -> str:

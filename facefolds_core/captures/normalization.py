@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking
+from facefolds_core.captures.front import find_front
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
@@ -83,20 +84,8 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
     cameras = [view.camera for view in capture.views]
     centre = nearest_to_axes(cameras)
     if front is None:
-        facing = np.mean([camera.centre - centre for camera in cameras], axis=0)
-        up = np.mean([-camera.rotation[1] for camera in cameras], axis=0)
-        if np.linalg.norm(facing) < 1e-9 or np.linalg.norm(np.cross(facing, up)) < 1e-9:
-            raise UserError(
-                "the cameras do not tell where the subject faces",
-                file=capture.root,
-                place="front",
-                remedy="set `front` of this subject in params.yaml to a camera that faces it, upright",
-            )
-        return (
-            centre,
-            orientation(facing, up),
-            [fact("front_guessed")],
-        )
+        facing, up, note = find_front(cameras, centre, capture.root)
+        return centre, orientation(facing, up), [note]
     names = [camera.name for camera in cameras]
     if front not in names:
         raise UserError(
@@ -191,38 +180,76 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
 
 
 def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact], file: object) -> tuple[Split, ...]:
-    """ "train" or "holdout" for each of the cameras that are used, in their order.
+    """ "train", "validate" or "holdout" for each of the cameras that are used, in their order.
 
-    `every: n` holds out the cameras at positions p (from 0) with (p + 1) % n == 0.
+    `every: n` takes the cameras at positions p (from 0) with (p + 1) % n == 0: of all of them for `holdout`, of those
+    that are not held out for `validate`.
 
     Args:
         unused: facts on cameras that were left out, to say why one that is named is not there.
 
     Raises:
-        UserError: if a camera to hold out is not there, or no camera is left for training.
+        UserError: if a camera that is named is not there, or for both, no camera is left for training, or `every` of
+            `holdout` finds none.
     """
-    if isinstance(subject.holdout, HoldoutEvery):
-        held = {name for p, name in enumerate(names) if (p + 1) % subject.holdout.every == 0}
-    else:
-        held = set(subject.holdout)
-    for name in sorted(held - set(names)):
-        reasons = [str(one) for one in unused if one.camera == name]
+    held = _named("holdout", subject.holdout, names, unused, file)
+    if isinstance(subject.holdout, HoldoutEvery) and not held:
+        every = subject.holdout.every
         raise UserError(
-            "a held-out camera is not there",
+            "too few cameras to hold one out",
             file=str(file),
             place="holdout",
-            expected=f"some of {shorten(names, 200)}",
-            found=reasons[0] if reasons else f"{name}, which the capture does not have",
-            remedy="correct `holdout` of this subject in params.yaml",
+            expected=f"at least {every} cameras for `holdout: {{every: {every}}}`",
+            found=f"{len(names)}: {shorten(names)}",
+            remedy=f"name one or two in `holdout` of this subject, such as ['{names[len(names) // 2]}']; with "
+            "`holdout: []` all are trained on, and `evaluate` has nothing to score",
         )
-    splits: tuple[Split, ...] = tuple("holdout" if name in held else "train" for name in names)
+    rest = [name for name in names if name not in held]
+    validating = _named("validate", subject.validation or (), names, unused, file, rest)
+    both = sorted(held & validating)
+    if both:
+        raise UserError(
+            "a camera is held out and for validation, too",
+            file=str(file),
+            place="validate",
+            expected=f"some of {shorten(rest, 200)}",
+            found=shorten(both),
+            remedy="correct `validate` or `holdout` of this subject in params.yaml",
+        )
+    splits: tuple[Split, ...] = tuple(
+        "holdout" if name in held else "validate" if name in validating else "train" for name in names
+    )
     if "train" not in splits:
         raise UserError(
             "no camera is left for training",
             file=str(file),
-            place="holdout",
-            expected=f"fewer than {len(names)} held-out cameras",
-            found=shorten(sorted(held)),
+            place="validate" if validating else "holdout",
+            expected=f"fewer than {len(names)} cameras that are set aside",
+            found=shorten(sorted(held | validating)),
             remedy="hold out fewer cameras",
         )
     return splits
+
+
+def _named(
+    key: str,
+    chosen: Sequence[str] | HoldoutEvery,
+    names: Sequence[str],
+    unused: Sequence[Fact],
+    file: object,
+    of: Sequence[str] | None = None,
+) -> set[str]:
+    """The cameras that a key of the subject chooses: by their names, or every n-th one of `of` (all)."""
+    if isinstance(chosen, HoldoutEvery):
+        return {name for p, name in enumerate(names if of is None else of) if (p + 1) % chosen.every == 0}
+    for name in sorted(set(chosen) - set(names)):
+        reasons = [str(one) for one in unused if one.camera == name]
+        raise UserError(
+            "a held-out camera is not there" if key == "holdout" else "a camera for validation is not there",
+            file=str(file),
+            place=key,
+            expected=f"some of {shorten(names, 200)}",
+            found=reasons[0] if reasons else f"{name}, which the capture does not have",
+            remedy=f"correct `{key}` of this subject in params.yaml",
+        )
+    return set(chosen)

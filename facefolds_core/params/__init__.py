@@ -18,7 +18,7 @@ from facefolds_core.params.compress import (
     VideoCodec,
     ViewEffectParams,
 )
-from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
     BackgroundParams,
     DivergenceParams,
@@ -49,6 +49,7 @@ from facefolds_core.params.volume import (
     SubjectParams,
     VolumeLevel,
     VolumeParams,
+    WallParams,
     WarningParams,
 )
 
@@ -91,6 +92,7 @@ __all__ = [
     "RefitParams",
     "RoomParams",
     "SampleParams",
+    "ScoreWarningParams",
     "Section",
     "StartParams",
     "Subject",
@@ -102,6 +104,7 @@ __all__ = [
     "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
+    "WallParams",
     "WarningParams",
     "merged",
     "nested",

@@ -1,4 +1,6 @@
-"""What each step of the export loses, on the held-out cameras: from the model to the files that ship.
+"""What each step of the export loses: from the model to the files that ship.
+
+It is measured on the cameras for validation, and on the held-out ones where there are none.
 
 Every step is rendered from what its stage left in data/<subject>, so the steps are those of the asset that is there.
 """
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.sheets import full_meshes
 from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, read_sheets, read_surfaces
@@ -75,18 +78,24 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
 
     Args:
         folders: of the subject, with all export stages run.
-        frames: indices of the frames that are rendered.
+        frames: indices of the frames that are rendered, where the camera has a photo.
+
+    Raises:
+        UserError: if there is no photo to compare with.
     """
     sources = list(_sources(scene, model, folders))
     truths, masks = scene.open_frames(), scene.open_masks()
     to_truth: dict[str, list[float]] = {name: [] for name in STEPS}
     to_model: dict[str, list[float]] = {name: [] for name in STEPS}
-    cameras = scene.indices("holdout")
-    with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
-        for index in cameras:
+    # Where cameras move, each is there in one frame only.
+    photos = {i: own for i in scene.indices(scene.choice_split) if (own := [k for k in frames if (i, k) in truths])}
+    if not photos:
+        raise UserError("no held-out camera has a photo of these frames", file=scene.folder / "scene.json")
+    with progress(total=sum(map(len, photos.values())), desc="waterfall", unit="image") as bar:
+        for index, own in photos.items():
             view = ModelView(model, scene.cameras[index])
             hits = [source.hits(scene.cameras[index]) for source in sources]
-            for k in frames:
+            for k in own:
                 truth = truths.image(index, k) / 255.0
                 has_mask = masks is not None and (index, k) in masks
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None

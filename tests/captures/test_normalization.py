@@ -16,7 +16,10 @@ from facefolds_core.captures.normalization import nearest_to_axes, split_cameras
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.sources.transforms import read_transforms
+from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
+from stages.normalize import left_out
 from tests.captures.fixtures import (
     FACES,
     HEAD,
@@ -115,11 +118,58 @@ def test_cameras_beyond_the_angles_are_culled_and_named(tmp_path: Path) -> None:
     assert [(one.kind, one.camera) for one in scene.left_out[1:]] == [("culled", "400002"), ("culled", "400004")]
 
 
-@pytest.mark.parametrize(("every", "held"), [(2, ["b", "d"]), (3, ["c"]), (5, ["e"]), (9, [])])
+@pytest.mark.parametrize(("every", "held"), [(2, ["b", "d"]), (3, ["c"]), (5, ["e"])])
 def test_every_nth_camera_is_held_out(every: int, held: list[str]) -> None:
     subject = Subject(source="transforms", path=".", holdout=HoldoutEvery(every=every))
     splits = split_cameras("abcde", subject, [], "capture")
     assert [name for name, split in zip("abcde", splits, strict=True) if split == "holdout"] == held
+
+
+def test_too_few_cameras_for_a_hold_out_are_refused_before_anything_is_trained() -> None:
+    subject = Subject(source="transforms", path=".")
+    with pytest.raises(UserError, match="too few cameras to hold one out") as caught:
+        split_cameras("abcde", subject, [], "capture")
+    assert "['c']" in str(caught.value)
+    assert split_cameras("abcde", subject.model_copy(update={"holdout": ()}), [], "capture") == ("train",) * 5
+
+
+@pytest.mark.parametrize(
+    ("validate", "splits"),
+    [
+        (None, ["train", "train", "holdout", "train", "train", "holdout"]),
+        ({"every": 2}, ["train", "validate", "holdout", "train", "validate", "holdout"]),  # of those not held out
+        (["a"], ["validate", "train", "holdout", "train", "train", "holdout"]),
+    ],
+)
+def test_cameras_for_validation_are_taken_from_those_that_would_train(validate: object, splits: list[str]) -> None:
+    subject = Subject.model_validate({"source": "actor", "path": ".", "holdout": {"every": 3}, "validate": validate})
+    assert list(split_cameras("abcdef", subject, [], "capture")) == splits
+
+
+@pytest.mark.parametrize(
+    ("validate", "says"),
+    [
+        (["c"], "held out and for validation"),
+        (["x"], "a camera for validation is not there"),
+        (["a", "b", "d", "e"], "no camera is left for training"),
+    ],
+)
+def test_a_wrong_choice_for_validation_is_named(validate: list[str], says: str) -> None:
+    subject = Subject.model_validate({"source": "actor", "path": ".", "holdout": {"every": 3}, "validate": validate})
+    with pytest.raises(UserError, match=says) as error:
+        split_cameras("abcdef", subject, [], "capture")
+    assert error.value.place == "validate"
+
+
+def test_cameras_for_validation_keep_their_masks(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    for camera in made.cameras:
+        for frame in made.frames:
+            save(tmp_path / "c" / "masks" / SEGMENT / camera.name / f"{frame}.png", np.zeros((64, 40), np.uint8))
+    plan = plan_multiface(tmp_path / "c", validate=("400001",))
+    masks = write_plan(plan, NormalizeParams()).open_masks()
+    assert masks is not None
+    assert {plan.scene.splits[camera] for camera, _ in masks} == {"holdout", "validate"}
 
 
 @pytest.mark.parametrize(
@@ -267,3 +317,11 @@ def test_the_shared_face_keeps_32_cameras(captures_folder: Path) -> None:
 def test_the_shared_statue_keeps_21_cameras(captures_folder: Path) -> None:
     scene = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
     assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (19, 2)
+
+
+def test_notes_are_said_before_lists_of_what_is_missing(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    scene = plan_multiface(tmp_path / "c").scene
+    missing = [fact("culled", camera=str(i), elevation=60.0, azimuth=0.0) for i in range(9)]
+    lines = left_out(replace(scene, left_out=(*missing, fact("front_guessed"))))
+    assert lines[1].startswith("  note: no `front`")
