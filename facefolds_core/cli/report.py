@@ -11,6 +11,7 @@ import typer
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting.build import make_report
+from facefolds_core.reporting.summary import row_of, write_summary
 
 
 def evaluated_subjects(data: Path) -> list[Path]:
@@ -35,8 +36,12 @@ def command(
 ) -> None:
     """Write one self-contained page a subject, report.html in its folder: pictures, scores, layers, costs."""
     with report_user_errors("report"):
-        for folder in subjects or evaluated_subjects(data):
+        folders = subjects or evaluated_subjects(data)
+        for folder in folders:
             start = time.perf_counter()
             path = make_report(SubjectFolders(folder))
             seconds = time.perf_counter() - start
             typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
+        if not subjects:
+            rows = [row_of(data, folder.name, "scored") for folder in folders]
+            typer.echo(f"report: {write_summary(data, rows)}, all of them")

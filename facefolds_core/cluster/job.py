@@ -8,12 +8,14 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -128,6 +130,7 @@ def _dvc(run: str, root: Path, environment: dict[str, str], command: list[str], 
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         errors="replace",
+        start_new_session=True,  # so that its stages can be ended with it
     ) as process:
         _at_work.setdefault(run, []).append(process)
         assert process.stdout is not None
@@ -141,9 +144,10 @@ def _dvc(run: str, root: Path, environment: dict[str, str], command: list[str], 
 
 
 def end_all(run: str) -> None:
-    """End what this worker does for an interrupted run; its stages end with their DVC."""
+    """End what this worker does for an interrupted run, DVC and its stages."""
     for process in _at_work.get(run, []):
-        process.terminate()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
 
 
 def _last_lines(log: str) -> str:
