@@ -198,7 +198,8 @@ def readme_table(data: Path) -> str:
         metrics = read_json(path)
         asset, cost = metrics["asset"], metrics["cost"]
         lpips, st_lpips = asset.get("lpips"), asset.get("st_lpips")
-        perceptual = f"LPIPS {lpips:.3f}" if lpips is not None else f"ST-LPIPS {number(st_lpips, 3)}"
+        known = {"LPIPS": lpips, "ST-LPIPS": st_lpips}
+        perceptual = next((f"{name} {value:.3f}" for name, value in known.items() if value is not None), "")
         preset = read_json(path.parent / "model" / "training.json")["preset"]
         rows.append(
             [

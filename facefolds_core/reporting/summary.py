@@ -1,4 +1,4 @@
-"""One page over all subjects: state, score, bytes, seconds. `facefolds run` and `facefolds report` write it."""
+"""One page over all subjects: state, score, bytes, seconds. `facefolds run` writes it."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -15,6 +16,8 @@ import psutil
 import pytest
 
 from tests.cluster.small import make_project
+
+pytestmark = pytest.mark.pipeline
 
 
 def environment(project_root: Path, **more: str) -> dict[str, str]:
@@ -59,8 +62,6 @@ def dask_cluster(
         while not address.exists():
             assert time.monotonic() < deadline, (tmp_path / "dask.log").read_text()
             time.sleep(0.1)
-        import json
-
         yield json.loads(address.read_text())["address"], processes[1:]
     finally:
         for process in reversed(processes):
