@@ -46,6 +46,10 @@ WORDS = {
     "pictures_disagree": "note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation "
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
+    "head_turns": "note: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of its size: "
+    "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
+    "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
+    "its size, and `stabilize: false` takes it to stand still: expect a blurred or doubled face",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did

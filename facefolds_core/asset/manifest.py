@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from facefolds_core.asset.codecs import CodecName
@@ -18,6 +19,7 @@ from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track
 
 FORMAT_VERSION = 2
 MANIFEST_NAME = "manifest.json"
@@ -220,6 +222,18 @@ class Photo(Poster):
     w2c: tuple[Row, Row, Row]
 
 
+class Pose(Part):
+    """Where the head stands in one frame: X_world = R X_mesh + t, normalised coordinates.
+
+    Attributes:
+        quaternion: w, x, y, z of R, of unit length.
+        translation: t.
+    """
+
+    quaternion: Row
+    translation: Vector
+
+
 class Compositing(Part):
     """How the layers are put together."""
 
@@ -236,6 +250,7 @@ class Manifest(Part):
         levels: coarsest first; the last is the full one.
         audio: of the sequence; it is in the MP4 files too.
         photos: for comparison.
+        track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
@@ -249,11 +264,26 @@ class Manifest(Part):
     audio: StoredFile | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
+    track: Annotated[tuple[Pose, ...] | None, Field(exclude_if=lambda track: track is None)] = None
     manifest_sha256: Sha256 = _UNSEALED
+
+    @field_validator("track")
+    @classmethod
+    def _absent_or_poses(cls, value: tuple[Pose, ...] | None) -> tuple[Pose, ...] | None:
+        if value is None:
+            raise ValueError("poses, or no such key")
+        return value
 
     @property
     def full(self) -> Level:
         return self.levels[-1]
+
+    def head_track(self) -> Track | None:
+        """`track` as it is computed with."""
+        if self.track is None:
+            return None
+        quaternions, translations = ([list(getattr(pose, name)) for pose in self.track] for name in Pose.model_fields)
+        return Track(np.array(quaternions, float), np.array(translations, float))
 
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of every file but the manifest."""
@@ -268,6 +298,8 @@ def manifest_schema() -> dict[str, Any]:
     schema = Manifest.model_json_schema(mode="serialization")
     layer = schema["$defs"]["Layer"]
     layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
+    poses = schema["properties"]["track"]["anyOf"][0]
+    schema["properties"]["track"] = poses | {"title": "Track"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
 
 

@@ -127,15 +127,6 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
     return Similarity(1 / distance, rotation, -(rotation @ centre) / distance), notes
 
 
-def stabilizing_similarities(tracking: Tracking) -> list[Similarity]:
-    """For each frame, world -> the world in which the head has its mean pose."""
-    facing, up = _mean_pose(tracking)
-    still = Similarity(
-        1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0)
-    )
-    return [still.after(Similarity(1.0, pose[:, :3], pose[:, 3]).inverse()) for pose in tracking.poses]
-
-
 def view_angles(cameras: Sequence[Camera]) -> Array:
     """(C, 2) elevation and azimuth of normalised cameras as the subject sees them, degrees; azimuth in -180..180."""
     centres = np.array([camera.centre for camera in cameras])

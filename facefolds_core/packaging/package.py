@@ -95,9 +95,10 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         UserError: if the export cannot be an asset.
     """
     _check_order(params.levels)
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
+    track = None if scene.poses is None else scene.poses.resampled(factor)
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, track)
     cameras = training_cameras(scene)
     with (
         atomic_folder(folder) as temporary,
@@ -211,9 +212,10 @@ def _with_extras(
         path = folder / f"audio{scene.audio.suffix}"
         shutil.copyfile(scene.audio, path)
         update["audio"] = StoredFile(**_stored(path))
-    cameras = training_cameras(scene)
-    if cameras:
-        update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras), jpeg_quality)
+    train = scene.indices("train")
+    if train:
+        frontal = _frontal([scene.camera_in_head(index, 0) for index in train])
+        update["poster"] = _poster(folder / "poster.jpg", manifest.full, frontal, jpeg_quality)
     return manifest.model_copy(update=update)
 
 

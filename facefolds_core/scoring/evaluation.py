@@ -22,16 +22,15 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
-from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.analysis import Sums as SeenSums
 from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
 from facefolds_core.scoring.images import Rendering, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
-from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.panels import WITH_EFFECTS, ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
 from facefolds_core.scoring.truths import MatteKind, Truths
@@ -97,17 +96,17 @@ def evaluate(
         for split in SCORED:
             sums, judged = [], []
             for index in scene.indices(split):
-                film, hits = Film(), scorer.caster.cast(scene.cameras[index])
+                film, view = Film(), scorer.view(scene.cameras[index])
                 screening = Screening(perceptual.cvvdp, params.cvvdp_frames)
                 shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
                 with shown_split.roll(scene.cameras[index].name) as roll:
-                    for k, shot in scorer.shots(split, index, hits):
+                    for k, shot in scorer.shots(split, index, view):
                         found += shot.scores
                         if shot.panel.mask is not None:
                             film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
                             screening.add(shot.pictures, shot.panel.truth, shot.panel.mask)
                         if split == "holdout":
-                            show.add(k, shot, scene.cameras[index], hits, scorer.kind)
+                            show.add(k, shot, view, scorer.kind)
                         if roll is not None:
                             roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
                         bar.update()
@@ -132,13 +131,13 @@ class _Show:
         self.worst: Panel | None = None
         self.seen = SeenSums(asset.layers)
 
-    def add(self, frame: int, shot: _Shot, camera: Camera, hits: Hits, kind: MatteKind) -> None:
+    def add(self, frame: int, shot: _Shot, view: PosedView, kind: MatteKind) -> None:
         panel = shot.panel
         self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
         if frame in self._on_sheet:
             self.panels.append(panel)
             known = None if kind == "found" else panel.mask
-            self.seen.add_picture(camera, hits, shot.textures, panel.asset - panel.truth, known)
+            self.seen.add_picture(view.seen_by, view.hits, shot.textures, panel.asset - panel.truth, known)
 
 
 def _changes(films: Sequence[dict[str, Sums]], jod: Mapping[str, float]) -> dict[str, Change]:
@@ -165,16 +164,20 @@ class _Scorer:
         self._params, self._perceptual = params, perceptual
         self._step = frame_rate_factor(scene, asset)
         self._truths = Truths(scene)
-        self.caster = AssetCaster(asset)
+        self._caster = AssetCaster(asset)
         cameras = [index for split in SCORED for index in scene.indices(split)]
         self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
         self.kind = self._truths.matte_kind(self.keys)
 
-    def shots(self, split: Split, index: int, hits: Hits) -> Iterator[tuple[int, _Shot]]:
+    def view(self, camera: Camera) -> PosedView:
+        """Of a camera of the world."""
+        return PosedView(self._scene, self._model, self._asset, self._caster, camera, self._step)
+
+    def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
         """All frames of a camera that have a photo."""
         camera, params = self._scene.cameras[index], self._params
         frames = [k for c, k in self.keys if c == index]
-        for k, textures, renderings in rendered(self._model, self._asset, hits, camera, frames, self._step):
+        for k, textures, renderings in rendered(view, self._asset, frames, self._step):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
             values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
@@ -188,21 +191,19 @@ class _Scorer:
 
 
 def rendered(
-    model: RadianceManifolds, asset: Asset, hits: Hits, camera: Camera, frames: list[int], step: int
+    view: PosedView, asset: Asset, frames: list[int], step: int
 ) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, Rendering]]]:
     """The asset's textures, and the variants' renderings, of each of the scene's `frames`."""
-    view = ModelView(model, camera)
-    maps = asset.effects()
-    added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
-        with_view, without_view, alpha = view.render(float(k))
+        view.turn(k)
+        with_view, without_view, alpha = view.model.render(float(k))
         images = {
             "model": Rendering(with_view, alpha),
             "diffuse": Rendering(without_view, alpha),
-            "asset": Rendering(*composite(hits, textures)),
+            "asset": Rendering(*composite(view.hits, textures)),
         }
-        if added is not None:
-            images[WITH_EFFECTS] = Rendering(*composite(hits, textures, added=added))
+        if view.added is not None:
+            images[WITH_EFFECTS] = Rendering(*composite(view.hits, textures, added=view.added))
         yield k, textures, images
 
 

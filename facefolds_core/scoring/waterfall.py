@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.sheets import full_meshes
 from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, read_sheets, read_surfaces
@@ -87,15 +86,14 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
     truths, masks = scene.open_frames(), scene.open_masks()
     to_truth: dict[str, list[float]] = {name: [] for name in STEPS}
     to_model: dict[str, list[float]] = {name: [] for name in STEPS}
-    # Where cameras move, each is there in one frame only.
-    photos = {i: own for i in scene.indices(scene.choice_split) if (own := [k for k in frames if (i, k) in truths])}
-    if not photos:
-        raise UserError("no held-out camera has a photo of these frames", file=scene.folder / "scene.json")
-    with progress(total=sum(map(len, photos.values())), desc="waterfall", unit="image") as bar:
-        for index, own in photos.items():
-            view = ModelView(model, scene.cameras[index])
-            hits = [source.hits(scene.cameras[index]) for source in sources]
-            for k in own:
+    cameras = scene.indices(scene.choice_split)
+    with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
+        for index in cameras:
+            for k in frames:
+                if k == frames[0] or scene.poses is not None:
+                    camera = scene.camera_in_head(index, k)
+                    view = ModelView(model, camera)
+                    hits = [source.hits(camera) for source in sources]
                 truth = truths.image(index, k) / 255.0
                 has_mask = masks is not None and (index, k) in masks
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None

@@ -89,6 +89,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "captures/capture.py": ALL,
         "captures/sound.py": ("RATES",),
         "captures/sources/transforms.py": ("LATEST",),
+        "geometry/track.py": ("UNIT",),
         "captures/visibility.py": ALL,
         "parsing.py": ALL,
         "reading.py": ALL,

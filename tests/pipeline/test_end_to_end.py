@@ -94,7 +94,7 @@ def test_a_killed_training_resumes(project: TinyProject) -> None:
 
 def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
     """The one whose training was killed."""
-    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames, one camera an image
+    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames
 
 
 def test_what_its_export_loses_is_measured_where_cameras_move(project: TinyProject) -> None:
