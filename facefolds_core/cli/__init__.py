@@ -20,6 +20,7 @@ COMMANDS = {
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
     "export": "Write an asset as another program can read it.",
+    "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
     "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
     "scores": "Scores, size and place of the assets that were made.",
