@@ -208,7 +208,7 @@ def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: 
     write_frames(scene.folder / "frames.arrow", image.shape, [(i, 0, image) for i in range(len(scene.cameras))])
     with pytest.raises(UserError, match="a training image is missing") as caught:
         train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
-    assert "quick" in str(caught.value.remedy)
+    assert "dvc repro" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize("grey", [0, 90])
