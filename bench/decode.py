@@ -74,15 +74,17 @@ def main() -> None:
         make_capture(folder, wanted.videos, wanted.frames, wanted.width, wanted.height)
         subject = Subject(source="neural3d", path=str(folder), front="cam00", holdout=("cam01",))
         for _ in range(wanted.repeats):
-            start = time.perf_counter()
+            times = [(time.perf_counter(), time.process_time())]
             for file in sorted(folder.glob("*.mp4")):
                 decode_only(file)
-            middle = time.perf_counter()
+            times.append((time.perf_counter(), time.process_time()))
             capture = read(folder, subject, CaptureParams())
             write_plan(plan_scene(capture, "clips", subject, params := NormalizeParams(), folder / "scene"), params)
-            decoded, made = middle - start, time.perf_counter() - middle
+            times.append((time.perf_counter(), time.process_time()))
+            (decoded, cpu), (made, more) = np.diff(times, axis=0)
+            print(f"decode only {decoded:.1f} s ({cpu:.1f} s of processors), scene {made:.1f} s ({more:.1f} s)")
             print(
-                f"decode only {decoded:.1f} s, scene {made:.1f} s, ratio {made / decoded:.2f}, {os.cpu_count()} cores"
+                f"ratio {made / decoded:.2f} ({more / cpu:.2f}), {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
             )
 
 

@@ -35,7 +35,7 @@ def left_out(scene: Scene) -> list[str]:
     shown = [f"  {line}" for line in lines[:SHOWN]]
     if len(lines) > SHOWN:
         shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")
-    return [f"normalize: left out, and notes ({len(lines)}):", *shown] if lines else []
+    return [f"normalize: notes, and what is left out ({len(lines)}):", *shown] if lines else []
 
 
 def normalize(folders: SubjectFolders) -> str:

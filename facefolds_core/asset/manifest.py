@@ -234,6 +234,25 @@ class Pose(Part):
     translation: Vector
 
 
+class FilmedView(Part):
+    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
+
+    Attributes:
+        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
+        elevation: the range of the training cameras, degrees.
+    """
+
+    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
+    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
+
+    @field_validator("azimuth", "elevation")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not value[0] <= value[1] <= value[0] + 360:
+            raise ValueError("from the lower to the higher angle, at most a full turn")
+        return value
+
+
 class Compositing(Part):
     """How the layers are put together."""
 
@@ -251,6 +270,7 @@ class Manifest(Part):
         audio: of the sequence; it is in the MP4 files too.
         photos: for comparison.
         track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
+        view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
@@ -265,6 +285,7 @@ class Manifest(Part):
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
     track: Annotated[tuple[Pose, ...] | None, Field(exclude_if=lambda track: track is None)] = None
+    view: Annotated[FilmedView | None, Field(exclude_if=lambda view: view is None)] = None
     manifest_sha256: Sha256 = _UNSEALED
 
     @field_validator("track")
@@ -272,6 +293,13 @@ class Manifest(Part):
     def _absent_or_poses(cls, value: tuple[Pose, ...] | None) -> tuple[Pose, ...] | None:
         if value is None:
             raise ValueError("poses, or no such key")
+        return value
+
+    @field_validator("view")
+    @classmethod
+    def _absent_or_whole(cls, value: FilmedView | None) -> FilmedView:
+        if value is None:
+            raise ValueError("the filmed range, or no such key")
         return value
 
     @property
@@ -300,15 +328,22 @@ def manifest_schema() -> dict[str, Any]:
     layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
     poses = schema["properties"]["track"]["anyOf"][0]
     schema["properties"]["track"] = poses | {"title": "Track"}
+    schema["properties"]["view"] = {"$ref": "#/$defs/FilmedView"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
+
+
+def sealed(manifest: Manifest) -> tuple[str, str]:
+    """The text of the manifest's file, with its own checksum in it, and that checksum."""
+    value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'), digest
 
 
 def write_manifest(manifest: Manifest, path: Path) -> Manifest:
     """Write the manifest with its own checksum; returns it as written."""
-    value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    write_text(path, text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'))
+    text, digest = sealed(manifest)
+    write_text(path, text)
     return manifest.model_copy(update={"manifest_sha256": digest})
 
 

@@ -43,7 +43,10 @@ def look(path: Path) -> list[tuple[str, Recognised]]:
     found = []
     for name in SOURCES.names:
         recognise = getattr(SOURCES[name], "recognise", None)
-        said = None if recognise is None else recognise(path)
+        try:
+            said = None if recognise is None else recognise(path)
+        except UserError:  # it has the marks of this layout, and what it says of itself is damaged
+            said = Recognised(f"a damaged capture of source {name}", path)
         if said is not None:
             found.append((name, said))
     return found

@@ -156,13 +156,15 @@ class VideoFrame:
         return next(self.video.frames([self.index], "opacity"))
 
 
-def decoded(pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1) -> Iterator[Image]:
+def decoded(
+    pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1, fine: bool = True
+) -> Iterator[Image]:
     """The pixels of pictures, one after the other; frames of one video that follow one another cost one reading.
 
     Args:
         pictures: each with its place; frames of a video in the order of time.
         channels: "rgb" (H, W, 3) or "opacity" (H, W, 1).
-        threads: of a video's decoder.
+        threads, fine: of `Video.frames`.
 
     Raises:
         UserError: if one is missing or damaged.
@@ -174,7 +176,7 @@ def decoded(pictures: Sequence[tuple[Picture, str]], channels: Channels, threads
     for video, run in itertools.groupby(pictures, video_of):
         if video is not None:
             indices = [picture.index for picture, _ in run if isinstance(picture, VideoFrame)]
-            yield from video.frames(indices, channels, threads)
+            yield from video.frames(indices, channels, threads, fine)
         else:
             for picture, place in run:
                 yield picture.rgb(place) if channels == "rgb" else picture.opacity(place)

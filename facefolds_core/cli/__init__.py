@@ -20,8 +20,10 @@ COMMANDS = {
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
     "export": "Write an asset as another program can read it.",
+    "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
     "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
+    "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
@@ -33,6 +35,7 @@ COMMANDS = {
 
 EXTRAS = {
     "submission": "train",
+    "scores": "train",
     "report": "report",
     "waterfall": "train",
     "collect": "pipeline",

@@ -17,6 +17,7 @@ from PIL import Image
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.effects import EffectsPicture
+from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Level,
@@ -206,7 +207,7 @@ def _crf(
 def _with_extras(
     folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
 ) -> Manifest:
-    """Add sound, a poster and photos."""
+    """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
         path = folder / f"audio{scene.audio.suffix}"
@@ -214,6 +215,7 @@ def _with_extras(
         update["audio"] = StoredFile(**_stored(path))
     train = scene.indices("train")
     if train:
+        update["view"] = filmed_view([scene.cameras[index] for index in train])
         frontal = _frontal([scene.camera_in_head(index, 0) for index in train])
         update["poster"] = _poster(folder / "poster.jpg", manifest.full, frontal, jpeg_quality)
     return manifest.model_copy(update=update)

@@ -77,7 +77,10 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
 
     Args:
         folders: of the subject, with all export stages run.
-        frames: indices of the frames that are rendered.
+        frames: indices of the frames that are rendered, where the camera has a photo.
+
+    Raises:
+        UserError: if there is no photo to compare with.
     """
     sources = list(_sources(scene, model, folders))
     truths, masks = scene.open_frames(), scene.open_masks()

@@ -15,6 +15,7 @@ from facefolds_core.cli import app
 from facefolds_core.errors import UserError
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.registry import SOURCES
 from tests.captures.fixtures import pattern, save, write_multiface, write_transforms
 
 
@@ -93,6 +94,32 @@ def test_a_folder_of_no_known_layout_is_described(tmp_path: Path, make: object, 
     said = describe(root)
     assert what in said[0]
     assert remedy in said[1]
+
+
+MARKS = {
+    "actorshq": ["calibration.csv", "rgbs/Cam001/Cam001_rgb000000.jpg"],
+    "ava256": ["camera_calibration.json", "frame_list.csv", "image/cam401031.zip"],
+    "colmap": ["sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin", "images/a.jpg"],
+    "easymocap": ["intri.yml", "extri.yml", "images/1/000000.jpg"],
+    "multiface": ["KRT", "frame_list.txt", "images/S/400001/000001.png", "tracked_mesh/S/000001.bin"],
+    "nersemble": ["calibration/camera_params.json", "sequences/S/images/cam_1.mp4"],
+    "neural3d": ["poses_bounds.npy", "cam00.mp4", "cam01.mp4"],
+    "renderme": ["0026_e0_raw.smc", "0026_e0_anno.smc"],
+    "transforms": ["transforms.json", "images/a.png"],
+}
+"""What a layout has on disk: names are enough to tell it."""
+
+
+def test_every_layout_has_its_marks() -> None:
+    assert sorted(MARKS) == [name for name in SOURCES.names if name != "actor"]
+
+
+@pytest.mark.parametrize("source", MARKS)
+def test_a_layout_is_recognised_by_its_own_source_and_no_other(tmp_path: Path, source: str) -> None:
+    for name in MARKS[source]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert [(name, said.path) for name, said in look(tmp_path)] == [(source, tmp_path)]
 
 
 def test_a_part_of_a_capture_leads_to_the_whole(tmp_path: Path) -> None:

@@ -17,7 +17,9 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
+from stages.normalize import left_out
 from tests.captures.fixtures import (
     FACES,
     HEAD,
@@ -355,3 +357,11 @@ def test_the_shared_face_keeps_32_cameras(captures_folder: Path) -> None:
 def test_the_shared_statue_keeps_21_cameras(captures_folder: Path) -> None:
     scene = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
     assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (19, 2)
+
+
+def test_notes_are_said_before_lists_of_what_is_missing(tmp_path: Path) -> None:
+    write_multiface(tmp_path / "c")
+    scene = plan_multiface(tmp_path / "c").scene
+    missing = [fact("culled", camera=str(i), elevation=60.0, azimuth=0.0) for i in range(9)]
+    lines = left_out(replace(scene, left_out=(*missing, fact("front_guessed"))))
+    assert lines[1].startswith("  note: no `front`")

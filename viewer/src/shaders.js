@@ -1,32 +1,43 @@
 /** What a layer's pixel is: docs/reference/asset-format.md, "A player in seven steps". Stored values in, stored values out. */
 
 /** Shared by all passes of a layer, so that their depths are equal bit for bit. */
-export const VERTEX = /* glsl */ `
+export const VERTEX = `#version 300 es
+precision highp float;
 invariant gl_Position;
+uniform mat4 projection;
+uniform mat4 view;
 uniform vec3 shift; // of the layer, when the layers are pulled apart
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 uv;
 out vec2 st;
 out vec3 point;
 void main() {
   st = uv;
   point = position;
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position + shift, 1.0);
+  gl_Position = projection * (view * vec4(position + shift, 1.0));
 }`;
 
-export const DEPTH_FRAGMENT = /* glsl */ `
+export const DEPTH_FRAGMENT = `#version 300 es
+precision highp float;
 out vec4 nothing;
 void main() { nothing = vec4(0.0); }`;
 
-export const COLOUR_FRAGMENT = /* glsl */ `
+/** What may be shown in place of the picture, by the value of `kind`. */
+export const KINDS = ["colour", "alpha", "depth", "uv"];
+
+export const COLOUR_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
 uniform vec4 colourRect; // x, y, w, h of this layer's colour in the picture, pixels
 uniform vec2 alphaOffset; // from its colour to its alpha
+uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
+uniform int kind; // of KINDS
+uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
 #ifdef EFFECTS
 uniform sampler2D effects;
 uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
 uniform float effectsScale; // 0: off
-uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 #endif
 in vec2 st;
 in vec3 point;
@@ -49,10 +60,13 @@ void main() {
     colour = clamp(colour, 0.0, 1.0);
   }
 #endif
+  if (kind == 1) colour = vec3(1.0);
+  if (kind == 2) colour = vec3(1.0 - clamp((distance(eye, point) - range.x) / (range.y - range.x), 0.0, 1.0));
+  if (kind == 3) colour = vec3(st, 0.35);
   result = vec4(colour, alpha);
 }`;
 
-export const WIRE_FRAGMENT = /* glsl */ `
+export const WIRE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec4 wire;
 out vec4 result;
