@@ -75,7 +75,8 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
-        levels = plan(fit, params)
+        levels = plan(fit, params, scene.num_frames)
+        bar.total = bar.n + sum(level.iterations for level in levels)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
