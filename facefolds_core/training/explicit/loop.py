@@ -28,7 +28,7 @@ from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.picture import draw_fit
-from facefolds_core.training.explicit.plan import Level, plan
+from facefolds_core.training.explicit.plan import Epochs, Level, plan
 from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
 from facefolds_core.training.explicit.views import Images, Rays, check_images, rays_of
 from facefolds_core.training.explicit.warnings import warnings_of
@@ -183,8 +183,9 @@ class _Trainer:
         coarse = number < len(self.params.geometry.rounds)
         weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
         best, recent = float("inf"), float("nan")
+        epochs = Epochs(self.scene.num_frames, self.random)
         for i in range(level.iterations):
-            frame = int(self.random.integers(self.scene.num_frames))
+            frame = epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             rates = self._rates(i / level.iterations if level.last else 0.0)
             error = self.state.step(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 
@@ -25,6 +27,24 @@ class Level:
     stride: int
     geometry: float
     last: bool
+
+
+class Epochs:
+    """Frames in the order in which steps take them: without replacement, shuffled anew each time all have been taken.
+
+    Args:
+        frames: K.
+        random: draws the orders.
+    """
+
+    def __init__(self, frames: int, random: np.random.Generator) -> None:
+        self._frames, self._random = frames, random
+        self._left: list[int] = []
+
+    def next(self) -> int:
+        if not self._left:
+            self._left = self._random.permutation(self._frames).tolist()
+        return self._left.pop()
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
