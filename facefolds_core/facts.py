@@ -50,6 +50,8 @@ WORDS = {
     "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
     "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
     "its size, and `stabilize: false` takes it to stand still: expect a blurred or doubled face",
+    "poses_refused": "warning: the pictures of frame {frames} fit no pose of the head; they are given that between "
+    "their neighbours'",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did

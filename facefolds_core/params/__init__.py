@@ -5,7 +5,7 @@ below takes a number that somebody might tune from anywhere but a section (tests
 """
 
 from facefolds_core.params.base import Section, merged, nested, value_at
-from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams
+from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams, RegistrationParams
 from facefolds_core.params.compress import (
     BetweenParams,
     CodecName,
@@ -93,6 +93,7 @@ __all__ = [
     "PruningParams",
     "ReconstructParams",
     "RefitParams",
+    "RegistrationParams",
     "RoomParams",
     "SampleParams",
     "ScoreWarningParams",
