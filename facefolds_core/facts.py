@@ -49,6 +49,8 @@ WORDS = {
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
+    "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
+    "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. Before a near, bright "
     "or cluttered room try `train: {{room: {{needed_below: 28}}}}`",

@@ -42,7 +42,7 @@ class Traced:
     Attributes:
         rgb: [R, 3] over black, not clamped.
         weights: [R, N].
-        view: [P] the view-dependent term at the P crossings of all rays; None if it was switched off.
+        view: [P] or [P, 3] the view-dependent term at the P crossings of all rays; None if it was switched off.
     """
 
     rgb: Tensor
@@ -88,7 +88,7 @@ class RadianceManifolds(nn.Module):
         ray, layer = crossings.hit.nonzero(as_tuple=True)
         uv, _ = points_to_uv(crossings.points[ray, layer], self.centre)
         shaded = self.textures.shade(uv, layer, time[ray], directions[ray] if view_effects else None)
-        colour = shaded.rgb if shaded.view is None else shaded.rgb + shaded.view[:, None]
+        colour = shaded.rgb if shaded.added is None else shaded.rgb + shaded.added
         alpha = torch.zeros_like(crossings.distance).index_put((ray, layer), shaded.alpha)
         weights, _ = compositing_weights(alpha)
         # Dense [R, N, 3]: index_add along rays would be one small operation a crossing on a CPU.

@@ -20,12 +20,18 @@ class Shaded:
     Attributes:
         rgb: [P, 3] view-independent colour in [0, 1].
         alpha: [P] opacity in [0, 1].
-        view: [P] grey view-dependent term to add to all three channels, or None where it was not asked for.
+        view: [P] grey view-dependent term to add to all three channels, [P, 3] a coloured one, or None where it was not
+            asked for.
     """
 
     rgb: Tensor
     alpha: Tensor
     view: Tensor | None
+
+    @property
+    def added(self) -> Tensor | None:
+        """`view` as [P, 1] or [P, 3]."""
+        return self.view[:, None] if self.view is not None and self.view.dim() == 1 else self.view
 
 
 class Textures(Protocol):

@@ -23,7 +23,7 @@ _scatter = scatter_of(4)
 
 
 @inlined
-def _corner(code, size):  # type: ignore[no-untyped-def]
+def texel_corner(code, size):  # type: ignore[no-untyped-def]
     """16-bit position over the window -> index of the texel before it, and the fraction beyond its centre."""
     x = min(max((code - 1) * (size / 65534.0) - 0.5, 0.0), size - 1.0)
     i = min(int(x), size - 2)
@@ -31,7 +31,7 @@ def _corner(code, size):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
+def texel_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
     bottom = texture[i + 1, j, n, q] * (one - b) + texture[i + 1, j + 1, n, q] * b
@@ -47,6 +47,7 @@ def shade(  # type: ignore[no-untyped-def]
     images,  # (C, H W, 3) uint8
     background,  # (C, H W, 3) float32, updated in place
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
+    shine,  # (P, 3) float32, added to the colours that a ray meets; (0, 3) for none
     gradient,  # (N, H, W, 4), added to
     opacity_weight,  # weight of opacity
     binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
@@ -78,6 +79,7 @@ def shade(  # type: ignore[no-untyped-def]
                 images,
                 background,
                 texture,
+                shine,
                 terms,
                 index[:, first:last],
                 wish[:, first:last],
@@ -100,6 +102,7 @@ def _shade(
     images: Any,
     background: Any,
     texture: Any,
+    shine: Any,
     terms: Any,
     index: Any,
     wish: Any,
@@ -112,25 +115,28 @@ def _shade(
     layer = np.empty(layers, np.int64)
     c = np.empty((layers, 4), np.float32)
     before = np.empty(layers, np.float32)
+    added = np.empty(3, np.float32)
     total = 0.0
     for k in range(rays.shape[0]):
         p = rays[k]
         transmittance, r0, r1, r2 = one, zero, zero, zero
+        for q in range(3):
+            added[q] = shine[p, q] if shine.shape[0] > 0 else zero
         m = 0
         for n in range(layers):
             index[n, k] = -1
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
-            alpha = _tap(texture, i, j, n, 3, a, b)
+            j, b = texel_corner(codes[p, n, 0], width)
+            i, a = texel_corner(codes[p, n, 1], height)
+            alpha = texel_tap(texture, i, j, n, 3, a, b)
             if alpha < min_alpha:
                 continue
             index[n, k] = i * width + j
             wish[n, k, 0], wish[n, k, 1] = a, b
             for q in range(3):
-                c[m, q] = _tap(texture, i, j, n, q, a, b)
+                c[m, q] = texel_tap(texture, i, j, n, q, a, b) + added[q]
             c[m, 3] = alpha
             layer[m], before[m] = n, transmittance
             light = transmittance * alpha
@@ -182,17 +188,17 @@ def contributions(codes, rays, texture, peak):  # type: ignore[no-untyped-def]
             for n in range(layers):
                 before[n, k] = transmittance if transmittance >= OPAQUE else np.float32(0.0)
                 if codes[p, n, 0] > 0 and transmittance >= OPAQUE:
-                    j, b = _corner(codes[p, n, 0], width)
-                    i, a = _corner(codes[p, n, 1], height)
-                    transmittance *= 1 - _tap(texture, i, j, n, 3, a, b)
+                    j, b = texel_corner(codes[p, n, 0], width)
+                    i, a = texel_corner(codes[p, n, 1], height)
+                    transmittance *= 1 - texel_tap(texture, i, j, n, 3, a, b)
         for task in prange(layers):
             n = spread(task, layers)
             for k in range(own):
                 p = rays[start + k]
                 if codes[p, n, 0] == 0 or before[n, k] == 0:
                     continue
-                j, b = _corner(codes[p, n, 0], width)
-                i, a = _corner(codes[p, n, 1], height)
+                j, b = texel_corner(codes[p, n, 0], width)
+                i, a = texel_corner(codes[p, n, 1], height)
                 for tap in range(4):
                     di, dj = tap >> 1, tap & 1
                     w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]

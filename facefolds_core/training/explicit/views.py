@@ -23,11 +23,13 @@ class Views:
             the layer is missed. A texel of 512 is 128 steps.
         camera: (P,) int32, position in the list of training cameras.
         pixel: (P,) int32, row-major.
+        directions: (P, 3) float32, unit vectors.
     """
 
     codes: NDArray[np.uint16]
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
+    directions: NDArray[np.float32]
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
@@ -36,7 +38,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    codes, cameras, pixels = [], [], []
+    codes, cameras, pixels, along = [], [], [], []
     centre = manifolds.centre.cpu().numpy().astype(np.float64)
     window = np.array(manifolds.window)
     for position, index in enumerate(scene.indices("train")):
@@ -50,7 +52,8 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
         codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
         cameras.append(np.full(len(hit), position, np.int32))
         pixels.append(chosen[hit].astype(np.int32))
-    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels))
+        along.append(directions[hit].astype(np.float32))
+    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels), np.concatenate(along))
     if len(views.pixel) == 0:
         raise UserError(
             "no pixel of any training camera sees the subject",
