@@ -158,7 +158,7 @@ def measure(folders: SubjectFolders, factor: int) -> dict[str, Sums]:
     scene = read_scene(folders.scene)
     store, meshes = FrameStore(folders.textures / "textures.arrow"), read_meshes(folders.meshes / "meshes.npz")
     found = {method: np.zeros((scene.num_frames - 1, 4)) for method in METHODS}
-    for camera in scene.indices("holdout"):
+    for camera in scene.indices(scene.choice_split):
         truth, hits = truth_of(folders, scene, camera, factor), cast_layers(scene.cameras[camera], meshes)
         for method, fill in METHODS.items():
             for at, textures in fill(store, factor):

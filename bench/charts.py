@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import EngFormatter, FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from bench.hazard_rows import CLEAN, ROWS, loss_of
 from bench.results import Cell, Measurement, Row
@@ -259,12 +259,7 @@ def _sweep_panel(axes: Axes, cost: str, own: Mapping[str, Sequence[tuple[int, fl
     axes.set_xscale("log")
     if cost == "pictures":
         axes.set_xlim(*sorted(axes.get_xlim(), reverse=True))  # shared by a column: to invert would undo itself
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: _short(x)))
-
-
-def _short(count: float) -> str:
-    """1e6 -> "1 M"."""
-    return f"{count / 1e6:g} M" if count >= 1e6 else f"{count / 1e3:g} k" if count >= 1e3 else f"{count:g}"
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
 
 
 def rate(rows: Sequence[Row], path: Path, title: str) -> None:
@@ -282,8 +277,9 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
         axes.legend(loc="lower right")
 
 
-def waterfall(found: Mapping[str, Sequence[Mapping[str, Any]]], path: Path) -> None:
+def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """A row of bars a subject: PSNR against the photos, what each step gained or lost, and the bytes."""
+    found = {name: [row for row in rows if row["subject"] == name] for name in sorted({r["subject"] for r in rows})}
     with figure_of(path, 9, 4.2 * len(found), dpi=120) as figure:
         for axes, (subject, steps) in zip(figure.subplots(len(found), squeeze=False)[:, 0], found.items(), strict=True):
             values = [step["psnr"] for step in steps]

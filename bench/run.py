@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from facefolds_core.scoring.perceptual import Perceptual
 
 Sections = Mapping[str, Mapping[str, Any]]
-STAGES = (
-    *("configure", "capture", "normalize", "train", "sample", "reconstruct"),
-    *("decimate", "texture", "bake", "compress", "evaluate"),
-)
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,8 @@ def training_of(folders: SubjectFolders) -> dict[str, Any]:
 def score_model(
     folder: Path, scene: Scene, times: Mapping[int, float], perceptual: Perceptual, device: torch.device
 ) -> Iterator[tuple[str, int, Means]]:
-    """The model without its view branch on the held-out cameras, as `evaluate` scores its variant `diffuse`.
+    """The model without its view branch, as `evaluate` scores its variant `diffuse`: on the cameras for validation, or
+    on the held-out ones where there are none.
 
     Args:
         folder: of the model.
@@ -103,13 +100,13 @@ def score_model(
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
     from facefolds_core.model import load_model
-    from facefolds_core.scoring.evaluation import score_images
+    from facefolds_core.scoring.images import score_images
     from facefolds_core.scoring.metrics import shown
     from facefolds_core.scoring.model_view import ModelView
 
     model = load_model(folder, device)
     truths, masks = scene.open_frames(), scene.open_masks()
-    for index in scene.indices("holdout"):
+    for index in scene.indices(scene.choice_split):
         view = ModelView(model, scene.cameras[index])
         for k, time in times.items():
             if (index, k) in truths:

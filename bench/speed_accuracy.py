@@ -100,7 +100,6 @@ def main(
     frames: Annotated[int, typer.Option(help="Of each held-out camera that are scored, evenly spaced.")] = 3,
     work: Annotated[Path, typer.Option(help="Folder for the trainings.")] = Path("data/bench"),
     results: Annotated[Path, typer.Option(help="File that measurements are added to.")] = RESULTS,
-    picture: Annotated[Path, typer.Option(help="The chart.")] = PICTURE,
     force: Annotated[bool, typer.Option("--force", help="Measure again what is there.")] = False,
     draw_only: Annotated[bool, typer.Option("--draw-only", help="Only draw what is there.")] = False,
 ) -> None:
@@ -117,8 +116,8 @@ def main(
             ]
             for found in store.fill(blanks, partial(measure, Project(work / subject, subject)), force):
                 typer.echo(f"bench: {describe(found)}")
-        charts.speed(store.read(), picture)
-        typer.echo(f"bench: {picture} drawn from {results}")
+        charts.speed(store.read(), PICTURE)
+        typer.echo(f"bench: {PICTURE} drawn from {results}")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
 python -m bench.sweeps queue mesh      layers, mesh, texture, or rate: the paper's export and ours at five rates
 dvc exp run --run-all                  runs what was queued (or `dvc queue start -j 2`: docs/guide/sweeps.md)
 python -m bench.sweeps collect         what has ended, into bench/results/sweeps.json
-python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there
+python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there;
+                                       of what `facefolds waterfall` measured, too
 
 A cell is the subject's own configuration with a few values changed. Stages that cells share run once.
 """
@@ -31,6 +32,7 @@ from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files import read_json, write_json
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.sweeps.experiments import runs_of
@@ -211,6 +213,13 @@ def draw(results: Results = RESULTS) -> None:
             name = "rate_distortion" if film == "actor" else f"rate_distortion_{film}"
             charts.rate(rates, IMAGES / f"{name}.png", f"{film}, {RATE_FRAMES} frames")
             typer.echo(f"{film}:\n\n{rate_tables(rates)}")
+        files = sorted(Path("data").glob("*/waterfall/waterfall.json"))
+        steps = [{"subject": found["subject"]} | step for found in map(read_json, files) for step in found["steps"]]
+        there = results.with_name("waterfall.json")
+        measured = {step["subject"] for step in steps}
+        steps = [step for step in read_json(there) if step["subject"] not in measured] + steps
+        write_json(there, steps)
+        charts.waterfall(steps, IMAGES / "export_waterfall.png")
 
 
 if __name__ == "__main__":

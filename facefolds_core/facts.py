@@ -1,7 +1,7 @@
 """What a user should know of a step: records, with one place that words them.
 
-A scene says what of its capture it left out, a training what happened to it. Code asks a fact's kind and values; people
-read `str(fact)`. Files hold both: the record, and its words beside it.
+A scene says what of its capture it left out, a training why it chose as it did and what happened to it. Code asks a
+fact's kind and values; people read `str(fact)`. Files hold both: the record, and its words beside it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,15 @@ WORDS = {
     # of a capture
     "camera_without_images": "camera {camera}: in KRT, but has no images",
     "camera_without_calibration": "camera {camera}: has images, but is not in KRT",
+    "no_images": "camera {camera}: calibrated, but has no pictures",
+    "uncalibrated": "camera {camera}: has pictures, but no calibration",
+    "other_size": "camera {camera}: its pictures are {size[0]} x {size[1]}, those of most cameras {common[0]} x "
+    "{common[1]}",
+    "k_is_scaled": "note: K is for larger or smaller pictures than {size[0]} x {size[1]}; scaled ({cameras})",
+    "masks_chosen": "note: masks are those of the folder {chosen}; {others} are not read",
+    "calibration_varies": "note: the pictures of {cameras} cameras were calibrated one by one; the mean of each camera "
+    "is used (farthest from it: {pixels:.2f} pixels on the subject, camera {worst})",
+    "other_models": "note: sparse/0 is read; COLMAP's other models ({others}) do not hang together with it",
     "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
     "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
     "frame_without_images": "frame {frame}: in frame_list.txt, but no camera has an image",
@@ -35,7 +44,18 @@ WORDS = {
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
-    # of a training
+    "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
+    # of a training: why it chose as it did
+    "centre_chosen": "centre: of the candidates whose hemispheres lose least of the visible surface, within {tie:.0%}, "
+    "the one farthest back (it loses {lost:.1%})",
+    "window_chosen": "window: directions in which the volume is at least {opacity:.0%} opaque (and the tracked mesh, "
+    "where there is one), and {margin} on each side",
+    "middle_from_volume": "middle radius: the volume, where half of its opacity is reached from outside",
+    "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the volume lies over {reach} "
+    "outside it",
+    "halfwidth_chosen": "halfwidth: {least}, more where the volume is blurred or far from the middle, at most {most}",
+    "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
+    # of a training: what happened
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
     "the others see as the median camera does; check its calibration",
     "gains": "cameras differ in exposure or white balance; taken out: gains r {r[0]:.2f} to {r[1]:.2f}, "
@@ -48,19 +68,38 @@ WORDS = {
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
+    "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
+    "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
     "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
-    "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. Before a near, bright "
-    "or cluttered room try `train: {{room: {{needed_below: 28}}}}`",
+    "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
+    "mattes help (docs/guide/subjects.md)",
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in front of the centre "
     "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres, or look at fit.png for what is no "
     "subject",
+    "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: "
+    "finer quantisation gives no more; finer textures (texture.resolution) or fewer specks in them (fit.png) do",
+    "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
+    "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
+    "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
+    "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
+    "one training's cannot be compared with another's. Give masks of the scored cameras (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }
 """Kind -> its words."""
+
+
+WARNINGS = frozenset(
+    {
+        *("pictures_disagree", "front_guessed", "camera_contradicts", "mesh_is_off", "cut_by_the_ball"),
+        *("volume_explains_little", "surface_without_a_place", "front_is_guessed"),
+        *("codec_misses", "stands_still", "matte_is_found"),
+    }
+)
+"""Kinds that ask for something to be done; the others are told for the record."""
 
 
 @dataclass(frozen=True)

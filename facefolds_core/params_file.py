@@ -144,7 +144,7 @@ def _has(overrides: Any, name: str) -> bool:
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
     """Write `subject.json`, one file a stage, and `levels.json` (see `config`); returns their paths."""
-    core = params.subject(subject).model_dump(mode="json", exclude=set(Overrides.model_fields))
+    core = params.subject(subject).model_dump(mode="json", by_alias=True, exclude=set(Overrides.model_fields))
     values: dict[str, Any] = {"subject": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
     resolutions = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})

@@ -67,7 +67,7 @@ def _tables(kind: type[Section], path: str) -> Iterator[str]:
 
 def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
     rows = [
-        f"| `{name}` | {_kind(field)} | {_default(field)} | {_words(field.description)} |"
+        f"| `{field.alias or name}` | {_kind(field)} | {_default(field)} | {_words(field.description)} |"
         for name, field in kind.model_fields.items()
         if name not in hidden and (not _is_section(field.annotation) or not path)
     ]

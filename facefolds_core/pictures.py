@@ -1,4 +1,4 @@
-"""Pictures decoded strictly, PNG and JPEG only: the one place where Pillow opens files.
+"""Pictures decoded strictly, PNG and JPEG only (AVIF where it is asked for): the one place where Pillow opens files.
 
 Pillow tries every format that it knows, whatever the file's name: an EPS called x.png would start Ghostscript. And it
 is lenient: it skips the checksums of a PNG's pixels and swallows the warnings of its JPEG library. Here:
@@ -8,6 +8,7 @@ is lenient: it skips the checksums of a PNG's pixels and swallows the warnings o
 - JPEG: it has no checksums, so a change of bits that makes another valid picture cannot be found. Found are: a cut
   file (the end marker must be there), segments that do not follow one another, restart markers out of turn, blocks of
   a disk that were never written, and codes that FFmpeg's decoder, told to be strict, cannot decode.
+- AVIF: a still of AV1, without checksums; a cut file is found, and what Pillow's decoder cannot decode.
 
 What follows the end of a picture is ignored, as every viewer does.
 """
@@ -18,6 +19,7 @@ import io
 import struct
 import warnings
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import av
@@ -43,29 +45,48 @@ class DamagedPictureError(ValueError):
     """A picture that is not whole, or none; the text says why."""
 
 
-def picture_size(file: Path | bytes) -> tuple[int, int]:
-    """(width, height) from the header of a PNG or JPEG, without decoding it. Only a regular file is opened.
+def picture_size(file: Path | bytes, formats: Sequence[str] = FORMATS) -> tuple[int, int]:
+    """(width, height) from the header of a picture, without decoding it. Only a regular file is opened.
+
+    Args:
+        file: a file, or its first bytes.
+        formats: some of PNG, JPEG, AVIF, as Pillow names them.
 
     Raises:
         DamagedPictureError: if it has none. OSError: if the file cannot be read.
     """
     _check_kind(file)
-    with _open(file) as picture:
+    extents = _avif_extents(file) if isinstance(file, bytes) and "AVIF" in formats else None
+    if extents is not None:
+        return extents
+    with _open(file, formats) as picture:
         return picture.size
 
 
-def open_picture(file: Path | bytes) -> Pillow.Image:
-    """A PNG or JPEG, decoded whole and checked as the module says. Only a regular file is opened.
+def _avif_extents(head: bytes) -> tuple[int, int] | None:
+    """(width, height) of an AVIF's first bytes: its box `ispe`; Pillow would want the whole file. None for others."""
+    place = head.find(b"ispe")
+    if head[4:8] != b"ftyp" or place < 0 or len(head) < place + 16:
+        return None
+    width, height = struct.unpack_from(">II", head, place + 8)
+    return int(width), int(height)
+
+
+def open_picture(file: Path | bytes, formats: Sequence[str] = FORMATS) -> Pillow.Image:
+    """A picture, decoded whole and checked as the module says. Only a regular file is opened.
+
+    Args:
+        formats: some of PNG, JPEG, AVIF, as Pillow names them.
 
     Raises:
         DamagedPictureError: if it is not one, or damaged. OSError: if the file cannot be read.
     """
     _check_kind(file)
     data = file if isinstance(file, bytes) else file.read_bytes()
-    with _open(data) as picture:
+    with _open(data, formats) as picture:
         if picture.format == "PNG":
             _check_png(data)
-        else:
+        elif picture.format == "JPEG":
             _check_jpeg(data)
         try:
             picture.load()
@@ -80,13 +101,13 @@ def _check_kind(file: Path | bytes) -> None:
         raise DamagedPictureError("not a regular file")
 
 
-def _open(file: Path | bytes) -> Pillow.Image:
+def _open(file: Path | bytes, formats: Sequence[str] = FORMATS) -> Pillow.Image:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return Pillow.open(io.BytesIO(file) if isinstance(file, bytes) else file, formats=FORMATS)
+            return Pillow.open(io.BytesIO(file) if isinstance(file, bytes) else file, formats=tuple(formats))
     except UnidentifiedImageError:
-        raise DamagedPictureError("no PNG or JPEG") from None
+        raise DamagedPictureError(f"no {' or '.join(formats)}") from None
     except Pillow.DecompressionBombError as error:
         raise DamagedPictureError(f"a header beyond sense: {error}") from None
     except (OSError, SyntaxError, ValueError, struct.error, zlib.error, IndexError, KeyError, OverflowError) as error:

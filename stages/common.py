@@ -21,7 +21,7 @@ from facefolds_core.paths import SubjectFolders, check_subject_name, subject_fol
 
 Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
 Work = Callable[[SubjectFolders], str]
-"""Does a stage's work on one subject's folders and returns one line that says what was made and where."""
+"""Does a stage's work on one subject's folders, and says in a line what was made and where; more lines may follow."""
 
 LOCK_WAIT = 20.0
 """Seconds that a stage waits for another run of it, which may be ending, on the same subject."""
@@ -54,7 +54,8 @@ def run_stage(name: str, work: Work, help_text: str) -> None:
                 made = work(folders)
                 seconds = time.perf_counter() - start
                 write_json(folders.timing(name), {"stage": name, "seconds": round(seconds, 3)})
-                typer.echo(f"{name}: {made} ({seconds:.1f} s)")
+                said, *more = made.splitlines()
+                typer.echo("\n".join([f"{name}: {said} ({seconds:.1f} s)", *more]))
 
     _run(name, command, help_text)
 

@@ -4,21 +4,43 @@ from __future__ import annotations
 
 import sys
 
-from facefolds_core.asset import read_asset
-from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage, read_train
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.config import read_stage, read_subject, read_train
+from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
-from facefolds_core.params import EvaluateParams
+from facefolds_core.packaging.notes import codec_warning
+from facefolds_core.params import CaptureParams, CompressParams, EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.analysis import shape_of
-from facefolds_core.scoring.evaluation import evaluate, frame_rate_factor
+from facefolds_core.scoring.evaluation import Evaluation, evaluate, frame_rate_factor
+from facefolds_core.scoring.fresh import fresh_json, score_fresh_views
 from facefolds_core.scoring.perceptual import find_perceptual
 from facefolds_core.scoring.record import write_record
-from facefolds_core.scoring.report import metrics_json, read_cost, text_table, write_per_image
+from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
+from facefolds_core.scoring.terminal import result_lines, score_lines
+from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
 from stages.common import run_stage
+
+
+def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
+    """What is not well with the capture, the training, the files and the scores."""
+    video = read_stage(CompressParams, folders.config)
+    quality = asset.manifest.full.quality
+    codec = codec_warning(quality.psnr_to_model if quality else None, video.video, video.search.noticed)
+    limits = read_stage(EvaluateParams, folders.config).warnings
+    return warnings_among(
+        [
+            *scene.left_out,
+            *training_events(folders.model / "fit.json"),
+            *([codec] if codec else []),
+            *matte_is_found(result.matte),
+            *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
+        ]
+    )
 
 
 def evaluate_subject(folders: SubjectFolders) -> str:
@@ -26,22 +48,25 @@ def evaluate_subject(folders: SubjectFolders) -> str:
     device = pick_device(read_train(folders.config).device)
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     cost = read_cost(folders, asset.manifest)
-    perceptual = find_perceptual(device)
-    for line in perceptual.missing:
-        sys.stderr.write(f"evaluate: {line}\n")
-    result = evaluate(scene, load_model(folders.model, device), asset, params, perceptual)
-    metrics = metrics_json(scene.subject, result.scores, cost)
+    perceptual, model = find_perceptual(device), load_model(folders.model, device)
+    result = evaluate(scene, model, asset, params, perceptual)
+    fresh = None
+    if params.fresh_views and read_subject(folders.config).source == "actor":
+        capture = read_stage(CaptureParams, folders.config)
+        fresh = fresh_json(score_fresh_views(scene, model, asset, params, capture))
+    about = Circumstances(result.matte, params.band, result.changes, fresh, noticed(folders, scene, asset, result))
+    metrics = metrics_json(scene.subject, result.scores, cost, about)
     with atomic_folder(folders.evaluation) as temporary:
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
         write_record(temporary, result.panels, result.worst, result.seen, shape_of(asset), asset)
     write_json(folders.metrics, metrics)
-    sys.stdout.write(text_table(metrics) + "\n")
+    notes = list(perceptual.missing)
     factor = frame_rate_factor(scene, asset)
     if factor > 1:
-        kept = f"{scene.num_frames} of the asset's {asset.num_frames} frames"
-        sys.stdout.write(f"evaluate: {kept} have photos and are scored, not those between them\n")
-    return f"{metrics['images']} images of {len(scene.indices('holdout'))} held-out cameras; {folders.metrics}"
+        notes.append(f"{scene.num_frames} of the asset's {asset.num_frames} frames have photos and are scored")
+    sys.stdout.write("\n".join([*score_lines(metrics), *(f"note: {note}" for note in notes)]) + "\n")
+    return "\n".join([f"scores in {folders.metrics}", *result_lines(metrics, folders)])
 
 
 if __name__ == "__main__":

@@ -19,10 +19,11 @@ SHOWN = 5
 def summary(plan: Plan) -> str:
     """One line on the scene."""
     scene = plan.scene
-    train, held = len(scene.indices("train")), len(scene.indices("holdout"))
+    train, checked, held = (len(scene.indices(split)) for split in ("train", "validate", "holdout"))
+    aside = f"{checked} validate, {held} holdout" if checked else f"{held} holdout"
     culled = sum(one.kind == "culled" for one in scene.left_out)
     return (
-        f"{len(scene.cameras)} cameras ({train} train, {held} holdout; {culled} culled), {scene.num_frames} frames, "
+        f"{len(scene.cameras)} cameras ({train} train, {aside}; {culled} culled), {scene.num_frames} frames, "
         f"{scene.width} x {scene.height} pixels, in {scene.folder}"
     )
 

@@ -13,7 +13,9 @@ from tests.chromium import BROWSERS, Chromium, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
 BROWSER = ("tests/viewer/", "tests/reporting/test_browser.py", "tests/core/test_chromium.py")
-LONGEST = ("tests/pipeline/test_end_to_end", *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
+RUN_ONCE = ("tests/pipeline/test_end_to_end.py", "tests/pipeline/test_commands.py")
+"""Tests of one project that DVC has run."""
+LONGEST = (*RUN_ONCE, *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
 """What several workers begin with."""
 
 
@@ -71,12 +73,13 @@ def _rank(nodeid: str) -> int:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """With `-n`: a worker gets whole files, so that what they share is made once; one of them has the browser."""
+    """With `-n`: a worker gets whole files, so that what they share is made once; one has the browser, one the run."""
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
-            return "browser" if nodeid.startswith(BROWSER) else nodeid.split("::")[0]
+            together = {"browser": BROWSER, "run once": RUN_ONCE}
+            return next((name for name, files in together.items() if nodeid.startswith(files)), nodeid.split("::")[0])
 
     config.option.loadscopereorder = False
     return ByFile(config, log)

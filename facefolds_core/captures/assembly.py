@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -12,20 +11,23 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.agreement import AGREE, agreement
 from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
-from facefolds_core.captures.images import decode_image, decode_mask, display_colour, downsample, fit_box, to_8bit
-from facefolds_core.captures.lens import Lens, undistort
+from facefolds_core.captures.developing import Negative, opacities, photos
+from facefolds_core.captures.images import fit_box
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
+from facefolds_core.captures.picture import Picture
 from facefolds_core.captures.scene import Scene, Split, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import FrameStore, Image, write_frames
+from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
+
+Negatives = list[Negative]
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ def _moved(tracking: Tracking, moves: list[Similarity]) -> Tracking:
 
 
 def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
-    """Write the scene's folder, whole or not at all; one image is held in memory at a time.
+    """Write the scene's folder, whole or not at all; a few images are held in memory at a time.
 
     Returns:
         The scene, with what its pictures show to be odd in `left_out`.
@@ -151,12 +153,23 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
         UserError: if an image is damaged.
     """
     scene, capture = plan.scene, plan.capture
-    masked = [row for row in plan.rows if scene.splits[row.camera] == "holdout" and row.source in capture.masks]
+    width, height = scene.width, scene.height
+    scored = [row for row in plan.rows if scene.splits[row.camera] != "train"]
+    opacity = {
+        "masks": _negatives(scored, capture.masks, lambda c, f: f"mask of {capture.place(c, f)}"),
+        "mattes": _negatives(plan.rows, capture.mattes, lambda c, f: f"matte of {capture.place(c, f)}"),
+    }
+    shown = _negatives(plan.rows, capture.images, capture.place)
     with atomic_folder(scene.folder) as temporary:
-        shape = (scene.height, scene.width, 3)
-        write_frames(temporary / "frames.arrow", shape, _photos(plan, params))
-        if masked:
-            write_frames(temporary / "masks.arrow", (scene.height, scene.width, 1), _masks(plan, masked))
+        rows = progress(photos(capture, shown, width, height, params), desc="normalize", unit="image", total=len(shown))
+        write_frames(temporary / "frames.arrow", (height, width, 3), rows)
+        for name, wanted in opacity.items():
+            if wanted:
+                rows = opacities(capture, wanted, width, height)
+                write_frames(temporary / f"{name}.arrow", (height, width, 1), rows)
+        if plates := _plates(plan):
+            rows = photos(capture, plates, width, height, params)
+            write_frames(temporary / "plates.arrow", (height, width, 3), rows)
         if plan.vertices is not None and capture.tracking is not None and capture.tracking.faces is not None:
             np.savez(temporary / "surface.npz", vertices=plan.vertices, faces=capture.tracking.faces)
         if capture.sound is not None and plan.sound_start is not None:
@@ -181,30 +194,21 @@ def _doubts(plan: Plan, written: Path) -> list[Fact]:
     return [fact("pictures_disagree", correlation=found)]
 
 
-def _photos(plan: Plan, params: NormalizeParams) -> Iterator[tuple[int, int, Image]]:
-    capture, scene = plan.capture, plan.scene
-    for row in progress(plan.rows, desc="normalize", unit="image"):
-        photo = decode_image(capture.images[row.source], capture.place(*row.source))
-        values = downsample(_straight(plan, row, photo), scene.width, scene.height)
-        yield row.camera, row.frame, to_8bit(display_colour(values) if params.display_colour else values)
+def _negatives(rows: Sequence[Row], pictures: Mapping[tuple[int, int], Picture], what: Callable[..., str]) -> Negatives:
+    """Of those rows that have a picture; `what` words its camera and frame in the capture."""
+    return [
+        Negative((row.camera, row.frame), row.source[0], pictures[row.source], what(*row.source))
+        for row in rows
+        if row.source in pictures
+    ]
 
 
-def _masks(plan: Plan, rows: list[Row]) -> Iterator[tuple[int, int, Image]]:
-    capture, scene = plan.capture, plan.scene
-    for row in rows:
-        mask = decode_mask(capture.masks[row.source], f"mask of {capture.place(*row.source)}")
-        yield row.camera, row.frame, to_8bit(downsample(_straight(plan, row, mask), scene.width, scene.height))
-
-
-def _straight(plan: Plan, row: Row, photo: Image) -> Image:
-    """The photo without distortion."""
-    lens = plan.capture.views[row.source[0]].lens
-    if lens is None:
-        return photo
-    return undistort(photo, _maps(lens, photo.shape[1], photo.shape[0]))
-
-
-@lru_cache(maxsize=1)
-def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """`Lens.maps`, kept while the frames of one camera are read."""
-    return lens.maps(width, height)
+def _plates(plan: Plan) -> Negatives:
+    """The clean plate of each camera that has one, as its frame 0."""
+    capture = plan.capture
+    view_of = {row.camera: row.source[0] for row in plan.rows}
+    return [
+        Negative((camera, 0), view, capture.plates[view], capture.plate_place(view))
+        for camera, view in view_of.items()
+        if view in capture.plates
+    ]

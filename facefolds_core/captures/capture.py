@@ -1,17 +1,18 @@
-"""A capture as read from disk, before it is normalised: cameras, paths of the images, tracked mesh. No pixels."""
+"""A capture as read from disk, before it is normalised: cameras, where the images lie, tracked mesh. No pixels."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.images import image_size
+from facefolds_core.captures.images import Colour
 from facefolds_core.captures.lens import Lens
+from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
@@ -30,10 +31,12 @@ class View:
     Attributes:
         camera: a pinhole without distortion, in the capture's world, for full-size images.
         lens: how to get the pinhole image from the photo; None where the photo is one.
+        colour: what brings the camera's colours to those of the others; None where they need nothing.
     """
 
     camera: Camera
     lens: Lens | None = None
+    colour: Colour | None = None
 
     @property
     def name(self) -> str:
@@ -82,26 +85,34 @@ class Capture:
         views: cameras, in the order of the capture's own list.
         frame_ids: K names of frames, sorted.
         fps: frames a second; 0 for a static capture.
-        images: (camera index, frame index) -> file. Incomplete where the capture is.
-        masks: likewise, files of true opacity, where there are any.
+        images: (camera index, frame index) -> where it lies. Incomplete where the capture is.
+        masks: likewise, opacity by which held-out images are scored, where there is any.
         tracking: for all K frames, or None.
         left_out: a fact for each thing of the capture that is not here, with the reason, and for each guess made.
         sound: None where the capture is silent.
+        plates: camera index -> a clean plate, the same camera's picture without the subject.
+        mattes: (camera index, frame index) -> opacity that training may use, of any camera.
     """
 
     root: Path
     views: tuple[View, ...]
     frame_ids: tuple[str, ...]
     fps: float
-    images: Mapping[tuple[int, int], Path]
-    masks: Mapping[tuple[int, int], Path]
+    images: Mapping[tuple[int, int], Picture]
+    masks: Mapping[tuple[int, int], Picture]
     tracking: Tracking | None
     left_out: tuple[Fact, ...]
     sound: Sound | None = None
+    plates: Mapping[int, Picture] = field(default_factory=dict)
+    mattes: Mapping[tuple[int, int], Picture] = field(default_factory=dict)
 
     def place(self, camera: int, frame: int) -> str:
         """Words for one image, for messages."""
         return f"camera {self.views[camera].name}, frame {self.frame_ids[frame]}"
+
+    def plate_place(self, camera: int) -> str:
+        """Words for a clean plate."""
+        return f"clean plate of camera {self.views[camera].name}"
 
 
 def select_frames(
@@ -204,7 +215,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
 
 def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
-    """(width, height) of all images in use, from their headers (masks included, where they belong to these).
+    """(width, height) of all images in use, from their headers (masks and mattes included).
 
     Raises:
         UserError: if a header cannot be read or sizes differ; names the file and the size of the others.
@@ -212,22 +223,46 @@ def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence
     expected: tuple[int, int] | None = None
     for c in cameras:
         for f in frames:
-            files = [capture.images[c, f]] + ([capture.masks[c, f]] if (c, f) in capture.masks else [])
-            for file in files:
-                size = image_size(file, capture.place(c, f))
+            place = capture.place(c, f)
+            pictures = [(capture.images[c, f], place)]
+            pictures += [(of[c, f], place) for of in (capture.masks, capture.mattes) if (c, f) in of]
+            for picture, where in pictures:
+                size = picture.size(where)
                 expected = expected or size
                 if size != expected:
-                    raise UserError(
-                        "images of different sizes",
-                        file=file,
-                        place=capture.place(c, f),
-                        expected=f"{expected[0]} x {expected[1]}, as {capture.images[cameras[0], frames[0]]}",
-                        found=f"{size[0]} x {size[1]}",
-                        remedy="use cameras of one image size, or resize the images (and their intrinsics)",
-                    )
+                    first = capture.images[cameras[0], frames[0]].file
+                    raise wrong_size(picture.file, where, size, f"{expected[0]} x {expected[1]}, as {first}")
     if expected is None:
         raise ValueError("no cameras or frames to check")
+    for c in cameras:
+        if c in capture.plates:
+            check_plate_size(capture, c, capture.plates[c].size(capture.plate_place(c)))
     return expected
+
+
+def check_plate_size(capture: Capture, camera: int, size: tuple[int, int]) -> None:
+    """UserError unless a clean plate of `size` (width, height) has the shape of the camera's images.
+
+    It may be larger or smaller, for both are averaged down; but not where a lens is taken out.
+    """
+    view = capture.views[camera]
+    width, height = view.camera.width, view.camera.height
+    if size == (width, height) or (view.lens is None and abs(size[0] * height / (size[1] * width) - 1) < 0.005):
+        return
+    file, expected = capture.plates[camera].file, f"{width} x {height}, as the camera's images"
+    raise wrong_size(file, capture.plate_place(camera), size, expected)
+
+
+def wrong_size(file: Path, place: str, size: tuple[int, int], expected: str) -> UserError:
+    """The error for an image whose (width, height) is not that of the others."""
+    return UserError(
+        "images of different sizes",
+        file=file,
+        place=place,
+        expected=expected,
+        found=f"{size[0]} x {size[1]}",
+        remedy="use cameras of one image size, or resize the images (and their intrinsics)",
+    )
 
 
 def closest_rotation(w2c: Array) -> Array:

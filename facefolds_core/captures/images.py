@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from facefolds_core.errors import UserError
-from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
+from facefolds_core.pictures import FORMATS, DamagedPictureError, open_picture, picture_size
 from facefolds_core.reading import LARGEST, check_regular, no_memory, read_bytes
 
 Image = NDArray[np.uint8]
@@ -47,17 +49,20 @@ def _unreadable(path: Path, place: str, length: int, error: Exception) -> UserEr
     )
 
 
-def _load(path: Path, place: str) -> Pillow.Image:
-    data = read_bytes(path, _REMEDY, place=place, missing="an image is missing")
+def _open_bytes(data: bytes, file: Path, place: str, formats: Sequence[str]) -> Pillow.Image:
+    """A picture's bytes decoded; `file` is where they lie, for messages."""
     try:
-        return open_picture(data)
+        return open_picture(data, formats)
     except MemoryError:
-        raise no_memory(path, place) from None
+        raise no_memory(file, place) from None
     except (OSError, DamagedPictureError) as error:
-        size = image_size(path, place)
+        try:
+            size = picture_size(data, formats)
+        except (OSError, DamagedPictureError) as worse:
+            raise _unreadable(file, place, len(data), worse) from None
         raise UserError(
             "a damaged image",
-            file=path,
+            file=file,
             place=place,
             expected=f"{size[0]} x {size[1]} pixels, as its header says",
             found=f"{error} ({len(data)} bytes in the file)",
@@ -71,16 +76,34 @@ def _grey_8bit(image: Pillow.Image) -> Image:
 
 
 def decode_image(path: Path, place: str) -> Image:
-    """(H, W, 3) uint8 RGB of a photo.
-
-    Grey images are repeated over the channels, 16-bit ones reduced to 8, straight alpha is composited over black (the
-    background of a capture with transparent images). EXIF rotation is ignored: K refers to the pixels as stored.
+    """(H, W, 3) uint8 RGB of a photo: `rgb_of` its bytes.
 
     Raises:
         UserError: if the file is missing, damaged (see `pictures`) or not an image; names file and `place`
             (camera and frame).
     """
-    image = _load(path, place)
+    return rgb_of(read_bytes(path, _REMEDY, place=place, missing="an image is missing"), path, place)
+
+
+def decode_mask(path: Path, place: str) -> Image:
+    """(H, W, 1) uint8 opacity from a grey image; raises like `decode_image`."""
+    return opacity_of(read_bytes(path, _REMEDY, place=place, missing="an image is missing"), path, place)
+
+
+def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS) -> Image:
+    """(H, W, 3) uint8 RGB of a picture's bytes.
+
+    Grey images are repeated over the channels, 16-bit ones reduced to 8, straight alpha is composited over black (the
+    background of a capture with transparent images). EXIF rotation is ignored: K refers to the pixels as stored.
+
+    Args:
+        file, place: where they lie, for messages.
+        formats: of `open_picture`.
+
+    Raises:
+        UserError: if they are damaged, or no picture.
+    """
+    image = _open_bytes(data, file, place, formats)
     if image.mode.startswith("I") or image.mode == "F":
         return np.repeat(_grey_8bit(image)[..., None], 3, axis=2)
     if image.mode in ("RGBA", "LA", "PA", "La", "RGBa") or "transparency" in image.info:
@@ -89,9 +112,17 @@ def decode_image(path: Path, place: str) -> Image:
     return np.array(image.convert("RGB"))
 
 
-def decode_mask(path: Path, place: str) -> Image:
-    """(H, W, 1) uint8 opacity from a grey image; raises like `decode_image`."""
-    image = _load(path, place)
+def opacity_of(
+    data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS, *, largest: bool = False
+) -> Image:
+    """(H, W, 1) uint8 opacity of a picture's bytes; raises like `rgb_of`.
+
+    Args:
+        largest: of a colour picture, the largest channel instead of its luma.
+    """
+    image = _open_bytes(data, file, place, formats)
+    if largest and not image.mode.startswith("I"):
+        return np.asarray(np.array(image.convert("RGB")).max(2, keepdims=True))
     grey = _grey_8bit(image) if image.mode.startswith("I") else np.array(image.convert("L"))
     return grey[..., None]
 
@@ -134,6 +165,40 @@ def display_colour(values: NDArray[np.float32]) -> NDArray[np.float32]:
     scaled = values / 255 * (np.array([1.4, 1.1, 1.6], np.float32) / 1.1)
     gained = np.clip(scaled - black, 0, 2) * (0.95 / (1 - black))
     return (np.clip(np.sqrt(gained) - 15 / 255, 0, 1) * 255).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Colour:
+    """What brings a camera's colours to those of the others: matrix @ RGB + offset, RGB a column in 0..1.
+
+    Attributes:
+        matrix: (3, 3).
+        offset: (3,).
+        linear: whether it is for linear light, else for values on the sRGB curve.
+    """
+
+    matrix: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    linear: bool
+
+
+def corrected_colour(values: NDArray[np.float32], colour: Colour) -> NDArray[np.float32]:
+    """Colours corrected, clipped to 0..1; linear light is reached by the sRGB curve (IEC 61966-2-1) and left by it.
+
+    Args:
+        values: (H, W, 3), 0..255.
+
+    Returns:
+        (H, W, 3), 0..255.
+    """
+    matrix, offset = colour.matrix.T.astype(np.float32), colour.offset.astype(np.float32)
+    coded = values / np.float32(255)
+    if not colour.linear:
+        return np.asarray(np.clip(coded @ matrix + offset, 0, 1) * 255, np.float32)
+    light = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    mixed = np.clip(light @ matrix + offset, 0, 1)
+    coded = np.where(mixed <= 0.0031308, mixed * 12.92, 1.055 * mixed ** (1 / 2.4) - 0.055)
+    return np.asarray(coded * 255, np.float32)
 
 
 def to_8bit(values: NDArray[np.float32]) -> Image:

@@ -1,4 +1,9 @@
-"""Lens distortion: the radial-tangential model of OpenCV (k1, k2, p1, p2, k3), and photos freed from it."""
+"""Lens distortion, and photos freed from it: OpenCV's radial-tangential model, and its fisheye model.
+
+- Radial-tangential: k1, k2, p1, p2, k3, and where there are eight, k4, k5, k6 of the rational model.
+- Fisheye (Kannala and Brandt 2006; `cv2.fisheye`): k1 to k4; a point at the angle theta from the axis lies at
+  theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8). An ideal fisheye has four zeros.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +24,30 @@ class Lens:
 
     Attributes:
         K: (3, 3) of the photo; continuous pixel coordinates, as everywhere.
-        coefficients: (5,) k1, k2, p1, p2, k3.
+        coefficients: (5,) k1, k2, p1, p2, k3, or (8,) with k4, k5, k6; of a fisheye (4,) k1 to k4.
         pinhole: (3, 3) of the undistorted image, which has the same size.
+        fisheye: the model of the coefficients.
     """
 
     K: Array
     coefficients: Array
     pinhole: Array
+    fisheye: bool = False
 
     def distort(self, points: Array) -> Array:
         """Ideal image-plane points (..., 2), X_c / Z_c, -> where the lens puts them, pixels (..., 2) of the photo."""
-        k1, k2, p1, p2, k3 = self.coefficients
+        if self.fisheye:
+            r = np.linalg.norm(points, axis=-1)
+            scale = np.where(r > 0, self._angle(np.arctan(r)) / np.where(r > 0, r, 1.0), 1.0)
+            bent = np.concatenate([points * scale[..., None], np.ones_like(r)[..., None]], -1)
+            return np.asarray((bent @ self.K.T)[..., :2])
+        k1, k2, p1, p2, k3 = self.coefficients[:5]
         x, y = points[..., 0], points[..., 1]
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        if len(self.coefficients) == 8:
+            k4, k5, k6 = self.coefficients[5:]
+            radial = radial / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
         moved = np.stack(
             [
                 x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
@@ -42,6 +57,21 @@ class Lens:
             -1,
         )
         return (moved @ self.K.T)[..., :2]
+
+    def _angle(self, theta: Array) -> Array:
+        """Where a fisheye puts angles from the axis (...), radians."""
+        k1, k2, k3, k4 = self.coefficients
+        t2 = theta * theta
+        return np.asarray(theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))))
+
+    def folds(self, pixels: Array) -> bool:
+        """Whether a fisheye's polynomial turns back on the way to pixels (..., 2) of the undistorted image."""
+        if not self.fisheye:
+            return False
+        homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
+        radius = np.linalg.norm((homogeneous @ np.linalg.inv(self.pinhole).T)[..., :2], axis=-1).max()
+        angles = self._angle(np.linspace(0, np.arctan(radius), 256))
+        return bool((np.diff(angles) <= 0).any())
 
     def source_of(self, pixels: Array) -> Array:
         """Pixels (..., 2) of the undistorted image -> pixels (..., 2) of the photo."""
@@ -62,7 +92,9 @@ def undistort(image: NDArray[np.uint8], maps: tuple[NDArray[np.float32], NDArray
     return np.asarray(straight, np.uint8).reshape(image.shape)
 
 
-def make_lens(K: Array, coefficients: Array, width: int, height: int, file: object, place: str) -> Lens | None:
+def make_lens(
+    K: Array, coefficients: Array, width: int, height: int, file: object, place: str, fisheye: bool = False
+) -> Lens | None:
     """The lens of one camera, or None where it does not distort.
 
     The undistorted image keeps K, unless it would then show places outside the photo (pincushion distortion): its focal
@@ -70,19 +102,21 @@ def make_lens(K: Array, coefficients: Array, width: int, height: int, file: obje
 
     Args:
         K: (3, 3) of the photo.
-        coefficients: (5,) k1, k2, p1, p2, k3.
+        coefficients, fisheye: as of `Lens`.
         file, place: for the message.
 
     Raises:
         UserError: if even twice the focal length shows places outside the photo: such numbers are no lens.
     """
-    if not np.any(coefficients):
+    if not fisheye and not np.any(coefficients):
         return None
 
     def zoomed(factor: float) -> Lens:
-        return Lens(K, coefficients, np.diag([factor, factor, 1.0]) @ K + _recentre(K, factor))
+        return Lens(K, coefficients, np.diag([factor, factor, 1.0]) @ K + _recentre(K, factor), fisheye)
 
     def inside(lens: Lens) -> bool:
+        if lens.folds(_border(width, height)):
+            return False
         points = lens.source_of(_border(width, height))
         return bool((points >= 0.5).all() and (points <= [width - 0.5, height - 0.5]).all())
 
@@ -94,9 +128,9 @@ def make_lens(K: Array, coefficients: Array, width: int, height: int, file: obje
             "the distortion is too strong to undo",
             file=str(file),
             place=place,
-            expected="k1, k2, p1, p2, k3 of a lens",
+            expected="k1, k2, k3, k4 of a fisheye lens" if fisheye else "k1, k2, p1, p2, k3 of a lens",
             found=coefficients.tolist(),
-            remedy="check the distortion values; fisheye images must be rectified first",
+            remedy="check the distortion values, and whether the lens is a fisheye",
         )
     for _ in range(30):
         middle = (low + high) / 2

@@ -191,38 +191,64 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
 
 
 def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact], file: object) -> tuple[Split, ...]:
-    """ "train" or "holdout" for each of the cameras that are used, in their order.
+    """ "train", "validate" or "holdout" for each of the cameras that are used, in their order.
 
-    `every: n` holds out the cameras at positions p (from 0) with (p + 1) % n == 0.
+    `every: n` takes the cameras at positions p (from 0) with (p + 1) % n == 0: of all of them for `holdout`, of those
+    that are not held out for `validate`.
 
     Args:
         unused: facts on cameras that were left out, to say why one that is named is not there.
 
     Raises:
-        UserError: if a camera to hold out is not there, or no camera is left for training.
+        UserError: if a camera that is named is not there, or for both, or no camera is left for training.
     """
-    if isinstance(subject.holdout, HoldoutEvery):
-        held = {name for p, name in enumerate(names) if (p + 1) % subject.holdout.every == 0}
-    else:
-        held = set(subject.holdout)
-    for name in sorted(held - set(names)):
-        reasons = [str(one) for one in unused if one.camera == name]
+    held = _named("holdout", subject.holdout, names, unused, file)
+    rest = [name for name in names if name not in held]
+    validating = _named("validate", subject.validation or (), names, unused, file, rest)
+    both = sorted(held & validating)
+    if both:
         raise UserError(
-            "a held-out camera is not there",
+            "a camera is held out and for validation, too",
             file=str(file),
-            place="holdout",
-            expected=f"some of {shorten(names, 200)}",
-            found=reasons[0] if reasons else f"{name}, which the capture does not have",
-            remedy="correct `holdout` of this subject in params.yaml",
+            place="validate",
+            expected=f"some of {shorten(rest, 200)}",
+            found=shorten(both),
+            remedy="correct `validate` or `holdout` of this subject in params.yaml",
         )
-    splits: tuple[Split, ...] = tuple("holdout" if name in held else "train" for name in names)
+    splits: tuple[Split, ...] = tuple(
+        "holdout" if name in held else "validate" if name in validating else "train" for name in names
+    )
     if "train" not in splits:
         raise UserError(
             "no camera is left for training",
             file=str(file),
-            place="holdout",
-            expected=f"fewer than {len(names)} held-out cameras",
-            found=shorten(sorted(held)),
+            place="validate" if validating else "holdout",
+            expected=f"fewer than {len(names)} cameras that are set aside",
+            found=shorten(sorted(held | validating)),
             remedy="hold out fewer cameras",
         )
     return splits
+
+
+def _named(
+    key: str,
+    chosen: Sequence[str] | HoldoutEvery,
+    names: Sequence[str],
+    unused: Sequence[Fact],
+    file: object,
+    of: Sequence[str] | None = None,
+) -> set[str]:
+    """The cameras that a key of the subject chooses: by their names, or every n-th one of `of` (all)."""
+    if isinstance(chosen, HoldoutEvery):
+        return {name for p, name in enumerate(names if of is None else of) if (p + 1) % chosen.every == 0}
+    for name in sorted(set(chosen) - set(names)):
+        reasons = [str(one) for one in unused if one.camera == name]
+        raise UserError(
+            "a held-out camera is not there" if key == "holdout" else "a camera for validation is not there",
+            file=str(file),
+            place=key,
+            expected=f"some of {shorten(names, 200)}",
+            found=reasons[0] if reasons else f"{name}, which the capture does not have",
+            remedy=f"correct `{key}` of this subject in params.yaml",
+        )
+    return set(chosen)

@@ -3,7 +3,10 @@
 A folder with
 - `scene.json`: cameras, split, times, the transform from the capture (this module's `Scene`);
 - `frames.arrow`: all images, one row per (camera, frame) (`frames.FrameStore`);
-- `masks.arrow`: true opacity of held-out images, where the capture has it (same format, one channel);
+- `masks.arrow`: true opacity of images of cameras that do not train, where the capture has it (same format, one
+  channel);
+- `plates.arrow`: a clean plate, the picture without the subject, of cameras for which the capture has one (frame 0);
+- `mattes.arrow`: opacity that training may use, of any camera and frame, where the capture has it (one channel);
 - `surface.npz`: tracked mesh in normalised coordinates, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32;
 - `audio.wav`: the sound from the first frame on, where the capture has it.
@@ -35,8 +38,10 @@ SCENE_VERSION = 2
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
 
-Split = Literal["train", "holdout", "out"]
-"""What a camera is for; "out" is nothing: a trainer does not believe it. No scene on disk has that."""
+Split = Literal["train", "validate", "holdout", "out"]
+"""What a camera is for. "train": seen by every stage that fits something. "validate": set aside from training, for
+whoever chooses between trainings. "holdout": for scores alone; nothing is chosen by it. "out": nothing, a trainer does
+not believe it; no scene on disk has that."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Scene:
     Attributes:
         subject: its name in params.yaml.
         cameras: C cameras, all of one image size, in the order of the rows of the frame store.
-        splits: for each camera, "train" or "holdout".
+        splits: for each camera, "train", "validate" or "holdout".
         frame_ids: K names of frames in the capture.
         times: (K,) seconds from the first frame.
         fps: frames a second of the capture (playback rate of the asset); 0 for a static scene.
@@ -87,6 +92,11 @@ class Scene:
         """Indices of the cameras of one split."""
         return [i for i, s in enumerate(self.splits) if s == split]
 
+    @property
+    def choice_split(self) -> Split:
+        """The cameras by which something may be chosen: those for validation; without any, the held-out ones."""
+        return "validate" if "validate" in self.splits else "holdout"
+
     def cameras_of(self, split: Split) -> list[Camera]:
         """The cameras of one split."""
         return [self.cameras[i] for i in self.indices(split)]
@@ -95,8 +105,18 @@ class Scene:
         return FrameStore(self.folder / "frames.arrow")
 
     def open_masks(self) -> FrameStore | None:
-        """True opacity (0..255, one channel) of some held-out images, or None where the capture has none."""
+        """True opacity (0..255, one channel) of some scored images, or None where the capture has none."""
         path = self.folder / "masks.arrow"
+        return FrameStore(path) if is_there(path) else None
+
+    def open_plates(self) -> FrameStore | None:
+        """Clean plates, (camera, 0) -> the picture without the subject, of some cameras; None where there is none."""
+        path = self.folder / "plates.arrow"
+        return FrameStore(path) if is_there(path) else None
+
+    def open_mattes(self) -> FrameStore | None:
+        """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""
+        path = self.folder / "mattes.arrow"
         return FrameStore(path) if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
@@ -207,7 +227,7 @@ def _check(scene: Scene) -> None:
         raise ValueError("matrices of the wrong shape")
     if len({(c.width, c.height) for c in cameras}) != 1 or not 1 <= min(scene.width, scene.height) <= 1 << 20:
         raise ValueError("image sizes that differ, or are none")
-    if not set(scene.splits) <= {"train", "holdout"}:
+    if not set(scene.splits) <= {"train", "validate", "holdout"}:
         raise ValueError(f"splits {sorted(set(scene.splits))}")
     if scene.times.shape != (frames,) or not np.isfinite([*scene.times, scene.fps]).all() or not 0 <= scene.fps < 1e4:
         raise ValueError("times or a rate that are none")

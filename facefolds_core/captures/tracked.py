@@ -105,7 +105,11 @@ def read_pose(path: Path) -> Array:
     Raises:
         UserError: if the file is garbled, has numbers that are not finite, or R is not a rotation (to 1e-3).
     """
-    text = read_text(path, _REMEDY, expected="a head pose")
+    return parse_pose(read_text(path, _REMEDY, expected="a head pose"), path)
+
+
+def parse_pose(text: str, path: Path) -> Array:
+    """(3, 4) head -> world, from the text of a pose; raises like `read_pose`."""
     try:
         pose = np.array([[float(w) for w in line.split()] for line in text.splitlines() if line.strip()])
     except ValueError:
@@ -135,7 +139,7 @@ def read_pose(path: Path) -> Array:
     return pose
 
 
-def _check_extent(points: Array, file: Path) -> None:
+def check_extent(points: Array, file: Path) -> None:
     """Refuse vertices (V, 3) that all lie in one point or on one line."""
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     if len(points) < 3 or spread[1] <= 1e-4 * spread[0] or spread[0] <= 1e-12:
@@ -190,7 +194,7 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
             raise UserError(
                 "a damaged tracked mesh", file=file, expected=f"{count} finite vertices", found=found, remedy=_REMEDY
             )
-        _check_extent(points, file)
+        check_extent(points, file)
         vertices.append(points)
         poses.append(read_pose(transform))
     return Tracking(np.array(poses), np.array(vertices), faces), tracked, left_out

@@ -22,6 +22,7 @@ COMMANDS = {
     "export": "Write an asset as another program can read it.",
     "export-godot": "The same as `export godot`.",
     "report": "A page that tells all about a subject.",
+    "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
     "recommend": "The best configuration within a budget, of such a table.",
     "doctor": "Is all here that the pipeline needs? Mends what a killed DVC leaves.",
@@ -29,7 +30,7 @@ COMMANDS = {
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
-EXTRAS = {"report": "report", "collect": "pipeline", "recommend": "pipeline"}
+EXTRAS = {"report": "report", "waterfall": "train", "collect": "pipeline", "recommend": "pipeline"}
 """Commands that need more than the base -> the extra that brings it."""
 
 

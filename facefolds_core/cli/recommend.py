@@ -11,10 +11,16 @@ import typer
 from facefolds_core.cli.numbers import finite
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.sweeps.edit import set_for_subject
-from facefolds_core.sweeps.recommend import Budget, recommend
+from facefolds_core.sweeps.experiments import VALIDATE
+from facefolds_core.sweeps.recommend import Budget, judged_by, recommend
 from facefolds_core.sweeps.table import Run, read_runs
 
-SHOWN = ("psnr_subject", "psnr", "triangles", "bytes", "gpu_bytes", "video_bits_per_second")
+SHOWN = ("psnr_over_plate", "psnr_subject", "psnr_found", "triangles", "bytes", "gpu_bytes", "video_bits_per_second")
+
+HELD_OUT = (
+    "  chosen by the held-out cameras, for want of others: its score there flatters it a little, the more so the more "
+    "were tried; set `validate: {every: 8}` of this subject in params.yaml while you choose (docs/guide/subjects.md)"
+)
 
 
 def command(
@@ -34,7 +40,7 @@ def command(
     ] = None,
     min_psnr: Annotated[
         float | None,
-        typer.Option(help="dB on held-out cameras, of the subject where there are masks.", callback=finite),
+        typer.Option(help="dB, of the figure that is gone by: it is printed.", callback=finite),
     ] = None,
     write: Annotated[bool, typer.Option("--write", help="Put it into params.yaml, for this subject.")] = False,
     params: Annotated[Path, typer.Option(help="The file that --write changes.")] = Path("params.yaml"),
@@ -43,7 +49,10 @@ def command(
     with report_user_errors("recommend"):
         runs = of_subject(read_runs(table), subject, table)
         run = recommend(runs, Budget(max_bytes, max_triangles, max_gpu_bytes, max_bit_rate), min_psnr)
-        typer.echo(f"recommend: {run.subject}, {run.experiment}")
+        key = judged_by(runs)
+        typer.echo(f"recommend: {run.subject}, {run.experiment} (by {key}, {run.figure(key):.2f} dB)")
+        if not key.startswith(VALIDATE):
+            typer.echo(HELD_OUT)
         for name, value in run.params.items():
             typer.echo(f"  {name}: {json.dumps(value)}")
         typer.echo("  " + ", ".join(f"{name} {value:g}" for name in SHOWN if (value := run.figure(name)) is not None))

@@ -19,13 +19,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.export.bake_kernel import SCALE, accumulate, render, true_positions, update
+from facefolds_core.export.bake_kernel import accumulate, render, true_positions, update
 from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.hit_codes import encode
 from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.rendering.raster import cast_mesh
@@ -91,7 +92,7 @@ def cast_codes(camera: Camera, meshes: Sequence[TexturedMesh]) -> Codes:
         hit = np.zeros((camera.height, camera.width), bool)
         st = np.zeros((camera.height, camera.width, 2), np.float32)
         cast_mesh(camera, mesh, hit, st)
-        codes[hit.reshape(-1), layer] = np.rint(1 + SCALE * st[hit].clip(0, 1))
+        codes[hit.reshape(-1), layer] = encode(st[hit])
     return codes
 
 
@@ -120,13 +121,13 @@ class Baker:
         sheets: that they came from.
         rays: of the training cameras.
         size: texels a side of the shipped textures.
-        damping: in a step's denominator, see `BakeParams`.
+        params: `damping` and `min_light` of the steps.
     """
 
     def __init__(
-        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, damping: float = _USUAL.damping
+        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, params: BakeParams = _USUAL
     ) -> None:
-        self.rays, self._damping = rays, damping
+        self.rays, self._params = rays, params
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
         self._sums: Float = np.zeros((len(meshes), size, size, 6), np.float32)
 
@@ -147,8 +148,8 @@ class Baker:
         values = moved.astype(np.float32) / np.float32(255)
         shown = values.copy()
         for _ in range(iterations):
-            accumulate(self.rays.shipped, target, shown, self._sums)
-            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._damping, shown.reshape(-1, 4))
+            accumulate(self.rays.shipped, target, shown, self._sums, self._params.min_light)
+            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._params.damping, shown.reshape(-1, 4))
         return np.stack([_finished(image) for image in shown])
 
 

@@ -8,25 +8,11 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
-OPAQUE = 1e-3
-"""Layers behind less than this transmittance are left out."""
-
-SCALE = 65534.0
-"""Texture coordinates in 16 bits: code = 1 + SCALE s, 0 where a ray misses the layer."""
-
-
 _scatter = scatter_of(6)
-
-
-@inlined
-def _corner(code, size):  # type: ignore[no-untyped-def]
-    """16-bit texture coordinate -> index of the texel before it, and the fraction beyond its centre; clamped."""
-    x = min(max((code - 1) * (size / SCALE) - 0.5, 0.0), size - 1.0)
-    i = min(int(x), size - 2)
-    return i, np.float32(x - i)
 
 
 @inlined
@@ -49,8 +35,8 @@ def render(codes, texture, out):  # type: ignore[no-untyped-def]
         for n in range(codes.shape[1]):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             alpha = _tap(texture, n, i, j, 3, a, b) * scale
             weight = through * alpha * scale
             r0 += weight * _tap(texture, n, i, j, 0, a, b)
@@ -61,13 +47,14 @@ def render(codes, texture, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(parallel=True)
-def accumulate(codes, target, texture, sums):  # type: ignore[no-untyped-def]
+def accumulate(codes, target, texture, sums, min_light):  # type: ignore[no-untyped-def]
     """Adds, for each texel: sum J r of its rgb and alpha, and sum |J| (row sum of |J|) of colour and of alpha.
 
     r = (C - C*, T - T*) of a ray, J its derivative by the texel's values. Returns the sum of |r|^2.
 
     codes (P, N, 2) uint16, target (P, 4) float32: rgb over black and transmittance; texture (N, H, W, 4) float32 in
     [0, 1]; sums (N, H, W, 6) are added to, each in the order of the rays: the result does not depend on the threads.
+    Layers behind less transmittance than `min_light` are left out.
     """
     layers, count = texture.shape[0], codes.shape[0]
     squares = np.zeros((count + BLOCK - 1) // BLOCK)
@@ -81,6 +68,7 @@ def accumulate(codes, target, texture, sums):  # type: ignore[no-untyped-def]
                 codes[start + first : start + last],
                 target[start + first : start + last],
                 texture,
+                min_light,
                 index[:, first:last],
                 wish[:, first:last],
             )
@@ -94,7 +82,7 @@ def accumulate(codes, target, texture, sums):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _residuals(codes: Any, target: Any, texture: Any, index: Any, wish: Any) -> Any:
+def _residuals(codes: Any, target: Any, texture: Any, min_light: Any, index: Any, wish: Any) -> Any:
     """A block of R rays: texels before their hits (N, R), -1 where there is none, and what is to be added there
     (N, R, 8): fractions of row and column, and the six sums. Returns the sum of |r|^2."""
     height, width, layers = texture.shape[1], texture.shape[2], texture.shape[0]
@@ -111,8 +99,8 @@ def _residuals(codes: Any, target: Any, texture: Any, index: Any, wish: Any) -> 
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             alpha = _tap(texture, n, i, j, 3, a, b)
             if alpha <= zero:
                 continue
@@ -128,7 +116,7 @@ def _residuals(codes: Any, target: Any, texture: Any, index: Any, wish: Any) -> 
             r2 += weight * c[m, 2]
             through *= one - alpha
             m += 1
-            if through < OPAQUE:
+            if through < min_light:
                 break
         d0, d1, d2 = r0 - target[p, 0], r1 - target[p, 1], r2 - target[p, 2]
         d3 = through - target[p, 3]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.export.bake_kernel import OPAQUE, SCALE
+from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
 
 
@@ -22,10 +22,10 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return (top * (1 - a) + bottom * a) * (codes[..., :1] > 0)
 
 
-def visible(rgba: Tensor) -> Tensor:
-    """[P, N, 4] -> the same without what lies behind less transmittance than OPAQUE, which a step leaves out."""
+def visible(rgba: Tensor, min_light: float) -> Tensor:
+    """[P, N, 4] -> the same without what lies behind less light than `min_light`, which a step leaves out."""
     before, _ = transmittances(rgba[..., 3].detach())
-    return torch.where((before >= OPAQUE)[..., None], rgba, 0.0)
+    return torch.where((before >= min_light)[..., None], rgba, 0.0)
 
 
 def composite(rgba: Tensor) -> Tensor:
@@ -34,7 +34,7 @@ def composite(rgba: Tensor) -> Tensor:
     return torch.cat([(weights[..., None] * rgba[..., :3]).sum(1), transmittance[:, None]], -1)
 
 
-def accumulate(codes: Tensor, target: Tensor, texture: Tensor) -> tuple[Tensor, Tensor]:
+def accumulate(codes: Tensor, target: Tensor, texture: Tensor, min_light: float) -> tuple[Tensor, Tensor]:
     """Sums [N, H, W, 6] as in the kernel, and the sum of |r|^2.
 
     Args:
@@ -43,7 +43,7 @@ def accumulate(codes: Tensor, target: Tensor, texture: Tensor) -> tuple[Tensor, 
         texture: [N, H, W, 4].
     """
     texture = texture.detach().requires_grad_()
-    rgba = visible(look_up(codes, texture))
+    rgba = visible(look_up(codes, texture), min_light)
     residual = composite(rgba) - target
     (gradient,) = torch.autograd.grad(0.5 * residual.square().sum(), texture, retain_graph=True)
     # Derivatives of a ray's four numbers by its layers' rgb and alpha, then |J| times the row's sum, at the texels.

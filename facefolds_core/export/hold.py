@@ -26,7 +26,7 @@ _USUAL = BakeParams()
 
 
 def texel_weights(
-    codes: NDArray[np.uint16], textures: FrameStore, cameras: int, looked_at: int = _USUAL.hold_frames
+    codes: NDArray[np.uint16], textures: FrameStore, cameras: int, params: BakeParams = _USUAL
 ) -> NDArray[np.float32]:
     """(N, S, S, 2): W of colour and of alpha.
 
@@ -34,14 +34,16 @@ def texel_weights(
         codes: (P, N, 2) rays of all training cameras (`bake.Rays.shipped`).
         textures: layered frame store.
         cameras: how many those are.
-        looked_at: frames, evenly spread; the greatest weight counts.
+        params: how many frames are looked at, evenly spread; the greatest weight counts.
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
-    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, min(looked_at, len(frames)))})
+    count = min(params.hold_frames, len(frames))
+    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, count)})
     weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
     for frame in chosen:
         sums = np.zeros_like(weights)
-        add_weights(codes, np.stack([textures.image(n, frame) for n in layers]).astype(np.float32), sums)
+        images = np.stack([textures.image(n, frame) for n in layers]).astype(np.float32)
+        add_weights(codes, images, sums, params.min_light)
         np.maximum(weights, sums / np.float32(cameras), out=weights)
     return weights
 

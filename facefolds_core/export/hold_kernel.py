@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.export.bake_kernel import OPAQUE, _corner, _tap
+from facefolds_core.export.bake_kernel import _tap
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
@@ -15,13 +16,14 @@ _scatter = scatter_of(2)
 
 
 @kernel(parallel=True)
-def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
+def add_weights(codes, texture, sums, min_light):  # type: ignore[no-untyped-def]
     """Adds to each texel's sums, over all rays, share * (dC/dcolour)^2 and share * |dC/dalpha|^2 / 3.
 
     C is a ray's colour over black, in the texture's unit; the share is the texel's in the bilinear look-up, and the
     derivatives are those by the value looked up.
 
-    codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255], sums (N, H, W, 2) float32.
+    codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255], sums (N, H, W, 2) float32. Layers behind less
+    transmittance than `min_light` are left out.
     """
     layers, count = texture.shape[0], codes.shape[0]
     index = np.empty((layers, CHUNK), np.int32)
@@ -30,14 +32,14 @@ def add_weights(codes, texture, sums):  # type: ignore[no-untyped-def]
         own = min(CHUNK, count - start)
         for block in prange((own + BLOCK - 1) // BLOCK):
             first, last = block * BLOCK, min((block + 1) * BLOCK, own)
-            _weigh(codes[start + first : start + last], texture, index[:, first:last], wish[:, first:last])
+            _weigh(codes[start + first : start + last], texture, min_light, index[:, first:last], wish[:, first:last])
         for task in prange(layers):
             n = spread(task, layers)
             _scatter(index[n, :own], wish[n, :own], sums[n])
 
 
 @compiled
-def _weigh(codes: Any, texture: Any, index: Any, wish: Any) -> None:
+def _weigh(codes: Any, texture: Any, min_light: Any, index: Any, wish: Any) -> None:
     """A block of R rays: index (N, R) and wish (N, R, 4) as `scatter` takes them."""
     height, width, layers = texture.shape[1], texture.shape[2], texture.shape[0]
     scale, one, zero = np.float32(1 / 255.0), np.float32(1.0), np.float32(0.0)
@@ -50,8 +52,8 @@ def _weigh(codes: Any, texture: Any, index: Any, wish: Any) -> None:
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = _corner(codes[p, n, 0], width)
-            i, a = _corner(codes[p, n, 1], height)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
             index[n, p] = i * width + j
             wish[n, p, 0], wish[n, p, 1] = a, b
             layer[m], before[m] = n, through
@@ -59,7 +61,7 @@ def _weigh(codes: Any, texture: Any, index: Any, wish: Any) -> None:
                 c[m, q] = _tap(texture, n, i, j, q, a, b) * scale
             through *= one - c[m, 3]
             m += 1
-            if through < OPAQUE:
+            if through < min_light:
                 break
         s0, s1, s2 = zero, zero, zero
         for q in range(m - 1, -1, -1):

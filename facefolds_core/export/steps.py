@@ -116,7 +116,7 @@ def bake(
     baked = FrameStore(path)
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
-        weights = texel_weights(rays, baked, len(cameras), params.hold_frames)
+        weights = texel_weights(rays, baked, len(cameras), params)
         write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
         baked.path.unlink()
     return len(rays)
@@ -135,7 +135,7 @@ def _fit(
     sheets = grid_sheets(grids, None).sheets
     _check_match(meshes, sheets, textures, samples)
     rays = gather_rays(cameras, meshes, sheets)
-    baker = Baker(meshes, sheets, rays, textures.height, params.damping)
+    baker = Baker(meshes, sheets, rays, textures.height, params)
     shape = (textures.height, textures.width, 4)
     write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
     return rays.shipped

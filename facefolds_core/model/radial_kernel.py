@@ -9,6 +9,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from facefolds_core.hit_codes import SCALE
 from facefolds_core.jit import inlined, kernel
 
 Array = NDArray[Any]
@@ -194,7 +195,7 @@ def texture_positions(
     distance: Array,  # (R, N) float32, 0 where missed
     window: Array,  # (4,)
 ) -> Array:
-    """(R, N, 2) uint16: s and t of the crossings over the window as 1 + 65534 s, 1 + 65534 t; 0 where missed."""
+    """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
     for ray in prange(distance.shape[0]):
         for n in range(distance.shape[1]):
@@ -206,6 +207,6 @@ def texture_positions(
             z = offsets[ray, 2] + d * directions[ray, 2]
             r = math.sqrt(x * x + y * y + z * z)
             row, column = _grid_position(x, y, z, r, window, 2, 2)
-            codes[ray, n, 0] = int(1.5 + 65534.0 * min(max(column, 0.0), 1.0))
-            codes[ray, n, 1] = int(1.5 + 65534.0 * min(max(row, 0.0), 1.0))
+            codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
+            codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
     return codes

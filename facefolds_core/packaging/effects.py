@@ -137,12 +137,9 @@ def _views(
     for index in progress(cameras, desc="view effects", unit="camera"):
         camera = scene.cameras[index]
         hits = cast_layers(camera, meshes)
-        count = hits.hit.shape[2]
-        seen = np.flatnonzero(hits.hit.any(2))
-        chosen = np.sort(rng.choice(seen, min(rays, len(seen)), replace=False))
-        part = Hits(hits.hit.reshape(1, -1, count)[:, chosen], hits.st.reshape(1, -1, count, 2)[:, chosen])
+        chosen = hits.choose(rng, rays)
         shown = {k: _photo(photos.image(index, k), chosen) for k in frames if (index, k) in photos}
-        views.append(Pixels(part, to_eye(camera).reshape(-1, 3)[chosen], shown))
+        views.append(Pixels(hits.at(chosen), to_eye(camera).reshape(-1, 3)[chosen], shown))
     return views
 
 

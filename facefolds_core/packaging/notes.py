@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from facefolds_core.facts import Fact, fact
 from facefolds_core.params import VideoCodec
 
 
-def codec_warning(reached: float | None, video: VideoCodec, noticed: float) -> str | None:
-    """A line where `target_psnr` was not reached, with what to do.
+def codec_warning(reached: float | None, video: VideoCodec, noticed: float) -> Fact | None:
+    """A fact where `target_psnr` was not reached, with what to do.
 
     Args:
         reached: dB to what went in, None if unknown.
@@ -15,7 +16,4 @@ def codec_warning(reached: float | None, video: VideoCodec, noticed: float) -> s
     target = video.target_psnr
     if reached is None or target is None or video.lossless or reached > target - noticed:
         return None
-    return (
-        f"warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: finer "
-        "quantisation gives no more; finer textures (texture.resolution) or fewer specks in them do (look at fit.png)"
-    )
+    return fact("codec_misses", reached=reached, target=target)

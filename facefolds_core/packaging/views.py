@@ -60,18 +60,16 @@ class ViewMeter:
         hits = []
         for camera in self._cameras:
             cast = cast_layers(camera, meshes)
-            seen = np.flatnonzero(cast.hit.any(2))
-            chosen = np.sort(rng.choice(seen, min(params.rays_per_camera, len(seen)), replace=False))
-            self._pixels.append(chosen)
-            hits.append(_subset(cast, chosen))
-        self._hits = _joined(hits)
+            self._pixels.append(cast.choose(rng, params.rays_per_camera))
+            hits.append(cast.at(self._pixels[-1]))
+        self._hits = Hits.joined(hits)
         self.frames = sorted(references)
         self._reference = {frame: composite(self._hits, references[frame]) for frame in self.frames}
 
     def hits(self, meshes: Sequence[TexturedMesh]) -> Hits:
         """Where the meter's rays hit other meshes."""
         parts = zip(self._cameras, self._pixels, strict=True)
-        return _joined([_subset(cast_layers(camera, meshes), pixels) for camera, pixels in parts])
+        return Hits.joined([cast_layers(camera, meshes).at(pixels) for camera, pixels in parts])
 
     def psnr(self, textures: Iterable[tuple[int, Sequence[Texture]]], hits: Hits | None = None) -> float:
         """dB over all rays and the meter's frames, each ray weighted with the reference's opacity; black background.
@@ -91,13 +89,3 @@ class ViewMeter:
         if weight == 0 or error == 0:
             return MAX_PSNR
         return min(MAX_PSNR, -10 * float(np.log10(error / weight)))
-
-
-def _subset(hits: Hits, pixels: NDArray[np.intp]) -> Hits:
-    """(1, M, N) of (H, W, N)."""
-    count = hits.hit.shape[2]
-    return Hits(hits.hit.reshape(-1, count)[None, pixels], hits.st.reshape(-1, count, 2)[None, pixels])
-
-
-def _joined(parts: Sequence[Hits]) -> Hits:
-    return Hits(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))

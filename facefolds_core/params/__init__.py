@@ -18,7 +18,7 @@ from facefolds_core.params.compress import (
     VideoCodec,
     ViewEffectParams,
 )
-from facefolds_core.params.evaluate import EvaluateParams
+from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
     BackgroundParams,
     DivergenceParams,
@@ -50,6 +50,7 @@ from facefolds_core.params.volume import (
     SubjectParams,
     VolumeLevel,
     VolumeParams,
+    WallParams,
     WarningParams,
 )
 
@@ -93,6 +94,7 @@ __all__ = [
     "ReflectionParams",
     "RoomParams",
     "SampleParams",
+    "ScoreWarningParams",
     "Section",
     "StartParams",
     "Subject",
@@ -104,6 +106,7 @@ __all__ = [
     "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
+    "WallParams",
     "WarningParams",
     "merged",
     "nested",

@@ -30,6 +30,12 @@ class CaptureParams(Section):
     seed: Seed = 0
     """Of the procedural skin, freckles and hair."""
 
+    plates: bool = False
+    """Film the empty room, too: a clean plate a camera. Off, so that results stay what they were."""
+
+    mattes: bool = False
+    """Offer the true opacity of all cameras to the training. Off: it serves scoring only, as in a real capture."""
+
 
 class NormalizeParams(Section):
     """From a capture to a scene: cameras, images and tracked mesh in the one convention."""

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.volume import (
@@ -26,12 +26,22 @@ class GridTextureParams(Section):
     """Of the finest textures, seen head on from the median camera. One pixel a texel measured 0.2 to 0.4 dB worse on
     cameras left out: some thirty cameras do not determine so many texels of twelve layers."""
 
+    radius_quantile: Share = 0.9
+    """`pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest, where
+    texels are largest."""
+
     rays_per_texel: Factor = 2.5
     """Of one frame, in one step: each texel is met, few rays twice."""
 
     learning_rate: Rate = 0.02
-    """Of the colours shared by layers and frames; it falls to a tenth along the last level. The other rates are factors
-    on it."""
+    """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
+
+    final_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """To this part of itself every rate falls along the last level: the noise of single steps settles."""
+
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps. The second is lower than the usual 0.999: a
+    level has some hundred steps, and a texel is met in few of them."""
 
     layer_rate: Rate = 0.3
     """Learning rate of the layers' own colours, against `learning_rate`: they are small changes."""
@@ -54,6 +64,9 @@ class GridTextureParams(Section):
     smooth_every: Count = 3
     """Steps between smoothings of opacity over neighbouring texels, at half and full resolution: left alone, opacity
     becomes grain that shows each camera its own picture."""
+
+    min_light: Share = 0.002
+    """Layers behind less transmittance are skipped: speed, half a code of a pixel."""
 
     min_alpha: Share = 0.002
     """Layers with less alpha are skipped once the textures are at half resolution: speed, half a code of a pixel."""
@@ -109,8 +122,14 @@ class DivergenceParams(Section):
     error_ratio: Annotated[float, Field(gt=1, le=1e6)] = 9.0
     """A mean squared error this many times the best of its level is a divergence: about 10 dB."""
 
+    smoothing: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """Share of the newest step in the running mean of the error: some ten steps, each on rays of one frame, count."""
+
     attempts: Annotated[int, Field(ge=1, le=100)] = 4
-    """Each at a third of the learning rate before; then training ends with a message."""
+    """Each at a lower learning rate; then training ends with a message."""
+
+    slow_down: Annotated[float, Field(gt=1, le=1000)] = 3.0
+    """The learning rate is divided by this before a level is begun again: four attempts span a factor of 27."""
 
 
 class ExplicitParams(Section):

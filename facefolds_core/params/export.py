@@ -142,3 +142,6 @@ class BakeParams(Section):
 
     damping: Annotated[float, Field(gt=0, le=1e6)] = 0.05
     """Added to a texel's sum of weights in each step: what is hardly seen hardly moves."""
+
+    min_light: Share = 0.001
+    """Layers behind less transmittance are left out of the fit, ray by ray: speed, a quarter of a code of a pixel."""

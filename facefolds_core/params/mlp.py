@@ -22,6 +22,12 @@ class MlpStartParams(Section):
     points: Annotated[int, Field(ge=8, le=10_000_000)] = 4096
     """Of each of its steps."""
 
+    learning_rate: Rate = 5e-3
+    """Adam's, of that regression: a shape is to be found in a few hundred steps."""
+
+    final_learning_rate: Rate = 1e-4
+    """To which it falls along a cosine."""
+
     margin: Annotated[float, Field(gt=0, le=10)] = 0.05
     """The search ball reaches this far beyond the outermost level's farthest point, units."""
 

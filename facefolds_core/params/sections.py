@@ -97,7 +97,7 @@ def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[
     holder = kind
     for name in folders:
         holder = _inner(holder, name) or holder
-    keys = ", ".join(sorted(holder.model_fields))
+    keys = ", ".join(sorted(field.alias or name for name, field in holder.model_fields.items()))
     model = kind.model_fields["model"].default if "model" in kind.model_fields else None
     owner = f" of the model `{model}`" if model else ""
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"

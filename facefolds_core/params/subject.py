@@ -19,7 +19,7 @@ Raw = dict[str, Any]
 
 
 class HoldoutEvery(Section):
-    """Hold out every n-th camera of those that remain after culling, in the order of the capture."""
+    """Every n-th camera, in the order of the capture: of those that remain after culling, or of those not held out."""
 
     every: Annotated[int, Field(ge=2, le=100_000)]
     """Counted from 1."""
@@ -88,7 +88,11 @@ class Subject(Overrides):
     """A range of positions, or a list of frame names; null takes all."""
 
     holdout: Many[str] | HoldoutEvery = HoldoutEvery(every=12)
-    """Camera names, or {every: n}: cameras for scoring only."""
+    """Camera names, or {every: n}: cameras for scoring only. Nothing is chosen by them."""
+
+    validation: Annotated[Many[str] | HoldoutEvery | None, Field(alias="validate")] = None
+    """Camera names, or {every: n} of the cameras that are not held out: set aside from training and scored apart, while
+    something is to be chosen (sweeps, `recommend`). null trains on all."""
 
     front: str | None = None
     """For captures without a tracked mesh, the name of a camera that faces the subject upright."""

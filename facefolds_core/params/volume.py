@@ -6,7 +6,19 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from facefolds_core.params.base import Count, Factor, Length, Many, Pixels, Rate, Section, Share, Weight
+from facefolds_core.params.base import (
+    Betas,
+    Count,
+    Factor,
+    Length,
+    Many,
+    Natural,
+    Pixels,
+    Rate,
+    Section,
+    Share,
+    Weight,
+)
 
 
 class VolumeLevel(Section):
@@ -56,6 +68,13 @@ class VolumeParams(Section):
     colour_learning_rate: Rate = 0.03
     """Of colours, Adam's."""
 
+    final_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """To this part of themselves both rates fall along the last level."""
+
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps. The second is lower than the usual 0.999:
+    there are 240 steps."""
+
     rays: Count = 16384
     """In one step."""
 
@@ -79,7 +98,7 @@ class VolumeParams(Section):
     """Blocks whose voxels all have a smaller optical depth a voxel are skipped: speed."""
 
     body_depth: Weight = 0.1
-    """Optical depth of a voxel from which on it belongs to a body; see `train.subject`."""
+    """Optical depth of a voxel from which on it belongs to a body, before a far sphere; else `train.subject`'s."""
 
     @model_validator(mode="after")
     def _shared_is_more(self) -> Self:
@@ -92,11 +111,10 @@ class RoomParams(Section):
     """The outer zone: density and colour of all space beyond the ball of `volume.reach`, contracted towards infinity. A
     near wall has parallax; without a place of its own it becomes fog around the head. Rates are the volume's."""
 
-    needed_below: Annotated[float, Field(ge=0, le=100)] = 0.0
-    """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. With 28 two of
-    three captures before near walls gain much, and the third loses parts of its head: try it, and look at the pictures
-    (docs/research/2026-11-22-rooms.md). Before a plain wall it explains nothing better, and takes up hair and
-    highlights of the subject."""
+    needed_below: Annotated[float, Field(ge=0, le=100)] = 28.0
+    """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. Before plain
+    walls it has 30 to 33 and an outer zone explains nothing better, but takes up hair and highlights of the subject;
+    before near, bright or patterned ones it has 20 to 26 (docs/research/2026-11-22-rooms.md)."""
 
     seen_rays: Factor = 1.0
     """Colours of voxels that fewer rays have reached are those of their neighbours: behind the head there would be
@@ -114,40 +132,64 @@ class RoomParams(Section):
     smoothness_weight: Weight = 0.001
     """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
 
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
+
+
+class WallParams(Section):
+    """Walls, floors and tables that the subject touches: planes with nothing behind them. Looked for only where there
+    is an outer zone."""
+
+    most: Annotated[int, Field(ge=0, le=8)] = 3
+    """As many are looked for; 0 looks for none."""
+
+    tolerance: Factor = 1.5
+    """Points within so many voxels lie on a plane: a surface is three voxels thick in the volume."""
+
+    spread: Length = 0.12
+    """Standard deviation of a wall's points along it, the smaller of the two, units: the flattest parts of heads have
+    0.1."""
+
+    behind: Share = 0.05
+    """Of all visible points that may lie behind a wall. Planes through heads have 6 % and more behind them."""
+
+    margin: Length = 0.05
+    """What stands out from a wall by less belongs to it, units: panelling, a shield that a trophy is mounted on."""
+
+    points: Count = 4000
+    """In the sample among which planes are looked for; with fewer there are none."""
+
+    trials: Count = 1000
+    """Planes through three random points that are tried (RANSAC): one of them lies on a wall that a fifth of the points
+    belongs to, but for one time in three thousand."""
+
+    seed: Natural = 0
+    """Of the trials."""
+
 
 class SubjectParams(Section):
-    """Which part of the volume is the subject: the body at the cameras' common centre, without the room it touches."""
+    """Which part of the volume is the subject: the body at the cameras' common centre, without the walls it touches."""
 
     near: Length = 0.1
     """Standard deviation of the weight, over the distance from the common centre, by which bodies are compared, units:
     half a head."""
 
-    core: Length = 0.11
-    """What lies so near to the common centre is the subject's own, units."""
-
-    rim: Length = 0.34
-    """What lies farther from the common centre, units, behind and not below, is the room's: a wall goes on, a head
-    ends. The back of a head is 0.2 away."""
-
-    front: Length = 0.13
-    """What has a larger x, units, is the subject's own, too: a room is not before the subject."""
-
-    behind: Length = 0.09
-    """Points with a smaller x, units, are behind: the common centre may lie a little behind a face."""
+    body_depth: Weight = 0.03
+    """Optical depth of a voxel from which on it belongs to a body, where there is an outer zone: smooth pale surfaces
+    are faint (of a plaster head 0.1 loses chin and cheeks), and the room no longer stands around the subject as fog."""
 
     below: Share = 0.35
-    """Directions that fall by more (the sine) are below: there a subject goes on, too."""
+    """Directions that fall by more (the sine) are below: there a subject goes on beyond the ball."""
 
     larger: Annotated[Many[Length], Field(max_length=8)] = (0.65,)
     """Radii of the ball that are tried one after the other where the subject is cut off by `volume.reach`; only
     where there is an outer zone."""
 
     max_cut: Share = 0.005
-    """Share of the subject's voxels at the edge of the ball, neither behind nor below, above which it is cut off."""
+    """Share of the subject's voxels at the edge of the ball, not below, above which it is cut off."""
 
-    room_speed: Annotated[int, Field(ge=1, le=16)] = 2
-    """The room grows by so many voxels while the subject grows by one, until they have shared the body out: a wall is
-    larger than what hangs on it."""
+    walls: WallParams = WallParams()
+    """What it stands on or hangs at."""
 
 
 class EnvironmentParams(Section):
@@ -161,6 +203,9 @@ class EnvironmentParams(Section):
 
     learning_rate: Rate = 0.02
     """Of its colours, Adam's."""
+
+    betas: Betas = (0.9, 0.99)
+    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
 
 
 class WarningParams(Section):

@@ -53,12 +53,27 @@ class Hits:
     """Nearest hit of each pixel's ray with each of N layers, outermost first. It serves all frames: meshes stand still.
 
     Attributes:
-        hit: (H, W, N) bool.
+        hit: (H, W, N) bool; of chosen rays (1, M, N).
         st: (H, W, N, 2) float32 texture coordinates; 0 where nothing is hit.
     """
 
     hit: NDArray[np.bool_]
     st: NDArray[np.float32]
+
+    def choose(self, rng: np.random.Generator, most: int) -> NDArray[np.intp]:
+        """Numbers, rising, of at most so many pixels whose rays hit anything."""
+        seen = np.flatnonzero(self.hit.any(2))
+        return np.sort(rng.choice(seen, min(most, len(seen)), replace=False))
+
+    def at(self, pixels: NDArray[np.intp]) -> Hits:
+        """(1, M, N): of these pixels, by number."""
+        count = self.hit.shape[2]
+        return Hits(self.hit.reshape(-1, count)[None, pixels], self.st.reshape(-1, count, 2)[None, pixels])
+
+    @classmethod
+    def joined(cls, parts: Sequence[Hits]) -> Hits:
+        """(1, M, N) of all parts (1, ..., N), one after the other."""
+        return cls(np.concatenate([part.hit for part in parts], 1), np.concatenate([part.st for part in parts], 1))
 
 
 class AssetCaster:

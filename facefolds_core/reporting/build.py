@@ -116,6 +116,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
         "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
         "camera_map": camera_map(scene) if scene else None,
+        "validating": scene is not None and "validate" in scene.splits,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
         "angles": tables.angles(seen) if seen else [],
         "views": record.on_sheet if record else 0,
@@ -123,10 +124,7 @@ def context(subject: Subject) -> dict[str, Any]:
         **layers(subject),
         "textures": textures(subject.asset),
         "curves": curves(facts),
-        "fit_notes": [
-            *(facts.fit or {}).get("reasons", []),
-            *(worded(event) for event in (facts.fit or {}).get("events", [])),
-        ],
+        "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "waterfall": tables.waterfall(facts.waterfall),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
@@ -204,7 +202,7 @@ def error_stops() -> str:
 def camera_map(scene: Scene) -> Markup:
     return charts.camera_map(
         [
-            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split == "holdout")
+            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split)
             for camera, split in zip(scene.cameras, scene.splits, strict=True)
         ]
     )

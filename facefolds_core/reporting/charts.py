@@ -77,7 +77,11 @@ class Dot:
     azimuth: float
     elevation: float
     name: str
-    held_out: bool
+    split: str
+
+
+KINDS = {"train": "for training", "validate": "for validation", "holdout": "held out"}
+"""Split -> in words."""
 
 
 def camera_map(dots: Sequence[Dot]) -> Markup:
@@ -87,15 +91,16 @@ def camera_map(dots: Sequence[Dot]) -> Markup:
     middle, half = (min(heights) + max(heights)) / 2, max(10.0, (max(heights) - min(heights)) / 2 * 1.25)
     frame = Frame((-across, across), (middle - half, middle + half))
     marks = []
-    for dot in sorted(dots, key=lambda one: one.held_out):
+    for dot in sorted(dots, key=lambda one: list(KINDS).index(one.split)):
         x, y = frame.at((dot.azimuth, dot.elevation))
-        kind = "held" if dot.held_out else "train"
-        words = f"{dot.name}, {'held out' if dot.held_out else 'for training'}"
-        radius = 6 if dot.held_out else 4
+        held = dot.split == "holdout"
+        kind = "held" if held else dot.split
+        words = f"{dot.name}, {KINDS[dot.split]}"
+        radius = 6 if held else 4
         marks.append(
             f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius}"><title>{escape(words)}</title></circle>'
         )
-        if dot.held_out:
+        if held:
             label = f'<text class="name" x="{x:.1f}" y="{y - 10:.1f}" text-anchor="middle">{escape(dot.name)}</text>'
             marks.append(label)
     return _svg("Where the cameras stand", _axes(frame, "azimuth"), "".join(marks))

@@ -122,7 +122,7 @@ def read_facts(folders: SubjectFolders) -> Facts:
                 "garbled file", file=folders.metrics, place=part, expected="a JSON object", found=metrics.get(part),
                 remedy=REMEDY,
             )  # fmt: skip
-    waterfall = read_mapping(folders.root / "waterfall" / "waterfall.json") or {}
+    waterfall = read_mapping(folders.waterfall) or {}
     return Facts(
         metrics=metrics,
         images=read_images(folders.evaluation / "per_image.parquet"),

@@ -86,10 +86,11 @@ def capture_words(scene: Scene) -> str:
     frames = plural(scene.num_frames, "frame")
     if scene.num_frames > 1 and scene.fps > 0:
         frames += f" ({number(scene.num_frames / scene.fps, 1)} s at {number(scene.fps, 0)} a second)"
-    train, held = len(scene.indices("train")), len(scene.indices("holdout"))
+    train, checked, held = (len(scene.indices(split)) for split in ("train", "validate", "holdout"))
+    aside = f"{count(checked)} set aside for choices, " if checked else ""
     return (
-        f"The capture: {frames} of {plural(train + held, 'camera')}, {scene.width} × {scene.height} pixels; "
-        f"{count(train)} of them trained the model, {count(held)} {'was' if held == 1 else 'were'} held out."
+        f"The capture: {frames} of {plural(len(scene.cameras), 'camera')}, {scene.width} × {scene.height} pixels; "
+        f"{count(train)} of them trained the model, {aside}{count(held)} {'was' if held == 1 else 'were'} held out."
     )
 
 

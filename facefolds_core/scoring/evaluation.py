@@ -1,4 +1,4 @@
-"""Score the shipped asset, and the model it came from, on the held-out cameras (docs/reference/metrics.md).
+"""Score the shipped asset, and the model it came from, on cameras that did not train (docs/reference/metrics.md).
 
 An asset at a multiple of the capture's frame rate is scored on the frames that have photos.
 
@@ -7,15 +7,14 @@ One camera at a time, one frame at a time: memory is bounded by one camera's cro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
@@ -24,17 +23,17 @@ from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
-from facefolds_core.scoring.analysis import Sums
-from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
+from facefolds_core.scoring.analysis import Sums as SeenSums
+from facefolds_core.scoring.images import Rendering, region_of, score_renderings
+from facefolds_core.scoring.metrics import Array, shown
 from facefolds_core.scoring.model_view import ModelView
-from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, WITH_EFFECTS, ImageScore, Panel
-from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
+from facefolds_core.scoring.panels import WITH_EFFECTS, ImageScore, Panel
+from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.record import Seen
+from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
+from facefolds_core.scoring.truths import MatteKind, Truths
 
-MASK_EDGE = 0.1
-"""The subject is where its opacity exceeds this: for the box of the perceptual metrics, and to tell an empty mask."""
-MASK_MARGIN = 8
-"""Pixels added to that box on each side, within the frame."""
+SCORED: tuple[Split, ...] = ("holdout", "validate")
 
 
 @dataclass(frozen=True)
@@ -42,128 +41,130 @@ class Evaluation:
     """What was found.
 
     Attributes:
-        scores: all of them.
-        panels: of the contact sheet.
-        worst: the picture on which the asset's PSNR is lowest (of the subject, where that is known).
+        scores: all of them, held-out cameras first.
+        panels: of the contact sheet, held-out cameras alone.
+        worst: the held-out picture on which the asset's PSNR is lowest (of the subject, where that is known).
         seen: what the asset's layers do in the pictures of the contact sheet.
+        matte: which opacity says where the subject is.
+        changes: split -> variant -> what it shows of what changes from frame to frame.
     """
 
     scores: list[ImageScore]
     panels: list[Panel]
     worst: Panel
     seen: Seen
+    matte: MatteKind = "true"
+    changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """A scored picture: textures of the asset, renderings and pictures by variant, and where the subject is."""
+
+    panel: Panel
+    scores: list[ImageScore]
+    textures: Sequence[NDArray[np.uint8]]
+    pictures: dict[str, Array]
 
 
 def evaluate(
     scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, perceptual: Perceptual
 ) -> Evaluation:
-    """Render and score every frame of every held-out camera; shows a progress bar.
+    """Render and score every frame of every camera that did not train; shows a progress bar.
 
     Raises:
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
-    held_out = scene.indices("holdout")
-    _check(scene, model, held_out)
-    step = frame_rate_factor(scene, asset)
-    truths, masks = scene.open_frames(), scene.open_masks()
-    on_sheet = spread(scene.num_frames, params.sheet_frames)
-    caster = AssetCaster(asset)
-    scores: list[ImageScore] = []
-    panels: list[Panel] = []
+    _check(scene, model, scene.indices("holdout"))
+    scorer = _Scorer(scene, model, asset, params, perceptual)
+    on_sheet = set(spread(scene.num_frames, params.sheet_frames))
+    found, panels, seen = [], [], SeenSums(asset.layers)
     worst: Panel | None = None
-    sums = Sums(asset.layers)
-    count = sum(camera in held_out for camera, _ in truths)
-    with progress(total=count, desc="evaluate", unit="image") as bar:
-        for index in held_out:
-            camera = scene.cameras[index]
-            frames = [k for k in range(scene.num_frames) if (index, k) in truths]
-            hits = caster.cast(camera)
-            for k, textures, images in _rendered(model, asset, hits, camera, frames, params.background, step):
-                frame = scene.frame_ids[k]
-                _check_finite(images, camera.name, frame)
-                pictures = {variant: shown(image) for variant, image in images.items()}
-                truth = truths.image(index, k) / 255.0
-                has_mask = masks is not None and (index, k) in masks
-                mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None
-                found = score_images(pictures, truth, mask, perceptual)
-                group = {v: ImageScore(camera.name, frame, v, values) for v, values in found.items()}
-                scores += group.values()
-                shot = (truth, pictures["model"], pictures["asset"])
-                panel = Panel(camera.name, frame, *shot, group["model"], group["asset"], mask)
-                worst = panel if worst is None else min(worst, panel, key=lambda one: one.rank)
-                if k in on_sheet:
-                    panels.append(panel)
-                    sums.add_picture(camera, hits, textures, pictures["asset"] - truth, mask)
+    films: dict[Split, list[dict[str, Sums]]] = {}
+    with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
+        for split, index in [(one, index) for one in SCORED for index in scene.indices(one)]:
+            camera, film = scene.cameras[index], Film()
+            hits = scorer.caster.cast(camera)
+            for k, shot in scorer.shots(split, index, hits):
+                found += shot.scores
+                if shot.panel.mask is not None:
+                    film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
+                if split == "holdout":
+                    worst = shot.panel if worst is None else min(worst, shot.panel, key=lambda one: one.rank)
+                    if k in on_sheet:
+                        panels.append(shot.panel)
+                        known = None if scorer.kind == "found" else shot.panel.mask
+                        seen.add_picture(camera, hits, shot.textures, shot.panel.asset - shot.panel.truth, known)
                 bar.update()
+            films.setdefault(split, []).append(film.sums())
     if worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
             file=scene.folder / "frames.arrow",
             remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
         )
-    return Evaluation(scores, panels, worst, sums.result())
+    changes = {split: _changes(each) for split, each in films.items()}
+    return Evaluation(found, panels, worst, seen.result(), scorer.kind, changes)
 
 
-def score_images(
-    images: dict[str, Array], truth: Array, mask: Array | None, perceptual: Perceptual
-) -> dict[str, dict[str, float | None]]:
-    """All metrics of several renderings of one view.
+def _changes(films: Sequence[dict[str, Sums]]) -> dict[str, Change]:
+    """By variant, over all cameras."""
+    variants = dict.fromkeys(variant for film in films for variant in film)
+    return {variant: change_of(film[variant] for film in films if variant in film) for variant in variants}
 
-    Args:
-        images: name -> (H, W, 3) in [0, 1].
-        truth: (H, W, 3).
-        mask: (H, W) opacity of the subject, or None.
+
+class _Scorer:
+    """Renders and scores the frames of a camera.
+
+    Attributes:
+        keys: (camera, frame) of all photos that are scored.
+        kind: which opacity says where the subject is in them.
     """
-    pictures = list(images.values())
-    frame = {"lpips": _distances(perceptual.lpips, pictures, truth)}
-    frame["st_lpips"] = _distances(perceptual.st_lpips, pictures, truth)
-    box = None if mask is None else subject_box(mask)
-    if mask is not None and box is not None:
-        cut = [(image * mask[..., None])[box] for image in [truth, *pictures]]
-        frame["lpips_subject"] = _distances(perceptual.lpips, cut[1:], cut[0])
-        frame["st_lpips_subject"] = _distances(perceptual.st_lpips, cut[1:], cut[0])
-    result: dict[str, dict[str, float | None]] = {}
-    for i, (name, image) in enumerate(images.items()):
-        values: dict[str, float | None] = dict.fromkeys((*METRICS, *SUBJECT_METRICS))
-        values |= {key: per_image[i] for key, per_image in frame.items()}
-        values |= {"psnr": psnr(image, truth), "ssim": ssim(image, truth)}
-        if box is not None:
-            values |= {"psnr_subject": psnr(image, truth, mask), "ssim_subject": ssim(image, truth, mask)}
-        result[name] = values
-    return result
+
+    def __init__(
+        self, scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, perceptual: Perceptual
+    ) -> None:
+        self._scene, self._model, self._asset = scene, model, asset
+        self._params, self._perceptual = params, perceptual
+        self._step = frame_rate_factor(scene, asset)
+        self._truths = Truths(scene)
+        self.caster = AssetCaster(asset)
+        cameras = [index for split in SCORED for index in scene.indices(split)]
+        self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
+        self.kind = self._truths.matte_kind(self.keys)
+
+    def shots(self, split: Split, index: int, hits: Hits) -> Iterator[tuple[int, _Shot]]:
+        """All frames of a camera that have a photo."""
+        camera, params = self._scene.cameras[index], self._params
+        frames = [k for c, k in self.keys if c == index]
+        for k, textures, renderings in rendered(self._model, self._asset, hits, camera, frames, self._step):
+            frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
+            _check_finite(renderings, camera.name, frame)
+            values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
+            group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
+            pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
+            region = region_of(self.kind, truth, renderings)
+            both = pictures["model"], pictures["asset"], group["model"], group["asset"]
+            panel = Panel(camera.name, frame, truth.picture, *both, region)
+            yield k, _Shot(panel, list(group.values()), textures, pictures)
 
 
-def subject_box(mask: Array) -> tuple[slice, slice] | None:
-    """Rows and columns of the subject with a margin; None where the mask is empty."""
-    rows, columns = np.nonzero(mask > MASK_EDGE)
-    if not len(rows):
-        return None
-    return (
-        slice(max(0, rows.min() - MASK_MARGIN), rows.max() + 1 + MASK_MARGIN),
-        slice(max(0, columns.min() - MASK_MARGIN), columns.max() + 1 + MASK_MARGIN),
-    )
-
-
-def _rendered(
-    model: RadianceManifolds,
-    asset: Asset,
-    hits: Hits,
-    camera: Camera,
-    frames: list[int],
-    background: tuple[float, float, float],
-    step: int,
-) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, NDArray[np.float32]]]]:
-    """The asset's textures, and the variants' images (H, W, 3) over `background`, of each of the scene's `frames`."""
+def rendered(
+    model: RadianceManifolds, asset: Asset, hits: Hits, camera: Camera, frames: list[int], step: int
+) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, Rendering]]]:
+    """The asset's textures, and the variants' renderings, of each of the scene's `frames`."""
     view = ModelView(model, camera)
     maps = asset.effects()
     added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
         with_view, without_view, alpha = view.render(float(k))
-        behind = (1 - alpha)[..., None] * np.asarray(background, np.float32)
-        picture, _ = composite(hits, textures, background)
-        images = {"model": with_view + behind, "diffuse": without_view + behind, "asset": picture}
+        images = {
+            "model": Rendering(with_view, alpha),
+            "diffuse": Rendering(without_view, alpha),
+            "asset": Rendering(*composite(hits, textures)),
+        }
         if added is not None:
-            images[WITH_EFFECTS], _ = composite(hits, textures, background, added)
+            images[WITH_EFFECTS] = Rendering(*composite(hits, textures, added=added))
         yield k, textures, images
 
 
@@ -196,14 +197,6 @@ def _wrong_frames(what: str, expected: str, found: Asset | RadianceManifolds, sc
     )
 
 
-def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:
-    if metric is None:
-        return [None] * len(images)
-    device = metric.shift.device
-    stack = torch.tensor(np.stack([truth, *images]), dtype=torch.float32, device=device).permute(0, 3, 1, 2)
-    return [float(d) for d in metric(stack[1:], stack[0])]
-
-
 def _check(scene: Scene, model: RadianceManifolds, held_out: list[int]) -> None:
     if not held_out:
         raise UserError(
@@ -217,13 +210,13 @@ def _check(scene: Scene, model: RadianceManifolds, held_out: list[int]) -> None:
         raise _wrong_frames("model", f"{scene.num_frames} frames, as in the scene", model, scene)
 
 
-def _check_finite(images: dict[str, NDArray[np.float32]], camera: str, frame: str) -> None:
+def _check_finite(images: Mapping[str, Rendering], camera: str, frame: str) -> None:
     for variant, image in images.items():
-        if not np.isfinite(image).all():
+        if not (np.isfinite(image.rgb).all() and np.isfinite(image.alpha).all()):
             raise UserError(
                 f"the rendering of the {variant} has numbers that are not finite",
                 place=f"camera {camera}, frame {frame}",
                 expected="colours in [0, 1]",
-                found=f"{int((~np.isfinite(image)).any(-1).sum())} pixels with NaN or infinity",
+                found=f"{int((~np.isfinite(image.rgb)).any(-1).sum())} pixels with NaN or infinity",
                 remedy="the model is damaged: train again with a smaller learning rate or another seed",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from facefolds_core.captures.scene import Split
 from facefolds_core.scoring.metrics import Array
 
 VARIANTS = ("model", "diffuse", "asset")
@@ -11,6 +12,17 @@ WITH_EFFECTS = "asset_view"
 """A further variant, where the asset has view effects: the asset with them."""
 METRICS = ("psnr", "ssim", "lpips", "st_lpips")
 SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
+FOUND_METRICS = tuple(f"{name}_found" for name in METRICS)
+"""Within an opacity that is not the true one, where there is no true one."""
+PLATE_METRICS = ("psnr_over_plate", "ssim_over_plate")
+REGION_METRICS = ("psnr_interior", "psnr_band", "psnr_band_over_plate")
+MATTE_METRICS = ("matte_sad", "matte_mse", "matte_gradient", "matte_iou")
+ALL_METRICS = (*METRICS, *SUBJECT_METRICS, *FOUND_METRICS, *PLATE_METRICS, *REGION_METRICS, *MATTE_METRICS)
+"""Of each picture; docs/reference/metrics.md defines them."""
+FILM_METRICS = ("temporal", "flicker")
+"""Of each variant, over all frames of its cameras."""
+HEADLINES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
+"""The first that is there says most of the asset."""
 
 
 @dataclass(frozen=True)
@@ -20,20 +32,27 @@ class ImageScore:
     Attributes:
         camera, frame: their names in the capture.
         variant: one of VARIANTS, or WITH_EFFECTS.
-        values: METRICS and SUBJECT_METRICS; None where a value cannot be had.
+        values: ALL_METRICS; None where a value cannot be had.
+        split: of the camera.
     """
 
     camera: str
     frame: str
     variant: str
     values: dict[str, float | None]
+    split: Split = "holdout"
+
+    @property
+    def headline(self) -> str:
+        """The metric that says most of this picture."""
+        return next((name for name in HEADLINES if self.values.get(name) is not None), HEADLINES[-1])
 
 
 @dataclass(frozen=True)
 class Panel:
     """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores.
 
-    `mask` is the subject's opacity (H, W), or None where the capture has none.
+    `mask` is the subject's opacity (H, W), or None where neither capture nor scene has one.
     """
 
     camera: str
@@ -47,6 +66,7 @@ class Panel:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """Least for the worst picture of the asset: by the subject's PSNR, and pictures without a subject last."""
-        frame, subject = self.asset_score.values["psnr"], self.asset_score.values["psnr_subject"]
-        return (subject is None, subject if subject is not None else frame or 0.0)
+        """Least for the worst picture of the asset: by PSNR within the subject, and pictures without one last."""
+        values = self.asset_score.values
+        within = next((v for name in ("psnr_subject", "psnr_found") if (v := values.get(name)) is not None), None)
+        return (within is None, within if within is not None else values["psnr"] or 0.0)

@@ -2,8 +2,8 @@
 
 - LPIPS (Zhang et al. 2018, version 0.1, AlexNet): trunk weights from torch hub's cache, where torchvision puts them;
   linear weights from the package torchmetrics. Without the trunk's file there is no LPIPS.
-- ST-LPIPS (Ghildyal and Liu 2022, shift-tolerant AlexNet): all weights from the package stlpips-pytorch. It is another
-  metric with other values, and is never reported as LPIPS.
+- ST-LPIPS (Ghildyal and Liu 2022, shift-tolerant AlexNet): all weights from the package stlpips-pytorch, an extra: it
+  says BSD, but files in it say CC BY-NC-SA 4.0. It is another metric with other values, and is never reported as LPIPS.
 
 No package is imported for its weights (both would import torchvision); nothing is downloaded.
 """
@@ -140,9 +140,15 @@ def find_perceptual(device: torch.device | str = "cpu") -> Perceptual:
     lpips, st_lpips = load_lpips(), load_st_lpips()
     missing = []
     if lpips is None:
-        missing.append(f"no LPIPS: AlexNet's weights, {TRUNK_NAME}, are not in {_hub_folder()} (or are damaged)")
+        missing.append(
+            f"LPIPS was not measured: AlexNet's weights, {TRUNK_NAME}, are not in {_hub_folder()} (or are damaged); "
+            "where torchvision is installed, torchvision.models.alexnet(weights='DEFAULT') puts them there"
+        )
     if st_lpips is None:
-        missing.append("no ST-LPIPS: the package stlpips-pytorch is not installed")
+        missing.append(
+            "ST-LPIPS was not measured: pip install 'facefolds[perceptual]' (parts of that package are CC BY-NC-SA: "
+            "not for commercial use)"
+        )
     return Perceptual(
         None if lpips is None else lpips.to(device), None if st_lpips is None else st_lpips.to(device), tuple(missing)
     )

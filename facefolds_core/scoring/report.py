@@ -1,8 +1,9 @@
-"""What `evaluate` writes: metrics.json and per_image.parquet (docs/reference/metrics.md); a table for the terminal."""
+"""What `evaluate` writes: metrics.json and per_image.parquet (docs/reference/metrics.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -11,10 +12,14 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from facefolds_core.asset.manifest import Manifest
+from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_file, read_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS, ImageScore
+from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, VARIANTS, WITH_EFFECTS, ImageScore
+from facefolds_core.scoring.temporal import Change
+from facefolds_core.scoring.truths import MatteKind
 
 METRICS_VERSION = 1
 EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
@@ -48,16 +53,62 @@ class Timing(BaseModel):
     seconds: Annotated[float, Field(ge=0)]
 
 
-def metrics_json(subject: str, scores: Sequence[ImageScore], cost: dict[str, Any]) -> dict[str, Any]:
-    """The content of metrics.json."""
-    images = [s for s in scores if s.variant == VARIANTS[0]]
-    return {
+@dataclass(frozen=True)
+class Circumstances:
+    """What metrics.json says beside means and costs.
+
+    Attributes:
+        matte: which opacity says where the subject is.
+        band: pixels to both sides of the outline.
+        changes: split -> variant -> what it shows of what changes from frame to frame.
+        fresh_views: means on views that were filmed for the purpose.
+        warnings: what is not well.
+    """
+
+    matte: MatteKind = "true"
+    band: float = 0.0
+    changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
+    fresh_views: Mapping[str, Any] | None = None
+    warnings: Sequence[Fact] = ()
+
+
+def metrics_json(
+    subject: str, scores: Sequence[ImageScore], cost: dict[str, Any], about: Circumstances | None = None
+) -> dict[str, Any]:
+    """The content of metrics.json: the held-out cameras first; those for validation apart, where there are any."""
+    about = Circumstances() if about is None else about
+    held, checked = (_means(scores, split, about) for split in ("holdout", "validate"))
+    content: dict[str, Any] = {
         "version": METRICS_VERSION,
         "subject": subject,
+        "headline": headline(held),
+        "matte": about.matte,
+        "band_pixels": about.band,
+        **held,
+    }
+    if checked["images"]:
+        content["validate"] = {"headline": headline(checked), **checked}
+    if about.fresh_views is not None:
+        content["fresh_views"] = about.fresh_views
+    return {**content, "warnings": [one.to_json() for one in about.warnings], "cost": cost}
+
+
+def headline(metrics: Mapping[str, Any]) -> str:
+    """The metric of the asset that says most: over the plate, of the subject, within the found matte, whole frame."""
+    values = metrics.get("asset") or {}
+    return next((name for name in HEADLINES if isinstance(values.get(name), int | float)), HEADLINES[-1])
+
+
+def _means(scores: Sequence[ImageScore], split: Split, about: Circumstances) -> dict[str, Any]:
+    own = [score for score in scores if score.split == split]
+    images = [score for score in own if score.variant == VARIANTS[0]]
+    changes = about.changes.get(split, {})
+    truth = next((change.truth_change for change in changes.values()), None)
+    return {
         "images": len(images),
-        "images_with_mask": sum(s.values["psnr_subject"] is not None for s in images),
-        **{variant: averages(scores, variant) for variant in _variants(scores)},
-        "cost": cost,
+        "images_with_mask": sum(score.values["psnr_subject"] is not None for score in images),
+        "truth_change": rounded(truth),
+        **{variant: averages(own, variant, changes.get(variant)) for variant in _variants(scores)},
     }
 
 
@@ -65,13 +116,17 @@ def _variants(scores: Sequence[ImageScore]) -> tuple[str, ...]:
     return (*VARIANTS, WITH_EFFECTS) if any(s.variant == WITH_EFFECTS for s in scores) else VARIANTS
 
 
-def averages(scores: Sequence[ImageScore], variant: str) -> dict[str, float | None]:
-    """Mean of each metric over the images that have it; None where no image has."""
+def averages(scores: Sequence[ImageScore], variant: str, change: Change | None = None) -> dict[str, float | None]:
+    """Mean of each metric over the images that have it; None where no image has. Then those of whole films."""
     result: dict[str, float | None] = {}
-    for name in (*METRICS, *SUBJECT_METRICS):
-        values = [v for s in scores if s.variant == variant and (v := s.values[name]) is not None]
-        result[name] = round(sum(values) / len(values), _DECIMALS) if values else None
-    return result
+    for name in ALL_METRICS:
+        values = [v for s in scores if s.variant == variant and (v := s.values.get(name)) is not None]
+        result[name] = rounded(sum(values) / len(values)) if values else None
+    return result | {name: rounded(getattr(change, name, None)) for name in FILM_METRICS}
+
+
+def rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, _DECIMALS)
 
 
 def read_cost(folders: SubjectFolders, manifest: Manifest) -> dict[str, Any]:
@@ -109,28 +164,19 @@ def asset_cost(manifest: Manifest) -> dict[str, int]:
 
 
 def write_per_image(scores: Sequence[ImageScore], path: Path) -> None:
-    """Parquet: camera, frame, variant (strings), then one float64 column a metric, null where it cannot be had."""
+    """Parquet: camera, frame, variant (strings), then one float64 column a metric, null where it cannot be had; split.
+
+    New columns come last.
+    """
     columns: dict[str, pa.Array] = {
         name: pa.array([getattr(s, name) for s in scores], pa.string()) for name in ("camera", "frame", "variant")
     }
-    for name in (*METRICS, *SUBJECT_METRICS):
-        columns[name] = pa.array([s.values[name] for s in scores], pa.float64())
+    for name in ALL_METRICS:
+        columns[name] = pa.array([s.values.get(name) for s in scores], pa.float64())
+    columns["split"] = pa.array([s.split for s in scores], pa.string())
     metadata = {"facefolds_metrics_version": str(METRICS_VERSION)}
     with atomic_file(path) as temporary:
         pq.write_table(pa.table(columns).replace_schema_metadata(metadata), temporary)
-
-
-def text_table(metrics: dict[str, Any]) -> str:
-    """The averages as a small table, one line a variant; metrics that nothing has are left out."""
-    variants = [v for v in (*VARIANTS, WITH_EFFECTS) if v in metrics]
-    names = [n for n in (*METRICS, *SUBJECT_METRICS) if any(metrics[v][n] is not None for v in variants)]
-    lines = ["".join([f"{'':<11}", *(f"{name:>18}" for name in names)])]
-    for variant in variants:
-        cells = [
-            "-" if (v := metrics[variant][n]) is None else f"{v:.2f}" if "psnr" in n else f"{v:.4f}" for n in names
-        ]
-        lines.append("".join([f"{variant:<11}", *(f"{cell:>18}" for cell in cells)]))
-    return "\n".join(lines)
 
 
 def _read(kind: type[T], path: Path) -> T:

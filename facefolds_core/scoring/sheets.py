@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from facefolds_core.files import atomic_file
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import ImageScore, Panel
+from facefolds_core.scoring.report import headline
+from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 MAX_ERROR = 0.25
 """The same end of the error scale on every sheet, so that sheets can be compared."""
@@ -118,13 +120,11 @@ def write_contact_sheet(path: Path, subject: str, panels: Sequence[Panel], metri
 
 def _summary(metrics: dict[str, Any]) -> str:
     names = {"model": "model", "diffuse": "model without view branch", "asset": "asset"}
-    parts = []
+    parts, key = [], headline(metrics)
     for variant, name in names.items():
         values = metrics[variant]
-        frame, subject = values["psnr"], values["psnr_subject"]
-        parts.append(f"{name} {frame:.2f} dB" if subject is None else f"{name} {subject:.2f} dB (frame {frame:.2f})")
-    what = "" if metrics["asset"]["psnr_subject"] is None else " of the subject"
-    return f"Held-out cameras, mean PSNR{what}:   " + "   ·   ".join(parts)
+        parts.append(f"{name} {values[key]:.2f} dB")
+    return f"Held-out cameras, mean PSNR {HEADLINE_WORDS[key]}:   " + "   ·   ".join(parts)
 
 
 def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequence[Panel]) -> None:
@@ -146,8 +146,10 @@ def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequ
 
 
 def _caption(score: ImageScore) -> str:
-    frame, subject = score.values["psnr"], score.values["psnr_subject"]
-    return f"{frame:.2f} dB" if subject is None else f"subject {subject:.2f} dB (frame {frame:.2f})"
+    """What says most of a picture, and within the subject beside it."""
+    key, within = score.headline, score.values.get("psnr_subject")
+    text = f"{score.values[key]:.2f} dB {HEADLINE_WORDS[key]}"
+    return text if within is None or key == "psnr_subject" else f"{text}, {within:.2f} of the subject"
 
 
 class _Sheet:

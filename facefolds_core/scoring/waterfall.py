@@ -1,4 +1,6 @@
-"""What each step of the export loses, on the held-out cameras: from the model to the files that ship.
+"""What each step of the export loses: from the model to the files that ship.
+
+It is measured on the cameras for validation, and on the held-out ones where there are none.
 
 Every step is rendered from what its stage left in data/<subject>, so the steps are those of the asset that is there.
 """
@@ -81,7 +83,7 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
     truths, masks = scene.open_frames(), scene.open_masks()
     to_truth: dict[str, list[float]] = {name: [] for name in STEPS}
     to_model: dict[str, list[float]] = {name: [] for name in STEPS}
-    cameras = scene.indices("holdout")
+    cameras = scene.indices(scene.choice_split)
     with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
         for index in cameras:
             view = ModelView(model, scene.cameras[index])

@@ -6,11 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from facefolds_core.errors import UserError
+from facefolds_core.sweeps.experiments import VALIDATE
 from facefolds_core.sweeps.frontier import frontier
 from facefolds_core.sweeps.table import Run
 
 INDIFFERENT = 0.05
 """dB. Nobody sees less: among configurations within it of the best, the smallest is taken."""
+
+
+_HELD_OUT = ("psnr_over_plate", "psnr_subject", "psnr_found")
+JUDGES = (*(f"{VALIDATE}{name}" for name in _HELD_OUT), *_HELD_OUT)
+"""Figures that tell a good run from a bad one, the best first: on the cameras for validation, as long as there are any,
+since the held-out ones are to stay unseen."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,7 @@ class _Point:
 
 
 def recommend(runs: Sequence[Run], budget: Budget, psnr: float | None = None) -> Run:
-    """The run to take, from the frontier of quality (`Run.quality`) against bytes of those within the budget.
+    """The run to take, from the frontier of quality (`judged_by`) against bytes of those within the budget.
 
     Without `psnr` it is the best one, or a smaller one that is at most INDIFFERENT worse. With it, the smallest one
     that reaches it.
@@ -57,11 +64,10 @@ def recommend(runs: Sequence[Run], budget: Budget, psnr: float | None = None) ->
     limits = budget.limits()
     if not limits and psnr is None:
         raise UserError("neither a budget nor a quality", remedy="give at least one of them")
+    key = judged_by(runs)
     points = [
-        _Point(run, size, db) for run in runs if (size := run.figure("bytes")) and (db := run.quality) is not None
+        _Point(run, size, db) for run in runs if (size := run.figure("bytes")) and (db := run.figure(key)) is not None
     ]
-    if not points:
-        raise UserError("nothing measured", found=f"{len(runs)} rows, none with scores", remedy="run the sweep first")
     within = [p for p in points if all(_cost(p.run, name) <= limit for name, limit in limits.items())]
     if not within:
         raise _nothing_within(points, limits)
@@ -76,6 +82,30 @@ def recommend(runs: Sequence[Run], budget: Budget, psnr: float | None = None) ->
         expected=f"{psnr:.2f} dB",
         found=f"at most {best.quality:.2f} dB ({best.run.experiment}, {best.bytes:.0f} bytes)",
         remedy="ask for less, allow more, or add finer configurations to the sweep",
+    )
+
+
+def judged_by(runs: Sequence[Run]) -> str:
+    """The figure by which runs are compared: the best of `JUDGES` that all of them have.
+
+    Raises:
+        UserError: if nothing was measured, or only what cannot tell a good run from a bad one: PSNR of the whole frame
+            rewards whoever paints the room, and each model's own matte is its own judge.
+    """
+    measured = [run for run in runs if run.figure("bytes")]
+    if not measured:
+        raise UserError("nothing measured", found=f"{len(runs)} rows, none with scores", remedy="run the sweep first")
+    for name in JUDGES:
+        if all(run.figure(name) is not None for run in measured):
+            return name
+    lacking = [run.experiment for run in measured if all(run.figure(name) is None for name in JUDGES)]
+    raise UserError(
+        "these runs cannot be told apart: it is not known where the subject is in the scored pictures",
+        expected="masks or mattes of the scored cameras, or clean plates",
+        found=f"PSNR of the whole frame alone ({lacking[0]}), which rewards painted rooms"
+        if lacking
+        else "no score that all of them have",
+        remedy="add them to the capture (docs/guide/subjects.md), run the sweep again and collect it",
     )
 
 

@@ -52,11 +52,6 @@ class Run:
     def figure(self, name: str) -> float | None:
         return self.figures.get(name)
 
-    @property
-    def quality(self) -> float | None:
-        """PSNR on held-out cameras, dB: of the subject where the capture has masks, else of the whole frame."""
-        return self.figures.get("psnr_subject", self.figures.get("psnr"))
-
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:
     """Write the table in the format that the suffix names.

@@ -106,7 +106,7 @@ def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParam
     Three quarters of the points lie in directions of the outline's vertices; the others at random over the hemisphere
     (uniform in u, v), where rho is interpolated from the three nearest vertices, so that beyond the mesh it continues
     as its border. Points lie within 0.1 of the surface. The mean absolute error is minimised (borders and folds are
-    outliers), by Adam, learning rate 5e-3 falling to 1e-4 (cosine).
+    outliers), by Adam, its learning rate falling along a cosine.
 
     Returns:
         the mean absolute error of the last tenth of the iterations, units.
@@ -117,8 +117,8 @@ def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParam
     nearest_count = min(3, len(outline.radii))
     middle = 0.5 * float(manifolds.levels[0] + manifolds.levels[-1])
     on_mesh = points * 3 // 4
-    optimiser = torch.optim.Adam(manifolds.parameters(), lr=5e-3)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, iterations, eta_min=1e-4)
+    optimiser = torch.optim.Adam(manifolds.parameters(), lr=params.learning_rate)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, iterations, eta_min=params.final_learning_rate)
     errors = []
     for _ in range(iterations):
         anywhere = uv_to_directions(torch.rand(points - on_mesh, 2, generator=generator) * 2 - 1).double().numpy()

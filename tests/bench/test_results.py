@@ -75,11 +75,6 @@ def rates() -> list[Row]:
     return [row for row in rows() if row.sweep in RATES]
 
 
-def steps() -> dict[str, list[dict[str, object]]]:
-    kept = read_json(KEPT / "waterfall.json")
-    return {name: [step for step in kept if step["subject"] == name] for name in ("actor", "mugsy")}
-
-
 @pytest.mark.parametrize(
     ("draw", "kept"),
     [
@@ -87,7 +82,7 @@ def steps() -> dict[str, list[dict[str, object]]]:
         (charts.hazards, film),
         (charts.sweeps, lambda: [row for row in rows() if row.sweep in AXES]),
         (lambda kept, path: charts.rate(kept, path, "actor"), rates),
-        (charts.waterfall, steps),
+        (charts.waterfall, lambda: read_json(KEPT / "waterfall.json")),
     ],
     ids=["speed", "hazards", "sweeps", "rate", "waterfall"],
 )

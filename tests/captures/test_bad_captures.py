@@ -205,7 +205,8 @@ ENTRIES: list[tuple[str, Edit, str, str]] = [
     ("focal length 0", {"fl_x": 0}, "singular", "frames[1]"),
     ("focal word", {"fl_x": "long"}, "not a number", "fl_x"),
     ("other size", {"w": 400}, "another size", "frames[1] (images/400002.png), w"),
-    ("fisheye", {"camera_model": "OPENCV_FISHEYE"}, "camera model", "frames[1]"),
+    ("camera model", {"camera_model": "FOV"}, "camera model", "frames[1]"),
+    ("strong fisheye", {"camera_model": "OPENCV_FISHEYE", "k1": -90.0}, "distortion is too strong", "frames[1]"),
     ("strong distortion", {"k1": 90.0}, "distortion is too strong", "frames[1]"),
     ("one time each", {"time": 3.0}, "one time only", "time"),
 ]

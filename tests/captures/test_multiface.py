@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.krt import read_krt
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.tracked import read_obj
 from facefolds_core.params import FrameRange, Subject
@@ -162,7 +163,7 @@ def test_masks_are_found_where_they_are(tmp_path: Path) -> None:
     write_multiface(tmp_path)
     mask = tmp_path / "masks" / SEGMENT / "400003" / "000006.png"
     save(mask, np.zeros((64, 40), np.uint8))
-    assert read_multiface(tmp_path, subject(tmp_path)).masks == {(2, 1): mask}
+    assert read_multiface(tmp_path, subject(tmp_path)).masks == {(2, 1): FilePicture(mask)}
 
 
 def test_distortion_in_krt_gives_the_camera_a_lens(tmp_path: Path) -> None:
@@ -203,4 +204,4 @@ def test_what_other_systems_leave_in_folders_is_no_picture(tmp_path: Path) -> No
         path.rename(path.with_suffix(".PNG"))
     found = read_multiface(tmp_path, subject(tmp_path))
     assert found.frame_ids == sound.frame_ids
-    assert {key: path.stem for key, path in found.images.items()} == {k: p.stem for k, p in sound.images.items()}
+    assert {k: p.file.stem for k, p in found.images.items()} == {k: p.file.stem for k, p in sound.images.items()}

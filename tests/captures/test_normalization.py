@@ -16,6 +16,7 @@ from facefolds_core.captures.normalization import nearest_to_axes, split_cameras
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.sources.transforms import read_transforms
+from facefolds_core.errors import UserError
 from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
 from tests.captures.fixtures import (
     FACES,
@@ -120,6 +121,45 @@ def test_every_nth_camera_is_held_out(every: int, held: list[str]) -> None:
     subject = Subject(source="transforms", path=".", holdout=HoldoutEvery(every=every))
     splits = split_cameras("abcde", subject, [], "capture")
     assert [name for name, split in zip("abcde", splits, strict=True) if split == "holdout"] == held
+
+
+@pytest.mark.parametrize(
+    ("validate", "splits"),
+    [
+        (None, ["train", "train", "holdout", "train", "train", "holdout"]),
+        ({"every": 2}, ["train", "validate", "holdout", "train", "validate", "holdout"]),  # of those not held out
+        (["a"], ["validate", "train", "holdout", "train", "train", "holdout"]),
+    ],
+)
+def test_cameras_for_validation_are_taken_from_those_that_would_train(validate: object, splits: list[str]) -> None:
+    subject = Subject.model_validate({"source": "actor", "path": ".", "holdout": {"every": 3}, "validate": validate})
+    assert list(split_cameras("abcdef", subject, [], "capture")) == splits
+
+
+@pytest.mark.parametrize(
+    ("validate", "says"),
+    [
+        (["c"], "held out and for validation"),
+        (["x"], "a camera for validation is not there"),
+        (["a", "b", "d", "e"], "no camera is left for training"),
+    ],
+)
+def test_a_wrong_choice_for_validation_is_named(validate: list[str], says: str) -> None:
+    subject = Subject.model_validate({"source": "actor", "path": ".", "holdout": {"every": 3}, "validate": validate})
+    with pytest.raises(UserError, match=says) as error:
+        split_cameras("abcdef", subject, [], "capture")
+    assert error.value.place == "validate"
+
+
+def test_cameras_for_validation_keep_their_masks(tmp_path: Path) -> None:
+    made = write_multiface(tmp_path / "c")
+    for camera in made.cameras:
+        for frame in made.frames:
+            save(tmp_path / "c" / "masks" / SEGMENT / camera.name / f"{frame}.png", np.zeros((64, 40), np.uint8))
+    plan = plan_multiface(tmp_path / "c", validate=("400001",))
+    masks = write_plan(plan, NormalizeParams()).open_masks()
+    assert masks is not None
+    assert {plan.scene.splits[camera] for camera, _ in masks} == {"holdout", "validate"}
 
 
 @pytest.mark.parametrize(

@@ -110,14 +110,14 @@ def test_folders_of_cameras_or_of_frames(tmp_path: Path, label: str) -> None:
     capture = read_transforms(tmp_path, subject(tmp_path, fps=25.0))
     assert [view.name for view in capture.views] == [name for name, _, _ in RING]
     assert (capture.frame_ids, capture.fps) == (("f0", "f1"), 25.0)
-    assert capture.images[1, 0] == tmp_path / label.format(camera="400002", frame="f0")
+    assert capture.images[1, 0].file == tmp_path / label.format(camera="400002", frame="f0")
 
 
 def test_times_order_the_frames(tmp_path: Path) -> None:
     write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
     capture = read_transforms(tmp_path, subject(tmp_path))
     assert capture.frame_ids == ("0", "0.25")
-    assert capture.images[4, 1] == tmp_path / "400005" / "f1.png"
+    assert capture.images[4, 1].file == tmp_path / "400005" / "f1.png"
 
 
 def test_times_that_six_digits_cannot_tell_apart(tmp_path: Path) -> None:

@@ -82,14 +82,15 @@ def test_an_edit_of_an_imported_module_is_compiled(tmp_path: Path, decorator: st
 
 
 def test_a_constant_changed_at_run_time_is_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    from facefolds_core.export import bake_kernel, hold_kernel
+    from facefolds_core import hit_codes
+    from facefolds_core.export import hold_kernel
 
     before = fingerprint(hold_kernel.add_weights)
     assert fingerprint(hold_kernel.add_weights) == before
-    monkeypatch.setattr(hold_kernel, "OPAQUE", 0.5)
+    monkeypatch.setattr(hit_codes, "SCALE", 0.5)
     changed = fingerprint(hold_kernel.add_weights)
     monkeypatch.undo()
-    monkeypatch.setattr(hold_kernel, "_tap", bake_kernel._corner)
+    monkeypatch.setattr(hold_kernel, "_tap", hit_codes.corner)
     assert len({before, changed, fingerprint(hold_kernel.add_weights)}) == 3
 
 

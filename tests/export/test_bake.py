@@ -10,19 +10,22 @@ import torch
 
 from facefolds_core.export import bake_reference
 from facefolds_core.export.bake import Baker, cast_codes, gather_rays, reproject, reprojection
-from facefolds_core.export.bake_kernel import SCALE, accumulate, render, update
+from facefolds_core.export.bake_kernel import accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.sampling import sample_grids, texture_rows
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
+from facefolds_core.hit_codes import SCALE
+from facefolds_core.params import BakeParams
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import look_at_origin
 
 WINDOW: Window = (-0.6, 0.6, -0.6, 0.6)
 MODEL = Ellipsoids(patch=0.5)
 R = 96
+LIGHT = BakeParams().min_light
 RIG = [look_at_origin(f"{a}", a, e, 96) for a, e in ((-35, 10), (0, 0), (30, -15), (-15, -10), (15, 15))]
 
 
@@ -44,13 +47,14 @@ def test_rendering_is_that_of_the_reference(problem: tuple[np.ndarray, np.ndarra
     assert np.abs(out - bake_reference.composite(rgba).numpy()).max() < 1e-4  # seen: 4e-5
 
 
-def test_the_step_is_that_of_the_reference(problem: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+@pytest.mark.parametrize("light", [LIGHT, 0.3])
+def test_the_step_is_that_of_the_reference(problem: tuple[np.ndarray, np.ndarray, np.ndarray], light: float) -> None:
     codes, target, texture = problem
-    texture[..., 3] **= 0.2  # a few rays end before the last layer
+    texture = np.concatenate([texture[..., :3], texture[..., 3:] ** 0.2], -1)  # a few rays end before the last layer
     sums = np.zeros((3, 7, 9, 6), np.float32)
-    squares = accumulate(codes, target, texture, sums)
+    squares = accumulate(codes, target, texture, sums, light)
     expected, total = bake_reference.accumulate(
-        torch.tensor(codes.astype(np.int32)), torch.tensor(target), torch.tensor(texture)
+        torch.tensor(codes.astype(np.int32)), torch.tensor(target), torch.tensor(texture), light
     )
     assert squares == pytest.approx(float(total), rel=1e-6)
     assert np.abs(sums - expected.numpy()).max() < 1e-5  # seen 1.9e-6, of sums up to 10.7
@@ -63,7 +67,7 @@ def test_a_texel_without_rays_or_without_opacity_stays() -> None:
     codes[0, 0, 1] = 1 + int(SCALE * 0.8)
     before, shown = texture.copy(), texture.copy()
     sums = np.zeros((1, 8, 8, 6), np.float32)
-    accumulate(codes, np.ones((1, 4), np.float32), texture, sums)
+    accumulate(codes, np.ones((1, 4), np.float32), texture, sums, LIGHT)
     update(texture.reshape(-1, 4), sums.reshape(-1, 6), 0.05, shown.reshape(-1, 4))
     changed = np.argwhere((texture != before).any(-1))
     assert set(changed[:, 1]) <= {5, 6}

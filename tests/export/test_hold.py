@@ -48,7 +48,7 @@ def test_weights_are_squared_derivatives() -> None:
     texture = rng.uniform(30, 200, (3, 5, 5, 4)).astype(np.float32)
     codes = np.full((1, 3, 2), round(1 + 65534 * 0.5), np.uint16)
     sums = np.zeros((3, 5, 5, 2), np.float32)
-    add_weights(codes, texture, sums)
+    add_weights(codes, texture, sums, 0.001)
     weights = sums
 
     def colour(layer: int, channel: int, change: float) -> np.ndarray:

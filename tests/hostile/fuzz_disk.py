@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.golden import digests
 from facefolds_core.errors import as_user_error
 from facefolds_core.files import PREFIX, write_json
 from facefolds_core.paths import SubjectFolders
@@ -33,6 +32,7 @@ from stages.reconstruct import reconstruct
 from stages.sample import sample
 from stages.texture import texture
 from stages.train import train_stage
+from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, fingerprint, outcome
 
 Stage = Callable[[SubjectFolders], str]

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from bench.golden import digests
 from facefolds_core.files import PREFIX
+from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, fingerprint
 from tests.pipeline.tiny import TinyProject
 

@@ -26,15 +26,6 @@ def stages_restored(output: str) -> list[str]:
     return re.findall(r"^Stage '(.+)' is cached", output, flags=re.MULTILINE)
 
 
-@pytest.fixture(scope="module")
-def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
-    """A tiny project that has been run once."""
-    tiny = TinyProject(project_root, tmp_path_factory.mktemp("tiny"))
-    status, output = tiny.repro("evaluate@actor")
-    assert status == 0, output
-    return tiny
-
-
 def test_it_ends_with_scores_and_pictures(project: TinyProject) -> None:
     folder = project.root / "data" / "actor"
     metrics = json.loads((folder / "metrics.json").read_text())
@@ -44,11 +35,6 @@ def test_it_ends_with_scores_and_pictures(project: TinyProject) -> None:
     assert metrics["cost"]["triangles"] > 0
     assert (folder / "evaluation" / "contact_sheet.png").stat().st_size > 1000
     assert (folder / "evaluation" / "per_image.parquet").exists()
-
-
-def test_the_asset_is_valid(project: TinyProject) -> None:
-    status, output = project.run("python", "-m", "facefolds_core", "validate", "data/actor/asset")
-    assert status == 0, output
 
 
 def test_nothing_to_do(project: TinyProject) -> None:

@@ -41,7 +41,8 @@ decimate: {resolution: 12}
 texture: {resolution: 32}
 bake: {}
 normalize: {}
-compress: {}
+compress:
+  levels: [{name: small, mesh_resolution: 8, texture_resolution: 32, crf: 30}]
 evaluate: {}
 """
 

@@ -54,7 +54,7 @@ def test_nothing_is_missing_and_nothing_is_no_number(subject: SubjectFolders) ->
 
 
 def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
-    for path in (copy.metrics, copy.root / "waterfall" / "waterfall.json", copy.timing("train")):
+    for path in (copy.metrics, copy.waterfall, copy.timing("train")):
         path.write_text(re.sub(r"(\d+\.\d+|300)(?=[,\n])", "NaN", path.read_text()))
     page = page_of(copy)
     assert not re.search(r"\b(nan|None|inf)\b", re.sub(r"data:image[^\"]*|<script>.*</script>", "", page, flags=re.S))
@@ -62,7 +62,11 @@ def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
 
 
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
-    assert "centre: &lt;the middle&gt;" in page_of(subject)
+    assert "level 3: &lt;diverged&gt;" in page_of(subject)
+
+
+def test_what_was_fitted_is_worded(subject: SubjectFolders) -> None:
+    assert "<li>texels: 1.5 pixels each" in page_of(subject)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +75,7 @@ def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
         ("scene", "dvc repro normalize@somebody"),
         ("evaluation", "dvc repro evaluate@somebody"),
         ("training", "dvc repro train@somebody"),
-        ("waterfall", "python -m bench.export_waterfall --subjects somebody"),
+        ("waterfall", "facefolds waterfall data/somebody"),
         ("../.config", "dvc repro configure"),
     ],
 )

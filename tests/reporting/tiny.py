@@ -6,6 +6,7 @@ from pathlib import Path
 
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import read_scene
+from facefolds_core.facts import fact
 from facefolds_core.files import write_json, write_text
 from facefolds_core.params import section_of
 from facefolds_core.paths import SubjectFolders
@@ -66,7 +67,8 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     write_per_image(scores(masks), folders.evaluation / "per_image.parquet")
     write_seen(folders, masks)
     write_json(folders.model / "training.json", {"preset": "fast", "seconds": 12.5})
-    write_json(folders.model / "fit.json", {"reasons": ["centre: <the middle>"], "events": []})
+    reason = fact("texels_chosen", pixels=1.5)
+    write_json(folders.model / "fit.json", {"reasons": [reason.to_json()], "events": ["level 3: <diverged>"]})
     write_text(folders.training_log / "plots" / "metrics" / "psnr.tsv", "step\tpsnr\n0\t10\n1\tnan\n2\t20\n")
     for i, stage in enumerate(("train", "compress")):
         write_json(folders.timing(stage), {"stage": stage, "seconds": 10.0 + i})
@@ -76,5 +78,5 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
         {"name": name, "psnr": 25.0 - i, "triangles": 0, "mesh_bytes": 0, "texture_bytes": i}
         for i, name in enumerate(STEPS)
     ]
-    write_json(folders.root / "waterfall" / "waterfall.json", {"subject": "spheres", "steps": steps})
+    write_json(folders.waterfall, {"subject": "spheres", "steps": steps})
     return folders

@@ -13,10 +13,11 @@ from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
 from facefolds_core.params import EvaluateParams
-from facefolds_core.scoring.evaluation import MASK_MARGIN, Evaluation, evaluate, score_images, subject_box
+from facefolds_core.scoring.evaluation import Evaluation, evaluate
+from facefolds_core.scoring.images import MASK_MARGIN, score_images, subject_box
 from facefolds_core.scoring.metrics import MAX_PSNR
 from facefolds_core.scoring.model_view import ModelView
-from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS
+from facefolds_core.scoring.panels import ALL_METRICS, METRICS, SUBJECT_METRICS, VARIANTS
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
@@ -40,7 +41,7 @@ def test_every_image_is_scored_for_every_variant(tmp_path: Path) -> None:
     scores = run(tmp_path).scores
     keys = [(s.camera, s.frame, s.variant) for s in scores]
     assert keys == [("front", f"{k:06d}", v) for k in range(FRAMES) for v in VARIANTS]
-    assert all(list(s.values) == [*METRICS, *SUBJECT_METRICS] for s in scores)
+    assert all(list(s.values) == list(ALL_METRICS) for s in scores)
 
 
 def test_without_masks_the_subject_has_no_scores(tmp_path: Path) -> None:

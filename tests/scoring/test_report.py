@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -10,18 +11,21 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.files import write_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore
+from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import (
     EXPORT_STAGES,
     METRICS_VERSION,
+    Circumstances,
     averages,
+    headline,
     metrics_json,
     read_cost,
-    text_table,
     write_per_image,
 )
+from facefolds_core.scoring.temporal import Change
 from tests.assets import cap_crops, make_asset
 
 COST_KEYS = [
@@ -41,7 +45,7 @@ TRAINING = {"seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "pr
 
 
 def score(variant: str, frame: str, psnr: float, subject: float | None = None) -> ImageScore:
-    values: dict[str, float | None] = dict.fromkeys((*METRICS, *SUBJECT_METRICS))
+    values: dict[str, float | None] = dict.fromkeys(ALL_METRICS)
     return ImageScore("cam", frame, variant, values | {"psnr": psnr, "psnr_subject": subject})
 
 
@@ -74,9 +78,10 @@ def test_metrics_json_has_all_its_keys_and_no_nan(folders: SubjectFolders) -> No
     cost = read_cost(folders, read_asset(folders.asset).manifest)
     write_json(folders.metrics, metrics_json("somebody", SCORES, cost))
     metrics = json.loads(folders.metrics.read_text(), parse_constant=pytest.fail)
-    assert list(metrics) == ["version", "subject", "images", "images_with_mask", *VARIANTS, "cost"]
+    about = ["headline", "matte", "band_pixels", "images", "images_with_mask", "truth_change"]
+    assert list(metrics) == ["version", "subject", *about, *VARIANTS, "warnings", "cost"]
     assert (metrics["version"], metrics["images"], metrics["images_with_mask"]) == (METRICS_VERSION, 3, 2)
-    assert all(list(metrics[v]) == [*METRICS, *SUBJECT_METRICS] for v in VARIANTS)
+    assert all(list(metrics[v]) == [*ALL_METRICS, *FILM_METRICS] for v in VARIANTS)
     assert list(metrics["cost"]) == COST_KEYS
 
 
@@ -97,7 +102,9 @@ def test_the_cost_adds_up(folders: SubjectFolders) -> None:
 def test_per_image_scores_come_back_from_parquet(tmp_path: Path) -> None:
     write_per_image(SCORES, tmp_path / "scores.parquet")
     rows = pq.read_table(tmp_path / "scores.parquet").to_pylist()
-    expected = [{"camera": s.camera, "frame": s.frame, "variant": s.variant, **s.values} for s in SCORES]
+    expected = [
+        {"camera": s.camera, "frame": s.frame, "variant": s.variant, **s.values, "split": s.split} for s in SCORES
+    ]
     assert rows == expected
 
 
@@ -116,8 +123,31 @@ def test_a_missing_timing_is_named(folders: SubjectFolders) -> None:
     assert error.value.file == folders.timing("decimate")
 
 
-def test_the_table_leaves_out_what_nothing_has() -> None:
-    table = text_table(metrics_json("somebody", SCORES, {}))
-    assert "psnr" in table
-    assert "lpips" not in table
-    assert len(table.splitlines()) == 1 + len(VARIANTS)
+def test_cameras_for_validation_are_averaged_apart() -> None:
+    checked = [replace(one, split="validate", values={**one.values, "psnr_subject": 33.0}) for one in SCORES]
+    metrics = metrics_json("somebody", [*SCORES, *checked], {})
+    assert (metrics["images"], metrics["validate"]["images"]) == (3, 3)
+    assert (metrics["asset"]["psnr_subject"], metrics["validate"]["asset"]["psnr_subject"]) == (12, 33)
+    assert "validate" not in metrics_json("somebody", SCORES, {})
+
+
+@pytest.mark.parametrize(
+    ("values", "best"),
+    [
+        ({"psnr": 1.0}, "psnr"),
+        ({"psnr": 1.0, "psnr_found": 2.0}, "psnr_found"),
+        ({"psnr": 1.0, "psnr_subject": 2.0}, "psnr_subject"),
+        ({"psnr": 1.0, "psnr_subject": 2.0, "psnr_over_plate": 3.0}, "psnr_over_plate"),
+        ({}, "psnr"),
+    ],
+)
+def test_the_headline_is_what_says_most(values: dict[str, float], best: str) -> None:
+    assert headline({"asset": values}) == best
+
+
+def test_changes_and_warnings_are_in_it() -> None:
+    changes = {"holdout": {"asset": Change(0.5, 0.01, 0.1)}}
+    about = Circumstances("found", 4.0, changes, warnings=[fact("matte_is_found")])  # type: ignore[arg-type]
+    metrics = metrics_json("somebody", SCORES, {}, about)
+    assert (metrics["asset"]["temporal"], metrics["asset"]["flicker"], metrics["truth_change"]) == (0.5, 0.01, 0.1)
+    assert [one["kind"] for one in metrics["warnings"]] == ["matte_is_found"]

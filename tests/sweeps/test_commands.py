@@ -27,7 +27,12 @@ def call(command: object, *arguments: str) -> Result:
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
     runs = [
-        Run(f"r{r}", "actor", params={"decimate.resolution": r}, figures={"bytes": 1000.0 * r, "psnr": 20 + r / 10})
+        Run(
+            f"r{r}",
+            "actor",
+            params={"decimate.resolution": r},
+            figures={"bytes": 1000.0 * r, "psnr_subject": 20 + r / 10},
+        )
         for r in (8, 16, 32)
     ]
     write_runs(tmp_path / "sweep.csv", runs)
@@ -39,7 +44,7 @@ def test_a_recommendation_is_printed_and_written(table: Path, project_root: Path
     params.write_text((project_root / "params.yaml").read_text())
     done = call(choose, str(table), "--max-bytes", "2e4", "--write", "--params", str(params))
     assert done.exit_code == 0, done.output
-    assert "r16" in done.output and "decimate.resolution: 16" in done.output and "psnr 21.6" in done.output
+    assert "r16" in done.output and "decimate.resolution: 16" in done.output and "psnr_subject, 21.60 dB" in done.output
     section = load_params(params).stage("decimate", "actor")
     assert isinstance(section, DecimateParams) and section.resolution == 16
 
@@ -59,7 +64,7 @@ def test_what_cannot_be_had_is_said(arguments: list[str], says: str, table: Path
 
 
 def test_two_subjects_need_a_name(table: Path) -> None:
-    write_runs(table, [*read_runs(table), Run("x", "anna", figures={"bytes": 1.0, "psnr": 1.0})])
+    write_runs(table, [*read_runs(table), Run("x", "anna", figures={"bytes": 1.0, "psnr_subject": 1.0})])
     assert "which subject?" in call(choose, str(table), "--min-psnr", "1").output
     assert "recommend: anna, x" in call(choose, str(table), "--min-psnr", "1", "--subject", "anna").output
 

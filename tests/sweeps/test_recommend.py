@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.sweeps.recommend import INDIFFERENT, Budget, recommend
+from facefolds_core.sweeps.recommend import INDIFFERENT, Budget, judged_by, recommend
 from facefolds_core.sweeps.table import Run
 
 
@@ -50,9 +50,22 @@ def test_twice_the_bytes_for_nothing_visible_are_not_spent() -> None:
     assert recommend(finer, Budget(bytes=1e6)).experiment == "visible"
 
 
-def test_the_whole_frame_where_there_are_no_masks() -> None:
+def test_the_whole_frame_tells_nothing() -> None:
     runs = [Run(n, "x", figures={"bytes": b, "psnr": db}) for n, b, db in (("a", 1.0, 20.0), ("b", 2.0, 22.0))]
-    assert recommend(runs, Budget(), 21.0).experiment == "b"
+    with pytest.raises(UserError, match="cannot be told apart") as error:
+        recommend(runs, Budget(), 21.0)
+    assert "masks" in str(error.value.expected)
+
+
+def test_cameras_for_validation_come_before_held_out_ones() -> None:
+    runs = [run("lucky", 10, 30.0, validate_psnr_subject=25.0), run("good", 10, 29.0, validate_psnr_subject=26.0)]
+    assert judged_by(runs) == "validate_psnr_subject"
+    assert recommend(runs, Budget(bytes=100)).experiment == "good"
+
+
+def test_runs_are_compared_by_what_all_of_them_have() -> None:
+    runs = [run("a", 10, 30.0, validate_psnr_subject=25.0), run("b", 10, 29.0), RUNS[-1]]
+    assert judged_by(runs) == "psnr_subject"
 
 
 @pytest.mark.parametrize(

@@ -42,12 +42,6 @@ def test_no_rows(name: str, tmp_path: Path) -> None:
     assert read_runs(tmp_path / name) == []
 
 
-def test_quality_is_the_subjects_where_there_is_one() -> None:
-    assert Run("", "", figures={"psnr": 10.0, "psnr_subject": 20.0}).quality == 20.0
-    assert Run("", "", figures={"psnr": 10.0}).quality == 10.0
-    assert Run("", "").quality is None
-
-
 def test_mistakes(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="kind of table"):
         write_runs(tmp_path / "sweep.xlsx", RUNS)

@@ -11,6 +11,7 @@ from facefolds_core import scatter
 from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.params import ExplicitParams
+from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 
@@ -37,12 +38,14 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
 
 FAST = ExplicitParams()
 OPACITY, LATE, RATE = FAST.losses.opacity, FAST.losses.late_opacity, FAST.background.rate
+LIGHT = FAST.textures.min_light
 SETTINGS = {
-    "rounds of geometry": (OPACITY, 0.0, RATE, 0.0),
-    "textures": (OPACITY * LATE, FAST.losses.binarisation, RATE, FAST.textures.min_alpha),
-    "stronger": (0.02, 0.05, RATE, 0.05),
+    "rounds of geometry": (OPACITY, 0.0, RATE, 0.0, LIGHT),
+    "textures": (OPACITY * LATE, FAST.losses.binarisation, RATE, FAST.textures.min_alpha, LIGHT),
+    "stronger": (0.02, 0.05, RATE, 0.05, 0.1),
 }
-"""Prices of opacity and half opacity, the background's rate, what is faint: as in production, and one that shows."""
+"""Prices of opacity and half opacity, the background's rate, what is faint, what is hidden: as in production, and
+one that shows."""
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
@@ -69,8 +72,10 @@ def test_contributions_match_the_reference() -> None:
     p = _problem(500, 5, (9, 7))
     p["texture"][..., 3] *= 1.9
     peak = np.zeros((5, 9, 7), np.float32)
-    shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak)
-    expected = reference.contributions(torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]))
+    shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, LIGHT)
+    expected = reference.contributions(
+        torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]), LIGHT
+    )
     torch.testing.assert_close(torch.from_numpy(peak), expected, atol=1e-6, rtol=0)  # seen: 2.7e-7
 
 
@@ -79,7 +84,7 @@ def test_shading_at_extreme_alphas(alpha: float) -> None:
     p = _problem(50, 4, (6, 6))
     p["texture"][..., 3] = alpha
     gradient = np.zeros((4, 6, 6, 4), np.float32)
-    assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.1, 0.1, 0.5, 0.0))
+    assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.1, 0.1, 0.5, 0.0, LIGHT))
     assert np.isfinite(gradient).all()
 
 
@@ -89,9 +94,9 @@ def test_shading_does_not_depend_on_the_number_of_threads() -> None:
         numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
         p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
         gradient = np.zeros((6, 9, 9, 4), np.float32)
-        squares = shading_kernel.shade(*p.values(), gradient, 0.0, 0.0, 0.5, 0.0)
+        squares = shading_kernel.shade(*p.values(), gradient, 0.0, 0.0, 0.5, 0.0, LIGHT)
         peak = np.zeros((6, 9, 9), np.float32)
-        shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak)
+        shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, LIGHT)
         results.append((gradient, p["background"], peak, squares))
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     for other in results[1:]:
@@ -104,7 +109,8 @@ def test_every_layer_is_somebodys_task(layers: int) -> None:
     assert sorted(scatter.spread(task, layers) for task in range(layers)) == list(range(layers))
 
 
-def test_adam_step_matches_the_reference() -> None:
+@pytest.mark.parametrize("betas", [FAST.textures.betas, (0.5, 0.7)])
+def test_adam_step_matches_the_reference(betas: tuple[float, float]) -> None:
     torch.manual_seed(0)
     m, n = 40, 5
     parts = [torch.randn(3, m, 3), torch.randn(3, m, n, 4), torch.randn(3, m, 3), torch.randn(3, m, n)]
@@ -128,8 +134,9 @@ def test_adam_step_matches_the_reference() -> None:
         rates.numpy(),
         np.float32(keep),
         correct.numpy(),
+        decays(betas),
     )
-    reference.adam_step(*parts, texture, gradient, rates, keep, correct)
+    reference.adam_step(*parts, texture, gradient, rates, keep, correct, betas)
     for a, b in zip(compiled, parts, strict=True):
         torch.testing.assert_close(a, b, atol=1e-5, rtol=1e-4)
 

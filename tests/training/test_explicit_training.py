@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import trimesh
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
+from facefolds_core.facts import read_fact
 from facefolds_core.frame_store import write_frames
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
@@ -75,6 +77,13 @@ def test_it_is_after_the_default_volume(trained: tuple[Scene, Path], tmp_path: P
 def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
     names = {p.name for p in trained[1].iterdir()}
     assert names == {"model.safetensors", "model.json", "training.json", "fit.json", "fit.png"}
+
+
+def test_reasons_are_facts(trained: tuple[Scene, Path]) -> None:
+    reasons = [read_fact(value) for value in json.loads((trained[1] / "fit.json").read_text())["reasons"]]
+    wanted = ["centre_chosen", "window_chosen", "middle_from_mesh", "halfwidth_chosen", "texels_chosen"]
+    assert [reason.kind for reason in reasons][:5] == wanted
+    assert 0 <= reasons[0].values["lost"] < 1
 
 
 def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> None:

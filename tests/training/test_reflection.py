@@ -69,7 +69,7 @@ def test_look_is_the_difference_of_photo_and_reference() -> None:
     texture = rng.random((6, 9, 4, 4), np.float32)
     images, background = rng.integers(0, 256, (1, 400, 3)).astype(np.uint8), rng.random((1, 400, 3), np.float32)
     seen = np.zeros((400, 6), np.float32)
-    look(codes, np.zeros(400, np.int32), np.arange(400, dtype=np.int32), images, background, texture, seen)
+    look(codes, np.zeros(400, np.int32), np.arange(400, dtype=np.int32), images, background, texture, seen, 0.002)
     rgba = reference.look_up(torch.from_numpy(codes.astype(np.int32)), torch.from_numpy(texture))
     weights, through = reference.compositing_weights(rgba[..., 3])
     st = (torch.from_numpy(codes.astype(np.float32)) - 1) / 65534

@@ -13,6 +13,7 @@ from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.search import cut_share
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
+from facefolds_core.training.volume.walls import Wall
 
 PARAMS = ExplicitParams()
 REACH, VOXEL = 0.45, 0.015
@@ -46,41 +47,53 @@ def _solid(volume: Volume) -> Array:
 def test_the_body_at_the_common_centre_wins_over_a_heavier_one() -> None:
     head, wardrobe = _ball(0.1, 0.0, 0.0, 0.0), _ball(0.16, -0.1, 0.32, 0.0)
     volume = _volume((head, 2.0), (wardrobe, 4.0))
-    kept = _solid(subject_of(volume, PARAMS))
+    kept = _solid(subject_of(volume, (), PARAMS))
     assert kept[head].all() and not kept[wardrobe].any()
 
 
 def test_a_wall_that_the_subject_hangs_on_is_left_to_the_room() -> None:
     head, wall = _ball(0.2, 0.12, 0.0, 0.0), np.abs(_points()[..., 0] + 0.06) < 0.02
-    kept = _solid(subject_of(_volume((head, 5.0), (wall, 5.0)), PARAMS))
-    far = np.hypot(_points()[..., 1], _points()[..., 2])
-    assert kept[head & ~wall].all()
-    assert not kept[wall & ~head & (far > 0.28) & (_points()[..., 2] > -0.1)].any()
+    volume = _volume((head, 5.0), (wall, 5.0))
+    found = Wall(np.array([1.0, 0.0, 0.0]), -0.04)
+    subject = subject_of(volume, (found,), PARAMS)
+    before = found.height(_points()) >= PARAMS.subject.walls.margin
+    np.testing.assert_array_equal(_solid(subject), head & before)
+    assert subject.removed is not None
+    rest = np.logaddexp(0, subject.removed[..., 0]) > PARAMS.volume.body_depth
+    np.testing.assert_array_equal(rest, _solid(volume) & ~(head & before))
+
+
+def test_smooth_pale_surfaces_stay_where_they_are_faint() -> None:
+    """A plaster head's chin has an optical depth of 0.05 a voxel."""
+    head, chin = _ball(0.2, 0.0, 0.0, 0.1), _ball(0.1, 0.1, 0.0, -0.1)
+    volume = _volume((chin, float(np.log(np.expm1(0.05)))), (head, 5.0))
+    kept = subject_of(volume, (), PARAMS).grid[..., 0] > -10
+    assert kept[chin].all()
 
 
 def test_shoulders_and_what_hangs_free_stay_whole() -> None:
     chest = (np.abs(_points()[..., 0]) < 0.1) & (np.abs(_points()[..., 1]) < 0.2) & (_points()[..., 2] < -0.1)
     volume = _volume((_ball(0.2, 0.0, 0.0, 0.0), 5.0), (chest, 5.0))
-    np.testing.assert_array_equal(_solid(subject_of(volume, PARAMS)), _solid(volume))
-    assert cut_share(volume, PARAMS) == 0
+    np.testing.assert_array_equal(_solid(subject_of(volume, (), PARAMS)), _solid(volume))
+    assert cut_share(volume, (), PARAMS) == 0
 
 
 def test_ears_at_the_edge_of_the_ball_are_noticed() -> None:
     ears = (np.abs(_points()[..., 0] - 0.15) < 0.05) & (np.abs(_points()[..., 1]) < 0.1) & (_points()[..., 2] > 0)
     volume = _volume((_ball(0.2, 0.0, 0.0, 0.0), 5.0), (ears, 5.0))
-    assert cut_share(volume, PARAMS) > PARAMS.subject.max_cut
+    assert cut_share(volume, (), PARAMS) > PARAMS.subject.max_cut
 
 
 def test_nothing_solid_is_no_body() -> None:
     volume = _volume()
     assert not body_at_centre(volume, 0.15, 0.1).any()
-    assert cut_share(volume, PARAMS) == 0
+    assert cut_share(volume, (), PARAMS) == 0
     assert positions(replace(volume, lower=np.zeros(3)))[0, 0, 0].tolist() == [0, 0, 0]
 
 
 def test_faint_hair_stays_where_there_is_no_room_and_no_other_body() -> None:
     head, hair = _ball(0.1, 0.0, 0.0, 0.0), _ball(0.2, 0.0, 0.0, 0.0)
-    volume = _volume((hair, -3.0), (head, 5.0))
-    assert subject_of(volume, PARAMS).grid[30, 30, 42, 0] < -10
+    volume = _volume((hair, -4.0), (head, 5.0))
+    assert subject_of(volume, (), PARAMS).grid[30, 30, 42, 0] < -10
     volume.room.outer = False
-    assert subject_of(volume, PARAMS).grid[30, 30, 42, 0] == -3.0
+    assert subject_of(volume, (), PARAMS).grid[30, 30, 42, 0] == -4.0

@@ -145,7 +145,7 @@ def test_what_floats_is_removed() -> None:
     both = replace(ball, grid=np.where(crumb.grid[..., :1] > ball.grid[..., :1], crumb.grid, ball.grid))
     outward = np.array([[1.0, 0.0, 0.0]])
     assert outline.profile(both, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.43, abs=0.01)
-    cleaned = subject_of(both, PARAMS)
+    cleaned = subject_of(both, (), PARAMS)
     assert outline.profile(cleaned, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.25, abs=0.01)
 
 
@@ -179,7 +179,7 @@ def test_a_sphere_is_found_from_images_alone(tmp_path: Path, resolution: int) ->
     scene = make_scene(tmp_path, size=64)
     levels = [{"resolution": r, "iterations": 120 * resolution // 96} for r in (resolution // 2, resolution)]
     params = ExplicitParams.model_validate({"volume": {"levels": levels}})
-    volume = subject_of(fit.fit_volume(scene, params, tqdm(disable=True)), params)
+    volume = subject_of(fit.fit_volume(scene, params, tqdm(disable=True)), (), params)
     centre = np.array(SPHERE_CENTRE)
     seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
     voxel = 0.008 * 96 / resolution

@@ -33,7 +33,7 @@ def test_what_is_not_well_is_said_with_a_remedy(tmp_path: Path) -> None:
     scene, params = make_scene(tmp_path, size=16), ExplicitParams().warnings
     assert warnings_of(scene, WELL, params) == ()
     (low,) = warnings_of(scene, replace(WELL, volume_psnr=20.1), params)
-    assert low.kind == "volume_explains_little" and "20.1 dB" in str(low) and "needed_below" in str(low)
+    assert low.kind == "volume_explains_little" and "20.1 dB" in str(low) and "plates" in str(low)
     (lost,) = warnings_of(scene, replace(WELL, centre=np.array([-0.4, 0.0, 0.0])), params)
     assert "30%" in str(lost) and "train.start.centres" in str(lost)
     guessed = replace(scene, left_out=(fact("front_guessed"),))

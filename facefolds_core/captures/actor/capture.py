@@ -1,8 +1,9 @@
-"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity for every camera."""
+"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity, clean plates."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -50,10 +51,12 @@ def _write_png(path: Path, image: NDArray[np.uint8]) -> None:
     path.write_bytes(data.tobytes())
 
 
-def _write_picture(folder: Path, camera: str, frame: str, picture: Picture) -> None:
+def _write_picture(folder: Path, camera: str, frame: str, picture: Picture, mattes: bool) -> None:
     _write_png(folder / "images" / SEGMENT / camera / f"{frame}.png", picture.rgb[..., ::-1])
     mask = np.rint(255 * picture.opacity).astype(np.uint8)
     _write_png(folder / "masks" / SEGMENT / camera / f"{frame}.png", mask)
+    if mattes:
+        _write_png(folder / "mattes" / SEGMENT / camera / f"{frame}.png", mask)
 
 
 def _write_mesh(folder: Path, frame: str, mesh: TrackedMesh, head_to_world: NDArray[np.float64]) -> None:
@@ -91,11 +94,15 @@ def write_capture(
         frames = [(frame_name(k), float(time)) for k, time in enumerate(frame_times(params))]
         listing = "".join(f"{SEGMENT} {name}\n" for name, _ in frames)
         (temporary / "frame_list.txt").write_text(listing, encoding="utf-8")
+        if params.plates:
+            for camera in rig.cameras:
+                plate = render(camera, 0.0, replace(options, away=1.0), params.seed)
+                _write_png(temporary / "plates" / f"{camera.name}.png", plate.rgb[..., ::-1])
         for name, time in frames:
             rotation, translation = head_pose(time, options.head_motion)
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)
             _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time, options.nose), head_to_world)
             for camera in rig.cameras:
-                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed))
+                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed), params.mattes)
                 if progress:
                     progress()

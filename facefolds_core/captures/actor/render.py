@@ -58,6 +58,7 @@ class ActorOptions:
         nose: mm by which the nose is longer.
         ball: radius of a striped ball before the mouth, mm; it is part of the subject. 0 is none.
         shutter: seconds that a picture is exposed, half before and half after its time.
+        away: kilometres that the head is lifted out of the picture; 1 leaves the room alone, a clean plate.
     """
 
     gloss: float = 1.0
@@ -68,6 +69,11 @@ class ActorOptions:
     nose: float = 0.0
     ball: float = 0.0
     shutter: float = 0.0
+    away: float = 0.0
+
+
+_UP = np.array([0.0, -1e6, 0.0])
+"""A kilometre above, mm: no camera looks there."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +241,7 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
     if options.shutter > 0:
         return _exposed(camera, time, options, seed)
     rotation, translation = head_pose(time, options.head_motion)
-    frame = np.concatenate([rotation, translation[:, None]], 1)
+    frame = np.concatenate([rotation, (translation + options.away * _UP)[:, None]], 1)
     pose = pose_at(time)
     pose[NOSE], pose[BALL] = options.nose, options.ball
     # The lights stand in the room: turn them into the head's frame.

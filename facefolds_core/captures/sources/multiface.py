@@ -4,6 +4,8 @@
     images/SEGMENT/CAMERA/FRAME.png
     tracked_mesh/SEGMENT/FRAME.obj|.bin|_transform.txt
     masks/SEGMENT/CAMERA/FRAME.png          not in Multiface: true opacity, where a synthetic capture knows it
+    mattes/SEGMENT/CAMERA/FRAME.png         not in Multiface: opacity of any camera, which training may use
+    plates/CAMERA.png                       not in Multiface: the same camera without the subject
 
 Cameras, frames or images may be missing; what is not used is named in `Capture.left_out`.
 """
@@ -19,6 +21,7 @@ from facefolds_core.captures.capture import Capture, Sound, View, closest_rotati
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
@@ -60,16 +63,20 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     views, note = _views(used, photos, root, subject)
     left_out += [note] if note else []
     images = {
-        (c, f): photos[view.name][name]
+        (c, f): FilePicture(photos[view.name][name])
         for c, view in enumerate(views)
         for f, name in enumerate(frames)
         if name in photos[view.name]
     }
-    masks = {
-        (c, f): path
-        for c, f in images
-        if is_there(path := root / "masks" / segment / views[c].name / f"{frames[f]}.png")
-    }
+
+    def opacity(folder: str) -> dict[tuple[int, int], Picture]:
+        return {
+            (c, f): FilePicture(path)
+            for c, f in images
+            if is_there(path := root / folder / segment / views[c].name / f"{frames[f]}.png")
+        }
+
+    plates = {c: path for c, view in enumerate(views) if is_there(path := root / "plates" / f"{view.name}.png")}
     audio = root / "audio" / f"{segment}.wav"
     rate = frame_rate(subject, fps, len(frames))
     seconds = tuple(names.index(name) / (subject.fps or fps) for name in frames)
@@ -79,10 +86,12 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
         tuple(frames),
         rate,
         images,
-        masks,
+        opacity("masks"),
         tracking,
         tuple(left_out),
         Sound(audio, seconds) if is_there(audio) else None,
+        {c: FilePicture(path) for c, path in plates.items()},
+        opacity("mattes"),
     )
 
 

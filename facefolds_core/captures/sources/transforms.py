@@ -1,18 +1,18 @@
 """transforms.json of nerfstudio and instant-ngp.
 
 Each entry of `frames` names an image and its camera -> world matrix with OpenGL axes (x right, y up, z backward).
-Intrinsics (fl_x, fl_y, cx, cy, w, h, or camera_angle_x / camera_angle_y) and distortion (k1, k2, k3, p1, p2) stand
-there or once at the top. Pixel coordinates are continuous (the first pixel's centre at 0.5), as instant-ngp reads them.
+Intrinsics (fl_x, fl_y, cx, cy, w, h, or camera_angle_x / camera_angle_y) and distortion (k1, k2, k3, p1, p2; of a
+fisheye, that is where camera_model is OPENCV_FISHEYE or is_fisheye is true, k1 to k4) stand there or once at the top.
+Pixel coordinates are continuous (the first pixel's centre at 0.5), as instant-ngp reads them.
 
 A static capture has one image a camera. A dynamic one shows each camera, that is each matrix, several times: entries
-differ by a `time` key, or by the folder or name of the image.
+differ by a `time` key, or by the folder or name of the image. Where every image was calibrated by itself the matrices
+of a camera differ a little (`arrangement`).
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -20,9 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.arrangement import Shot, arrange, jitter, mean_calibration
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
+from facefolds_core.captures.gathering import Calibration
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files import read_json
@@ -36,6 +39,8 @@ FPS = 30.0
 PIXEL_CENTRES = 0.5
 _PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 _DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+_FISHEYE = ("k1", "k2", "k3", "k4")
+_KEYS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye")
 LATEST = 1e19
 """Of `time`: nanoseconds since 1970 are 1.8e18."""
 
@@ -103,22 +108,25 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
             "no such file",
             "copy the images there, or correct file_path",
         )
-    groups, names, frame_of = _arrange(present, path)
+    arranged = arrange([_shot(entry) for entry in present], path)
     what = f"`{path.name}`"
-    frames = select_frames(names, subject.frames, path, what)
+    frames = select_frames(arranged.frames, subject.frames, path, what)
     centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
-    views = tuple(_view(name, members[0], centres, path) for name, members in groups.items())
+    members = {name: [present[i] for i in of] for name, of in arranged.cameras.items()}
+    each = [_calibrations(name, some, centres, path) for name, some in members.items()]
+    views = tuple(_view(mean_calibration(some)) for some in each)
+    left_out += jitter(each)
     position = {name: f for f, name in enumerate(frames)}
-    images: dict[tuple[int, int], Path] = {}
-    for c, members in enumerate(groups.values()):
-        for entry in members:
-            name = frame_of[entry.place]
+    images: dict[tuple[int, int], Picture] = {}
+    for c, of in enumerate(arranged.cameras.values()):
+        for i in of:
+            name, entry = arranged.frame_of[i], present[i]
             if name in position and entry.image is not None:
                 if (c, position[name]) in images:
                     raise wrong(
                         path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label
                     )
-                images[c, position[name]] = entry.image
+                images[c, position[name]] = FilePicture(entry.image)
     rate = frame_rate(subject, FPS, len(frames))
     return Capture(path.parent, views, tuple(frames), rate, images, {}, None, tuple(left_out))
 
@@ -165,79 +173,24 @@ def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
     return inverse
 
 
-def _arrange(entries: list[Entry], path: Path) -> tuple[dict[str, list[Entry]], list[str], dict[str, str]]:
-    """Sort entries into cameras and frames.
-
-    Returns:
-        camera name -> entries; names of the frames, in order; place of an entry -> name of its frame.
-    """
-    by_pose: dict[bytes, list[Entry]] = defaultdict(list)
-    for entry in entries:
-        by_pose[np.round(entry.w2c, 7).tobytes()].append(entry)
-    groups = list(by_pose.values())
-    times = {entry.time for entry in entries}
-    if max(len(group) for group in groups) == 1:
-        if len(times) > 1:
-            raise wrong(
-                path,
-                "time",
-                "every camera is seen at one time only, as from a single moving camera",
-                "cameras that see every frame",
-                f"{len(groups)} cameras, {len(times)} times",
-                "use a capture of several fixed cameras; for a static scene, take the `time` keys out",
-            )
-        names = _unique([_stem_and_folder(group[0]) for group in groups])
-        return dict(zip(names, groups, strict=True)), ["0"], {entry.place: "0" for entry in entries}
-    timed = None not in times
-    named = _time_names([time for time in times if time is not None]) if timed else {}
-    frame_of = {}
-    stems = _frame_is_folder(groups)
-    for entry in entries:
-        stem, folder = _stem_and_folder(entry)
-        frame_of[entry.place] = folder if stems else stem
-        if timed and entry.time is not None:
-            frame_of[entry.place] = named[entry.time]
-    ordered = list(named.values()) if timed else sorted(set(frame_of.values()))
-    parts = [_stem_and_folder(group[0]) for group in groups]
-    cameras = _unique([(stem, folder) if stems else (folder, stem) for stem, folder in parts])
-    return dict(zip(cameras, groups, strict=True)), ordered, frame_of
-
-
-def _time_names(times: Iterable[float]) -> dict[float, str]:
-    """Names of moments, in order: six digits, or all of them where six are not enough to tell them apart."""
-    ordered = sorted(set(times))
-    short = [f"{time:g}" for time in ordered]
-    return dict(zip(ordered, short if len(set(short)) == len(short) else map(repr, ordered), strict=True))
-
-
-def _stem_and_folder(entry: Entry) -> tuple[str, str]:
+def _shot(entry: Entry) -> Shot:
     path = PurePosixPath(entry.label)
     name = path.name if entry.image is None or entry.image.suffix != path.suffix else path.stem
-    return name, path.parent.name
+    return Shot(name, path.parent.name, entry.time, entry.w2c)
 
 
-def _frame_is_folder(groups: list[list[Entry]]) -> bool:
-    """Whether the images of one camera share their name (so that folders are frames) or their folder."""
-    return all(len({_stem_and_folder(entry)[0] for entry in group}) == 1 for group in groups)
+def _calibrations(name: str, entries: list[Entry], pixel_centres: float, path: Path) -> list[Calibration]:
+    """Those of a camera's entries; one where all are the same, as they mostly are."""
+    keys = (*_KEYS, *_DISTORTION, *_FISHEYE)
+    given = {(np.round(e.w2c, 7).tobytes(), *(repr(e.values.get(key)) for key in keys)) for e in entries}
+    return [_calibration(name, entry, pixel_centres, path) for entry in (entries if len(given) > 1 else entries[:1])]
 
 
-def _unique(candidates: list[tuple[str, str]]) -> list[str]:
-    """Names of cameras: the first choice of each where these differ, else the second, else both, else numbered."""
-    for names in (
-        [first for first, _ in candidates],
-        [second for _, second in candidates],
-        [f"{second}/{first}" for first, second in candidates],
-    ):
-        if max(Counter(names).values()) == 1:
-            return names
-    return [f"{first}-{i}" for i, (first, _) in enumerate(candidates)]
-
-
-def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
-    """The camera of an entry, distortion taken out."""
+def _calibration(name: str, entry: Entry, pixel_centres: float, path: Path) -> Calibration:
+    """Of one entry; K in continuous pixel coordinates."""
     assert entry.image is not None
     width, height = image_size(entry.image, f"camera {name}")
-    _check_model(entry, path)
+    fisheye = _is_fisheye(entry, path)
     for key, size in (("w", width), ("h", height)):
         if key in entry.values and _number(entry, key) != size:
             raise wrong(
@@ -254,26 +207,36 @@ def _view(name: str, entry: Entry, pixel_centres: float, path: Path) -> View:
     cy = _number(entry, "cy") + shift if "cy" in entry.values else height / 2
     K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     check_camera(Camera(name, K, entry.w2c, width, height), path, entry.place)
-    coefficients = np.array([_number(entry, key) if key in entry.values else 0.0 for key in _DISTORTION])
-    lens = make_lens(K, coefficients, width, height, path, entry.place)
-    return View(Camera(name, K if lens is None else lens.pinhole, entry.w2c, width, height), lens)
+    given = [_number(entry, key) if key in entry.values else 0.0 for key in (_FISHEYE if fisheye else _DISTORTION)]
+    return Calibration(name, K, entry.w2c, path, entry.place, np.array(given), fisheye, (width, height))
 
 
-def _check_model(entry: Entry, path: Path) -> None:
-    model = entry.values.get("camera_model", "OPENCV")
+def _view(calibration: Calibration) -> View:
+    """The camera of an entry, distortion taken out."""
+    c = calibration
+    assert c.size is not None
+    lens = make_lens(c.K, c.coefficients, *c.size, c.file, c.place, c.fisheye)
+    return View(Camera(c.name, c.K if lens is None else lens.pinhole, c.w2c, *c.size), lens)
+
+
+def _is_fisheye(entry: Entry, path: Path) -> bool:
+    model = str(entry.values.get("camera_model", "OPENCV")).upper()
     fisheye = entry.values.get("is_fisheye", False)
     if not isinstance(fisheye, bool):
         raise wrong(path, f"{entry.place}, is_fisheye", "neither true nor false", "true or false", short(fisheye))
-    fisheye = fisheye or (entry.values.get("k4") is not None and _number(entry, "k4") != 0)
-    if str(model).upper() not in _PINHOLES or fisheye:
+    if fisheye or model == "OPENCV_FISHEYE":
+        return True
+    fourth = entry.values.get("k4") is not None and _number(entry, "k4") != 0
+    if model not in _PINHOLES or fourth:
         raise wrong(
             path,
             entry.place,
             "a camera model that is not read",
-            f"{shorten(_PINHOLES)}, k1 k2 p1 p2 k3 at most",
-            "k4 or is_fisheye" if fisheye else short(model),
-            "rectify the images first",
+            f"OPENCV_FISHEYE, {shorten(_PINHOLES)}; k1 k2 p1 p2 k3 at most, of a fisheye k1 k2 k3 k4",
+            "k4" if fourth else short(entry.values.get("camera_model")),
+            "undistort the images first",
         )
+    return False
 
 
 def _focal(entry: Entry, width: int, height: int, path: Path) -> tuple[float, float]:

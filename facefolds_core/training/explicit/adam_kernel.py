@@ -6,8 +6,7 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import inlined, kernel
-
-BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
+from facefolds_core.training.adam import EPSILON
 
 
 @kernel(parallel=True)
@@ -22,10 +21,10 @@ def activate(colour, layers, frame_colour, frame_alpha, out):  # type: ignore[no
 
 
 @inlined
-def _adam(values, first, second, index, g, rate, correct1, correct2, keep):  # type: ignore[no-untyped-def]
+def _adam(values, first, second, index, g, rate, correct1, correct2, keep, decay):  # type: ignore[no-untyped-def]
     """One Adam step on values[index], then shrinking by `keep`."""
-    first[index] = np.float32(BETA1) * first[index] + np.float32(1 - BETA1) * g
-    second[index] = np.float32(BETA2) * second[index] + np.float32(1 - BETA2) * g * g
+    first[index] = decay[0] * first[index] + decay[1] * g
+    second[index] = decay[2] * second[index] + decay[3] * g * g
     step = rate * (first[index] * correct1) / (np.sqrt(second[index] * correct2) + np.float32(EPSILON))
     values[index] = (values[index] - step) * keep
 
@@ -41,6 +40,7 @@ def adam_step(  # type: ignore[no-untyped-def]
     rates,  # (5,) of colour, layer colour, alpha, frame colour, frame alpha
     keep,  # factor by which the frames' parts shrink each step
     correct,  # (4,) bias corrections of both moments, of the static and of this frame's parts
+    decay,  # (4,) of `adam.decays`
 ):
     """Adam on the texels that the rays have met; the others stay as they are, moments included."""
     count, layers_n = layers.shape[1], layers.shape[2]
@@ -67,16 +67,16 @@ def adam_step(  # type: ignore[no-untyped-def]
             sum2 += g2
             for q in range(3):
                 g = g0 if q == 0 else (g1 if q == 1 else g2)
-                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one)
+                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one, decay)
             alpha = texture[k, n, 3]
             g = g3 * alpha * (1 - alpha)
-            _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one)
+            _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one, decay)
             layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
-            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep)
+            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep, decay)
         if not met:
             continue
         for q in range(3):
             g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
-            _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one)
+            _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one, decay)
             colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
-            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep)
+            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep, decay)

@@ -25,7 +25,7 @@ def first_background(scene: Scene, images: Images, volume: Volume, params: Backg
         at = np.broadcast_to(origins, directions.shape).astype(np.float32)
         along = directions.astype(np.float32)
         _, alpha, _ = volume.render(at, along)
-        behind = volume.room.look_up(at, along)
+        behind = volume.behind(at, along)
         full = [cv2.resize(a.reshape(rows, columns, -1), (w, h)) for a in (alpha, behind)]
         covered = full[0] >= params.max_opacity
         image[covered] = full[1][covered]

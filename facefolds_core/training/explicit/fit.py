@@ -39,7 +39,7 @@ class Fit:
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
-        reasons: one line a choice.
+        reasons: one a choice, and the notes.
         notes: what a user should know at once.
         losses: x of the candidates for the centre -> share of the visible surface that each loses.
         volume_psnr: of the volume on training rays, dB.
@@ -53,7 +53,7 @@ class Fit:
     opacity: Array
     rgb: Array
     texels: tuple[int, int]
-    reasons: tuple[str, ...]
+    reasons: tuple[Fact, ...]
     notes: tuple[Fact, ...]
     losses: dict[float, float]
     volume_psnr: float
@@ -78,7 +78,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     if surface is None or vertices is None:
         known = seen.radius
         trust = np.zeros((rows, columns))
-        source = "the volume, where half of its opacity is reached from outside"
+        source = fact("middle_from_volume")
     else:
         mesh = mesh_radii(vertices, surface[1], centre, directions)
         points = (centre + mesh[..., None] * directions).reshape(-1, 3)
@@ -87,11 +87,11 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         known, kept = blend(mesh, seen.radius, params.mesh.reach)
         trust = params.mesh.trust * kept
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
-        source = f"the tracked mesh, mean over frames, but where the volume lies over {params.mesh.reach} outside it"
+        source = fact("middle_from_mesh", reach=params.mesh.reach)
     middle = extrapolate(known).clip(geometry.min_radius)
     widths = spread(seen, middle, geometry, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
-    radius = float(np.quantile(middle[opacity >= start.subject_opacity], 0.9))
+    radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         centre=centre,
@@ -102,25 +102,22 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[float(centre[0])], source), *map(str, notes)),
+        reasons=(*_reasons(params, losses[float(centre[0])], source), *notes),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
 
 
-def _reasons(params: ExplicitParams, lost: float, source: str) -> tuple[str, ...]:
-    """One line a choice."""
+def _reasons(params: ExplicitParams, lost: float, middle: Fact) -> tuple[Fact, ...]:
+    """One a choice."""
     start, geometry = params.start, params.geometry
     return (
-        "centre: of the candidates whose hemispheres lose least of the visible surface, within "
-        f"{start.centre_tie:.0%}, the one farthest back (it loses {lost:.1%})",
-        f"window: directions in which the volume is at least {start.subject_opacity:.0%} opaque (and the tracked mesh, "
-        f"where there is one), and {start.window_margin} on each side",
-        f"middle radius: {source}",
-        f"halfwidth: {geometry.halfwidth}, more where the volume is blurred or far from the middle, at most "
-        f"{geometry.max_halfwidth}",
-        f"texels: {params.textures.pixels_per_texel:g} pixels each, seen head on from the median training camera",
+        fact("centre_chosen", tie=start.centre_tie, lost=lost),
+        fact("window_chosen", opacity=start.subject_opacity, margin=start.window_margin),
+        middle,
+        fact("halfwidth_chosen", least=geometry.halfwidth, most=geometry.max_halfwidth),
+        fact("texels_chosen", pixels=params.textures.pixels_per_texel),
     )
 
 

@@ -115,7 +115,7 @@ class _Trainer:
         return RadialManifolds(self.centre, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
-        """One level, again from its start at a third of the learning rate if it diverges."""
+        """One level, again from its start at a lower learning rate if it diverges."""
         self._prepare(level)
         assert self.state is not None and self.views is not None
         saved = self.state.snapshot()
@@ -125,7 +125,7 @@ class _Trainer:
                     self._judge_reflection(bar)
                 return
             self.state.restore(saved)
-            self.rate /= 3
+            self.rate /= self.params.divergence.slow_down
             self.events.append(fact("diverged", level=number, rate=self.rate))
             bar.write(f"train: {self.events[-1]}")
         raise UserError(
@@ -193,7 +193,7 @@ class _Trainer:
         assert self.state is not None and self.views is not None
         count, stride = len(self.views.pixel), self._stride()
         coarse = number < len(self.params.geometry.rounds)
-        weights = self._weights(coarse)
+        weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
@@ -209,7 +209,7 @@ class _Trainer:
             )
             if not coarse and i % self.params.textures.smooth_every == 0:
                 self.state.smooth_alpha(frame)
-            recent = error if i == 0 else 0.9 * recent + 0.1 * error
+            recent = error if i == 0 else (1 - smoothing) * recent + smoothing * error
             best = min(best, recent)
             if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
                 return False
@@ -238,8 +238,8 @@ class _Trainer:
         return max(1, int(len(self.views.pixel) / (self.params.textures.rays_per_texel * texels)))
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
-        rate = self.rate * (1 - 0.9 * progress)
         to = self.params.textures
+        rate = self.rate * (1 - (1 - to.final_rate) * progress)
         rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
@@ -294,7 +294,7 @@ class _Trainer:
             "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
             "layers": spec.num_layers,
             "texels": list(spec.texels),
-            "reasons": list(self.fit.reasons),
+            "reasons": [reason.to_json() for reason in self.fit.reasons],
             "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
             "volume_psnr": self.fit.volume_psnr,
             "cameras": self.cameras.summary,

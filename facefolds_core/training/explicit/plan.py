@@ -17,7 +17,7 @@ class Level:
         iterations: steps.
         stride: of the pixels that are traced.
         geometry: halfwidths of the layers, in those of the fit.
-        last: the learning rates fall to a tenth along it.
+        last: the learning rates fall along it.
     """
 
     texels: tuple[int, int]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
-from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2, EPSILON
-from facefolds_core.training.explicit.shading_kernel import OPAQUE
+from facefolds_core.training.adam import EPSILON, Betas
 
 
 def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:
@@ -19,8 +19,8 @@ def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: 
 def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     """Bilinear rgba [R, N, 4] at 16-bit positions [R, N, 2] (int32); alpha 0 where missed (code 0)."""
     height, width, layers, _ = texture.shape
-    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
-    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    x = ((codes[..., 0] - 1) * (width / SCALE) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / SCALE) - 0.5).clamp(0, height - 1)
     j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
     b, a = (x - j)[..., None], (y - i)[..., None]
     flat = texture.reshape(-1, 4)
@@ -34,22 +34,22 @@ def look_up(codes: Tensor, texture: Tensor) -> Tensor:
     return torch.cat([rgba[..., :3], rgba[..., 3:] * hit], -1)
 
 
-def visible(alpha: Tensor, min_alpha: float) -> Tensor:
-    """[R, N] bool: layers with at least `min_alpha` of alpha that do not lie behind less transmittance than OPAQUE."""
+def visible(alpha: Tensor, min_alpha: float, min_light: float) -> Tensor:
+    """[R, N] bool: layers with at least `min_alpha` of alpha that do not lie behind less light than `min_light`."""
     before, _ = transmittances(torch.where(alpha >= min_alpha, alpha, 0.0))
-    return (alpha >= min_alpha) & (before >= OPAQUE)
+    return (alpha >= min_alpha) & (before >= min_light)
 
 
-def contributions(codes: Tensor, texture: Tensor) -> Tensor:
+def contributions(codes: Tensor, texture: Tensor, min_light: float) -> Tensor:
     """As `shading_kernel.contributions`: [R, N, 2] int32, [H, W, N, 4] -> [N, H, W]."""
     height, width, layers, _ = texture.shape
-    x = ((codes[..., 0] - 1) * (width / 65534.0) - 0.5).clamp(0, width - 1)
-    y = ((codes[..., 1] - 1) * (height / 65534.0) - 0.5).clamp(0, height - 1)
+    x = ((codes[..., 0] - 1) * (width / SCALE) - 0.5).clamp(0, width - 1)
+    y = ((codes[..., 1] - 1) * (height / SCALE) - 0.5).clamp(0, height - 1)
     j, i = x.floor().clamp(max=width - 2).long(), y.floor().clamp(max=height - 2).long()
     alpha = look_up(codes, texture)[..., 3]
     before, _ = transmittances(alpha)
     n = torch.arange(layers, device=texture.device).expand_as(i)
-    hit = (codes[..., 0] > 0) & visible(alpha, 0.0)
+    hit = (codes[..., 0] > 0) & visible(alpha, 0.0, min_light)
     peak = texture.new_zeros(height * width * layers)
     for di, wi in ((0, 1 - (y - i)), (1, y - i)):
         for dj, wj in ((0, 1 - (x - j)), (1, x - j)):
@@ -69,12 +69,13 @@ def shade(
     binarisation_weight: float,
     rate: float,
     min_alpha: float,
+    min_light: float,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
     texture = texture.detach().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
-        alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha), rgba[..., 3], 0.0)
+        alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha, min_light), rgba[..., 3], 0.0)
         weights, transmittance = compositing_weights(alpha)
         rgb = rgba[..., :3] if shine is None else rgba[..., :3] + shine[:, None]
         colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * background
@@ -98,25 +99,26 @@ def adam_step(
     rates: Tensor,  # [5]
     keep: float,
     correct: Tensor,  # [4]
+    betas: Betas,
 ) -> None:
     """As `adam_kernel.adam_step`."""
     met = (gradient != 0).any(-1)
     alpha = texture[..., 3]
     slope = gradient[..., 3] * alpha * (1 - alpha)
-    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], 1.0)
-    _adam(layers[..., 3], slope, met, rates[2], correct[:2], 1.0)
+    _adam(layers[..., :3], gradient[..., :3], met[..., None], rates[1], correct[:2], 1.0, betas)
+    _adam(layers[..., 3], slope, met, rates[2], correct[:2], 1.0, betas)
     layers[0, ..., 3].clamp_(-9, 9)
-    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep)
+    _adam(frame_alpha, slope, met, rates[4], correct[2:], keep, betas)
     total, any_met = gradient[..., :3].sum(1), met.any(1, keepdim=True)
-    _adam(colour, total, any_met, rates[0], correct[:2], 1.0)
+    _adam(colour, total, any_met, rates[0], correct[:2], 1.0, betas)
     colour[0].clamp_(0, 1)
-    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep)
+    _adam(frame_colour, total, any_met, rates[3], correct[2:], keep, betas)
 
 
-def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: float) -> None:
+def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, keep: float, betas: Betas) -> None:
     values, first, second = state
-    new_first = BETA1 * first + (1 - BETA1) * g
-    new_second = BETA2 * second + (1 - BETA2) * g * g
+    new_first = betas[0] * first + (1 - betas[0]) * g
+    new_second = betas[1] * second + (1 - betas[1]) * g * g
     step = rate * (new_first * correct[0]) / ((new_second * correct[1]).sqrt() + EPSILON)
     values.copy_(torch.where(met, (values - step) * keep, values))
     first.copy_(torch.where(met, new_first, first))

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from facefolds_core.hit_codes import SCALE, corner
 from facefolds_core.jit import inlined, kernel
-from facefolds_core.training.explicit.shading_kernel import OPAQUE, texel_corner, texel_tap
-
-CODES = np.float32(65534.0)
+from facefolds_core.training.explicit.shading_kernel import rgba_tap
 
 
 @kernel(parallel=True)
-def look(codes, camera, pixel, images, background, texture, seen):  # type: ignore[no-untyped-def]
+def look(codes, camera, pixel, images, background, texture, seen, min_light):  # type: ignore[no-untyped-def]
     """Adds to seen (P, 6) of each ray, in one frame: photo minus C (3), opacity, and opacity times (s, t).
 
     Arguments as of `shading_kernel.shade`; C without reflections, over the background.
@@ -27,16 +26,16 @@ def look(codes, camera, pixel, images, background, texture, seen):  # type: igno
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = texel_corner(codes[p, n, 0], width)
-            i, a = texel_corner(codes[p, n, 1], height)
-            light = through * texel_tap(texture, i, j, n, 3, a, b)
-            r0 += light * texel_tap(texture, i, j, n, 0, a, b)
-            r1 += light * texel_tap(texture, i, j, n, 1, a, b)
-            r2 += light * texel_tap(texture, i, j, n, 2, a, b)
-            s += light * (np.float32(codes[p, n, 0]) - one) / CODES
-            t += light * (np.float32(codes[p, n, 1]) - one) / CODES
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
+            light = through * rgba_tap(texture, i, j, n, 3, a, b)
+            r0 += light * rgba_tap(texture, i, j, n, 0, a, b)
+            r1 += light * rgba_tap(texture, i, j, n, 1, a, b)
+            r2 += light * rgba_tap(texture, i, j, n, 2, a, b)
+            s += light * (np.float32(codes[p, n, 0]) - one) / np.float32(SCALE)
+            t += light * (np.float32(codes[p, n, 1]) - one) / np.float32(SCALE)
             through -= light
-            if through < OPAQUE:
+            if through < min_light:
                 break
         cam, pix = camera[p], pixel[p]
         inverse = np.float32(1 / 255.0)
@@ -101,13 +100,13 @@ def normal_equations(st: Any, weight: Any, wish: Any, height: Any, width: Any, b
             continue
         j, b = _texel(st[p, 0], width)
         i, a = _texel(st[p, 1], height)
-        for tap in range(4):
-            di, dj = tap >> 1, tap & 1
+        for one_of in range(4):
+            di, dj = one_of >> 1, one_of & 1
             own = (a if di else 1 - a) * (b if dj else 1 - b)
             at = (i + di) * width + j + dj
             for q in range(wish.shape[1]):
                 right[at, q] += own * wish[p, q]
-            for other in range(tap + 1):
+            for other in range(one_of + 1):
                 oi, oj = other >> 1, other & 1
                 theirs = (a if oi else 1 - a) * (b if oj else 1 - b)
                 before = (i + oi) * width + j + oj

@@ -10,28 +10,17 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
 Array = NDArray[Any]
 
-OPAQUE = 0.002
-"""Layers behind less than this transmittance are left out."""
-
-
 _scatter = scatter_of(4)
 
 
 @inlined
-def texel_corner(code, size):  # type: ignore[no-untyped-def]
-    """16-bit position over the window -> index of the texel before it, and the fraction beyond its centre."""
-    x = min(max((code - 1) * (size / 65534.0) - 0.5, 0.0), size - 1.0)
-    i = min(int(x), size - 2)
-    return i, np.float32(x - i)
-
-
-@inlined
-def texel_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
+def rgba_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
     bottom = texture[i + 1, j, n, q] * (one - b) + texture[i + 1, j + 1, n, q] * b
@@ -40,7 +29,7 @@ def texel_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
 
 @kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
-    codes,  # (P, N, 2) uint16: 1 + 65534 s, 1 + 65534 t of the crossing with each layer; 0 where missed
+    codes,  # (P, N, 2) uint16 (`hit_codes`): crossings with each layer
     camera,  # (P,) int32
     pixel,  # (P,) int32
     rays,  # (R,) int64, which of the P to shade, none twice
@@ -53,6 +42,7 @@ def shade(  # type: ignore[no-untyped-def]
     binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
     rate,  # of the background
     min_alpha,  # layers with less alpha are left out
+    min_light,  # layers behind less transmittance are left out
 ):
     """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t).
 
@@ -66,7 +56,13 @@ def shade(  # type: ignore[no-untyped-def]
     squares = np.zeros((count + BLOCK - 1) // BLOCK)
     index = np.empty((layers, CHUNK), np.int32)
     wish = np.empty((layers, CHUNK, 6), np.float32)
-    terms = (np.float32(opacity_weight), np.float32(binarisation_weight), np.float32(rate), np.float32(min_alpha))
+    terms = (
+        np.float32(opacity_weight),
+        np.float32(binarisation_weight),
+        np.float32(rate),
+        np.float32(min_alpha),
+        min_light,
+    )
     for start in range(0, count, CHUNK):
         own = min(CHUNK, count - start)
         for block in prange((own + BLOCK - 1) // BLOCK):
@@ -110,7 +106,7 @@ def _shade(
     """A block of R rays: texels before their crossings (N, R), -1 where there is none, and what is wanted there
     (N, R, 6): fractions of row and column, gradient of rgba. Returns the sum of |C - I|^2."""
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    opacity_weight, binarisation_weight, rate, min_alpha = terms
+    opacity_weight, binarisation_weight, rate, min_alpha, min_light = terms
     one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
     layer = np.empty(layers, np.int64)
     c = np.empty((layers, 4), np.float32)
@@ -128,15 +124,15 @@ def _shade(
         for n in range(layers):
             if codes[p, n, 0] == 0:
                 continue
-            j, b = texel_corner(codes[p, n, 0], width)
-            i, a = texel_corner(codes[p, n, 1], height)
-            alpha = texel_tap(texture, i, j, n, 3, a, b)
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
+            alpha = rgba_tap(texture, i, j, n, 3, a, b)
             if alpha < min_alpha:
                 continue
             index[n, k] = i * width + j
             wish[n, k, 0], wish[n, k, 1] = a, b
             for q in range(3):
-                c[m, q] = texel_tap(texture, i, j, n, q, a, b) + added[q]
+                c[m, q] = rgba_tap(texture, i, j, n, q, a, b) + added[q]
             c[m, 3] = alpha
             layer[m], before[m] = n, transmittance
             light = transmittance * alpha
@@ -145,7 +141,7 @@ def _shade(
             r2 += light * c[m, 2]
             transmittance *= one - alpha
             m += 1
-            if transmittance < OPAQUE:
+            if transmittance < min_light:
                 break
         cam, pix = camera[p], pixel[p]
         s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
@@ -171,11 +167,11 @@ def _shade(
 
 
 @kernel(parallel=True)
-def contributions(codes, rays, texture, peak):  # type: ignore[no-untyped-def]
+def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-untyped-def]
     """What each texel adds to a ray's opacity at most: T w alpha; w bilinear weight, T transmittance before it.
 
     codes (P, N, 2) as above, rays (R,) which of them to look at, texture (H, W, N, 4); peak (N, H, W) float32 is raised
-    to what is found.
+    to what is found. Nothing is added behind less transmittance than `min_light`.
     """
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
     count = rays.shape[0]
@@ -186,19 +182,19 @@ def contributions(codes, rays, texture, peak):  # type: ignore[no-untyped-def]
             p = rays[start + k]
             transmittance = np.float32(1.0)
             for n in range(layers):
-                before[n, k] = transmittance if transmittance >= OPAQUE else np.float32(0.0)
-                if codes[p, n, 0] > 0 and transmittance >= OPAQUE:
-                    j, b = texel_corner(codes[p, n, 0], width)
-                    i, a = texel_corner(codes[p, n, 1], height)
-                    transmittance *= 1 - texel_tap(texture, i, j, n, 3, a, b)
+                before[n, k] = transmittance if transmittance >= min_light else np.float32(0.0)
+                if codes[p, n, 0] > 0 and transmittance >= min_light:
+                    j, b = corner(codes[p, n, 0], width)
+                    i, a = corner(codes[p, n, 1], height)
+                    transmittance *= 1 - rgba_tap(texture, i, j, n, 3, a, b)
         for task in prange(layers):
             n = spread(task, layers)
             for k in range(own):
                 p = rays[start + k]
                 if codes[p, n, 0] == 0 or before[n, k] == 0:
                     continue
-                j, b = texel_corner(codes[p, n, 0], width)
-                i, a = texel_corner(codes[p, n, 1], height)
+                j, b = corner(codes[p, n, 0], width)
+                i, a = corner(codes[p, n, 1], height)
                 for tap in range(4):
                     di, dj = tap >> 1, tap & 1
                     w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.params import ExplicitParams
+from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
-from facefolds_core.training.explicit.adam_kernel import BETA1, BETA2
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.views import Views
@@ -140,7 +140,8 @@ class TextureState:
         texture = self.activated(frame)
         self.steps[frame] += 1
         total, own = int(self.steps.sum()), int(self.steps[frame])
-        correct = np.array([1 / (1 - b**t) for t in (total, own) for b in (BETA1, BETA2)], np.float32)
+        betas = self.params.textures.betas
+        correct = np.array([*corrections(betas, total), *corrections(betas, own)], np.float32)
         if self.device.type == "cpu":
             (h, w), n = self.shape, texture.shape[1]
             squares = shading_kernel.shade(
@@ -157,6 +158,7 @@ class TextureState:
                 weights.binarisation,
                 background_rate,
                 weights.min_alpha,
+                self.params.textures.min_light,
             )
             adam_kernel.adam_step(
                 self.colour.numpy(),
@@ -168,6 +170,7 @@ class TextureState:
                 rates,
                 np.float32(keep),
                 correct,
+                decays(betas),
             )
         else:
             squares = self._reference_step(views, rays, images, frame, texture, weights, rates, correct)
@@ -203,6 +206,7 @@ class TextureState:
             weights.binarisation,
             self.params.background.rate,
             weights.min_alpha,
+            self.params.textures.min_light,
         )
         self.background[at] = moved
         reference.adam_step(
@@ -215,6 +219,7 @@ class TextureState:
             torch.from_numpy(rates).to(self.device),
             self.params.textures.frame_decay,
             torch.from_numpy(correct).to(self.device),
+            self.params.textures.betas,
         )
         return float(squares)
 
@@ -231,21 +236,22 @@ class TextureState:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
         (h, w), n = self.shape, self.layers.shape[2]
         texture = self.activated(frame).cpu().numpy().reshape(h, w, n, 4)
-        look(views.codes, views.camera, views.pixel, images, self.background.cpu().numpy(), texture, seen)
+        background, least = self.background.cpu().numpy(), self.params.textures.min_light
+        look(views.codes, views.camera, views.pixel, images, background, texture, seen, least)
 
     def contributions(self, views: Views, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
-        (h, w), frames = self.shape, len(self.steps)
+        (h, w), frames, least = self.shape, len(self.steps), self.params.textures.min_light
         n = self.layers.shape[2]
         peak = torch.zeros(n, h, w)
         for i in range(max(passes, frames)):
             rays = np.arange(i % passes, len(views.pixel), passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
             if self.device.type == "cpu":
-                shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy())
+                shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), least)
             else:
                 codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
-                torch.maximum(peak, reference.contributions(codes, texture).cpu(), out=peak)
+                torch.maximum(peak, reference.contributions(codes, texture, least).cpu(), out=peak)
         return peak.view(n, -1).T.contiguous().to(self.device)
 
     def hide(self, unseen: Tensor) -> None:

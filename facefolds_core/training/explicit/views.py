@@ -19,8 +19,8 @@ class Views:
     """P rays of C training cameras that cross at least one layer.
 
     Attributes:
-        codes: (P, N, 2) uint16: 1 + 65534 s and 1 + 65534 t of the crossing with each layer, over the window; 0 where
-            the layer is missed. A texel of 512 is 128 steps.
+        codes: (P, N, 2) uint16 (`hit_codes`): the crossing with each layer, over the window. A texel of 512 is 128
+            steps.
         camera: (P,) int32, position in the list of training cameras.
         pixel: (P,) int32, row-major.
         directions: (P, 3) float32, unit vectors.

@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.params import EnvironmentParams
+from facefolds_core.training.adam import EPSILON
 
 Array = NDArray[np.float32]
-
-BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
-"""Adam's, as in `kernel`."""
 
 
 class Environment:
@@ -59,8 +57,9 @@ class Environment:
         )
         self._steps += 1
         first, second = self._moments
-        first += (1 - BETA1) * (gradient - first)
-        second += (1 - BETA2) * (gradient**2 - second)
-        move = first / (1 - BETA1**self._steps) / (np.sqrt(second / (1 - BETA2**self._steps)) + EPSILON)
+        keep1, keep2 = self.params.betas
+        first += (1 - keep1) * (gradient - first)
+        second += (1 - keep2) * (gradient**2 - second)
+        move = first / (1 - keep1**self._steps) / (np.sqrt(second / (1 - keep2**self._steps)) + EPSILON)
         self.values = np.where(gradient != 0, self.values - scale * self.params.learning_rate * move, self.values)
         self.values = self.values.clip(0, 1).astype(np.float32)

@@ -37,6 +37,7 @@ class Volume:
         frame: index of the frame that it was fitted to.
         psnr: on the training rays of the last iterations, dB.
         cameras: what single training cameras do differently.
+        removed: what was in the grid beside the subject (`subject.py`), on the same grid; None where nothing is known.
     """
 
     grid: Array
@@ -47,6 +48,15 @@ class Volume:
     frame: int
     psnr: float
     cameras: CameraFit
+    removed: Array | None = None
+
+    def behind(self, origins: Array, directions: Array) -> Array:
+        """Rays (R, 3) -> colours (R, 3) of what stands behind the subject: what was removed, and the room."""
+        colours = self.room.look_up(origins, directions)
+        if self.removed is None:
+            return colours
+        rgb, alpha, _ = replace(self, grid=self.removed).render(origins, directions)
+        return (rgb + (1 - alpha[:, None]) * colours).astype(np.float32)
 
     def render(self, origins: Array, directions: Array) -> tuple[Array, Array, Array]:
         """Rays (R, 3) -> rgb over black (R, 3), alpha (R,), distance at which T falls to 1/2 or 0 (R,)."""

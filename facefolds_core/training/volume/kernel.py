@@ -12,6 +12,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.jit import inlined, kernel
+from facefolds_core.training.adam import EPSILON
 
 Array = NDArray[Any]
 
@@ -25,7 +26,6 @@ BLOCK = 4
 CLEAR, OPAQUE = 1e-4, 1e-3
 """Samples with less alpha are left out, and so is what lies behind less transmittance."""
 
-BETA1, BETA2, EPSILON = 0.9, 0.99, 1e-8
 LIMIT = 12.0
 """Of |raw density|."""
 
@@ -211,8 +211,9 @@ def adam_step(  # type: ignore[no-untyped-def]
     share,  # (X, Y, Z) factor on the rate of density
     rate_density,
     rate_colour,
-    correct1,  # bias corrections of the two moments
+    correct1,  # `adam.corrections`
     correct2,
+    decay,  # `adam.decays`
     smooth,  # weight of sum sqrt(1 + d^2) over differences d of raw density to the six neighbours
 ):
     """Adam on the voxels that the rays have met; the others stay as they are, moments included."""
@@ -251,8 +252,8 @@ def adam_step(  # type: ignore[no-untyped-def]
                             if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz:
                                 difference = old[i, j, k] - old[x, y, z]
                                 g += np.float32(smooth) * difference / math.sqrt(1 + difference * difference)
-                    m1 = np.float32(BETA1) * grid[1, i, j, k, q] + np.float32(1 - BETA1) * g
-                    m2 = np.float32(BETA2) * grid[2, i, j, k, q] + np.float32(1 - BETA2) * g * g
+                    m1 = decay[0] * grid[1, i, j, k, q] + decay[1] * g
+                    m2 = decay[2] * grid[2, i, j, k, q] + decay[3] * g * g
                     grid[1, i, j, k, q], grid[2, i, j, k, q] = m1, m2
                     rate = rate_density * share[i, j, k] if q == 0 else rate_colour
                     moved = values[i, j, k, q] - rate * (m1 * correct1) / (math.sqrt(m2 * correct2) + EPSILON)

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VolumeLevel, VolumeParams
+from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.room import Room
 
@@ -142,7 +143,7 @@ def train(
     """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
     grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
     gradient, touched = kernel.empty_gradient(values.shape)
-    count = min(params.rays, len(rays.origins))
+    count, decay = min(params.rays, len(rays.origins)), decays(params.betas)
     recent = math.nan
     for i in range(level.iterations):
         if i % 25 == 0:
@@ -168,11 +169,11 @@ def train(
         )
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
-        scale = 1 - 0.9 * i / level.iterations if last else 1.0
-        bias1, bias2 = 1 / (1 - kernel.BETA1 ** (i + 1)), 1 / (1 - kernel.BETA2 ** (i + 1))
+        scale = 1 - (1 - params.final_rate) * i / level.iterations if last else 1.0
+        bias = corrections(params.betas, i + 1)
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
         room.step(behind, transmittance[:, None] * residual, scale, *rates)
-        kernel.adam_step(grid, gradient, touched, share, *rates, bias1, bias2, params.smoothness_weight)
+        kernel.adam_step(grid, gradient, touched, share, *rates, *bias, decay, params.smoothness_weight)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()

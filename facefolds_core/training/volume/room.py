@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.params import EnvironmentParams, RoomParams
+from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.volume import kernel, room_kernel
 from facefolds_core.training.volume.environment import Environment
 
@@ -110,9 +111,9 @@ class Room:
             return
         self._splat(seen, slope)
         self._steps += 1
-        bias1, bias2 = 1 / (1 - kernel.BETA1**self._steps), 1 / (1 - kernel.BETA2**self._steps)
+        rates = rate, colour_rate, *corrections(self.params.betas, self._steps), decays(self.params.betas)
         weight = self.params.smoothness_weight
-        kernel.adam_step(self.grid, self._gradient, self._touched, self._share, rate, colour_rate, bias1, bias2, weight)
+        kernel.adam_step(self.grid, self._gradient, self._touched, self._share, *rates, weight)
 
     def forget_unseen(self, origins: Array, directions: Array, through: Array) -> None:
         """Give voxels that no rays (R, 3) have reached, with transmittances (R,), the colours of their neighbours."""

@@ -3,14 +3,19 @@ is behind, a larger box only where the subject is cut off."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume.fit import Volume, VolumeFit
-from facefolds_core.training.volume.subject import body_at_centre, distances, positions, subject_of, without_room
+from facefolds_core.training.volume.outline import visible_points
+from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
+from facefolds_core.training.volume.walls import Wall, find_walls
 
 
 def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volume, tuple[Fact, ...]]:
@@ -33,7 +38,8 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
             fit = VolumeFit(scene, params.model_copy(update={"volume": volume}), outer=True)
             bar.total += coarse
             fit.run(0, bar)
-            share = cut_share(fit.volume(), params)
+            coarser = fit.volume()
+            share = cut_share(coarser, _walls(coarser, fit.cameras, params), params)
             if share < params.subject.max_cut:
                 break
             more = number + 1 < len(reaches)
@@ -41,16 +47,21 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
             notes.append(fact("cut_by_the_ball", share=share, reach=reach, then=then))
     for number in range(1, len(params.volume.levels)):
         fit.run(number, bar)
-    return subject_of(fit.finish(), params), tuple(notes)
+    found = fit.finish()
+    walls = _walls(found, fit.cameras, params) if fit.outer else ()
+    if walls:
+        notes.append(fact("walls", count=len(walls), margin=params.subject.walls.margin))
+    return subject_of(found, walls, params), tuple(notes)
 
 
-def cut_share(volume: Volume, params: ExplicitParams) -> float:
-    """Share of the subject's voxels that lie at the edge of the ball, neither behind nor below; 0 of nothing."""
-    wanted = params.subject
-    body = body_at_centre(volume, wanted.near, params.volume.body_depth)
-    body = without_room(volume, body, wanted)
+def _walls(volume: Volume, cameras: list[Camera], params: ExplicitParams) -> tuple[Wall, ...]:
+    return find_walls(visible_points(volume, cameras), cameras, volume.voxel, params.subject.walls)
+
+
+def cut_share(volume: Volume, walls: Sequence[Wall], params: ExplicitParams) -> float:
+    """Share of the subject's voxels that lie at the edge of the ball, but not below; 0 of nothing."""
+    body = body_before(volume, walls, params)
     distance, points, reach = distances(volume), positions(volume), volume.room.radius
     edge = body & (distance > reach - 2 * volume.voxel)
-    edge &= (points[..., 0] >= wanted.behind) | (points[..., 2] > 0.5 * distance)
-    edge &= points[..., 2] > -wanted.below * distance
+    edge &= points[..., 2] > -params.subject.below * distance
     return int(np.count_nonzero(edge)) / max(1, int(np.count_nonzero(body)))

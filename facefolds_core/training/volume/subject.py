@@ -1,18 +1,23 @@
-"""Which part of a volume is the subject: the body at the cameras' common centre, without the room it touches."""
+"""Which part of a volume is the subject: the body at the cameras' common centre, without the walls it touches."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.params import ExplicitParams, SubjectParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.walls import Wall
 
 Bool = NDArray[np.bool_]
+
+EMPTY = math.log(math.expm1(1e-5))
+"""Raw density of a voxel that holds nothing."""
 
 
 def body_at_centre(volume: Volume, near: float, body_depth: float) -> Bool:
@@ -27,36 +32,39 @@ def body_at_centre(volume: Volume, near: float, body_depth: float) -> Bool:
     return body
 
 
-def without_room(volume: Volume, body: Bool, params: SubjectParams) -> Bool:
-    """The part of `body` that is nearer, through it, to what is at the common centre, or before it, than to what lies
-    far behind it."""
-    distance, points = distances(volume), positions(volume)
-    own = body & ((distance < params.core) | (points[..., 0] > params.front))
-    behind = (points[..., 0] < params.behind) & (points[..., 2] > -params.below * distance)
-    room = body & (distance > params.rim) & behind
-    if not own.any() or not room.any():
-        return body
-    # Both grow until they have shared the body out.
-    before = -1
-    while (now := int(own.sum() + room.sum())) != before:
-        before = now
-        own = ndimage.binary_dilation(own, mask=body & ~room)
-        room = ndimage.binary_dilation(room, mask=body & ~own, iterations=params.room_speed)
-    return own
+def body_before(volume: Volume, walls: Sequence[Wall], params: ExplicitParams) -> Bool:
+    """(X, Y, Z): the body at the centre of a volume with an outer zone, without what belongs to `walls`."""
+    points = positions(volume)
+    solid = volume.grid.copy()
+    for wall in walls:
+        solid[wall.height(points) < params.subject.walls.margin, 0] = EMPTY
+    return body_at_centre(replace(volume, grid=solid), params.subject.near, params.subject.body_depth)
 
 
-def subject_of(volume: Volume, params: ExplicitParams) -> Volume:
-    """The volume with nothing in it but the subject."""
-    body = body_at_centre(volume, params.subject.near, params.volume.body_depth)
-    # Before a plain background there is no room to be told from a subject that is cut off by the ball.
+def subject_of(volume: Volume, walls: Sequence[Wall], params: ExplicitParams) -> Volume:
+    """The volume with nothing in it but the subject; what was taken out is kept as `removed` where there is an outer
+    zone.
+
+    Args:
+        walls: of `find_walls`; none without an outer zone.
+    """
     if volume.room.outer:
-        body = without_room(volume, body, params.subject)
-    elif body.sum() == (np.logaddexp(0, volume.grid[..., 0]) > params.volume.body_depth).sum():
-        return volume  # there is nothing else: faint hair around it stays, too
+        body = body_before(volume, walls, params)
+    else:
+        # Before a plain background there is no room to be told from a subject that is cut off by the ball.
+        body = body_at_centre(volume, params.subject.near, params.volume.body_depth)
+        if body.sum() == (np.logaddexp(0, volume.grid[..., 0]) > params.volume.body_depth).sum():
+            return volume  # there is nothing else: faint hair around it stays, too
     kept = ndimage.binary_dilation(body, iterations=2)
+    for wall in walls:
+        kept &= wall.height(positions(volume)) >= params.subject.walls.margin
     grid = volume.grid.copy()
-    grid[~kept, 0] = np.minimum(grid[~kept, 0], math.log(math.expm1(1e-5)))
-    return replace(volume, grid=grid)
+    grid[~kept, 0] = np.minimum(grid[~kept, 0], EMPTY)
+    if not volume.room.outer:
+        return replace(volume, grid=grid)
+    removed = volume.grid.copy()
+    removed[kept, 0] = np.minimum(removed[kept, 0], EMPTY)
+    return replace(volume, grid=grid, removed=removed)
 
 
 def positions(volume: Volume) -> NDArray[np.float64]:

@@ -1,0 +1,241 @@
+"""Which of many posed pictures were taken by one camera, and at which moment: for layouts that list pictures.
+
+Pictures of one camera have one pose. Where tools calibrate every picture by itself, the poses of one camera differ by a
+little: then names (a folder a camera, or a folder a frame) or times tell which belong together, and the poses must
+agree that they do.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.capture import closest_rotation
+from facefolds_core.captures.gathering import Calibration
+from facefolds_core.captures.normalization import nearest_to_axes
+from facefolds_core.captures.values import wrong
+from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.cameras import Camera
+
+Array = NDArray[np.float64]
+
+STILL = 0.01
+"""Poses of one camera differ by less than this: its place, over its distance from the subject, its axes in radians."""
+APART = 5.0
+"""Times as far from the next camera a camera stands, at least, as its own poses differ."""
+FEWEST = 3
+"""Cameras that poses which differ can be gathered into; fewer are one camera that moves."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One posed picture.
+
+    Attributes:
+        stem, folder: of its path: the name without extension, and the folder's.
+        time: seconds, where the layout says it.
+        w2c: (3, 4) world -> camera.
+    """
+
+    stem: str
+    folder: str
+    time: float | None
+    w2c: Array
+
+    @property
+    def centre(self) -> Array:
+        return -self.w2c[:, :3].T @ self.w2c[:, 3]
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Attributes:
+    cameras: name -> indices of its shots.
+    frames: names, in order.
+    frame_of: for each shot, the name of its frame.
+    gathered: whether poses that differ were taken for one camera's.
+    """
+
+    cameras: dict[str, list[int]]
+    frames: list[str]
+    frame_of: list[str]
+    gathered: bool
+
+
+def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
+    """Sort shots into cameras and frames.
+
+    Args:
+        path: of the file that lists them, for messages.
+
+    Raises:
+        UserError: if they show a single camera that moves.
+    """
+    groups = _by_pose(shots)
+    gathered = _gathered(shots, groups)
+    groups = gathered or groups
+    times = {shot.time for shot in shots}
+    if max(len(group) for group in groups) == 1:
+        if len(times) > 1:
+            raise wrong(
+                path,
+                "time",
+                "every camera is seen at one time only, as from a single moving camera",
+                "cameras that see every frame",
+                f"{len(groups)} cameras, {len(times)} times",
+                "use a capture of several fixed cameras; for a static scene, take the `time` keys out",
+            )
+        names = _unique([(shots[group[0]].stem, shots[group[0]].folder) for group in groups])
+        return Arrangement(dict(zip(names, groups, strict=True)), ["0"], ["0"] * len(shots), False)
+    timed = None not in times
+    named = _time_names([time for time in times if time is not None]) if timed else {}
+    stems = _frame_is_folder(shots, groups)
+    frame_of = [shot.folder if stems else shot.stem for shot in shots]
+    if timed:
+        frame_of = [named[shot.time] for shot in shots if shot.time is not None]
+    ordered = list(named.values()) if timed else sorted(set(frame_of))
+    firsts = [shots[group[0]] for group in groups]
+    cameras = _unique([(s.stem, s.folder) if stems else (s.folder, s.stem) for s in firsts])
+    return Arrangement(dict(zip(cameras, groups, strict=True)), ordered, frame_of, gathered is not None)
+
+
+def mean_calibration(some: Sequence[Calibration]) -> Calibration:
+    """One camera whose pictures were calibrated one by one: the mean of its calibrations.
+
+    Raises:
+        UserError: if some of them are a fisheye's and others not.
+    """
+    first = some[0]
+    if len(some) == 1:
+        return first
+    for other in some:
+        if (other.fisheye, other.coefficients.shape) != (first.fisheye, first.coefficients.shape):
+            raise wrong(
+                other.file, other.place, "two lens models of one camera", f"that of {first.place}", "another model"
+            )
+    K, coefficients = (np.mean(of, axis=0) for of in ([c.K for c in some], [c.coefficients for c in some]))
+    return replace(first, K=K, w2c=_mean_pose([c.w2c for c in some]), coefficients=coefficients)
+
+
+def jitter(cameras: Sequence[Sequence[Calibration]]) -> list[Fact]:
+    """A note on cameras whose pictures were calibrated one by one: how far these calibrations are from their means.
+
+    It is measured in pixels, on points about the point nearest to all optical axes.
+
+    Args:
+        cameras: the calibrations of each, all for pictures of one size.
+    """
+    sizes = [c[0].size for c in cameras]
+    means = [
+        Camera(m.name, m.K, m.w2c, *(size or (1, 1)))
+        for m, size in zip([mean_calibration(some) for some in cameras], sizes, strict=True)
+    ]
+    target = nearest_to_axes(means)
+    moved = {}
+    for mean, some in zip(means, cameras, strict=True):
+        if len(some) > 1:
+            each = [replace(mean, K=one.K, w2c=one.w2c) for one in some]
+            moved[mean.name] = _shift(each, mean, target)
+    if not moved:
+        return []
+    worst = max(moved, key=lambda name: moved[name])
+    return [fact("calibration_varies", cameras=len(moved), worst=worst, pixels=moved[worst])]
+
+
+def _mean_pose(poses: Sequence[Array]) -> Array:
+    """(3, 4): mean centre and mean rotation of poses (3, 4) of one camera."""
+    centre = np.mean([-pose[:, :3].T @ pose[:, 3] for pose in poses], axis=0)
+    rotation = closest_rotation(np.concatenate([np.mean([p[:, :3] for p in poses], axis=0), np.zeros((3, 1))], 1))
+    rotation[:, 3] = -rotation[:, :3] @ centre
+    return rotation
+
+
+def _shift(cameras: Sequence[Camera], mean: Camera, target: Array) -> float:
+    """Pixels by which cameras differ from their mean, at most, on points at and around `target` (3,)."""
+    reach = 0.1 * float(np.linalg.norm(mean.centre - target))
+    points = target + reach * np.concatenate([np.zeros((1, 3)), mean.rotation[:2], -mean.rotation[:2]])
+    straight = mean.project(points)[0]
+    return max(float(np.linalg.norm(camera.project(points)[0] - straight, axis=1).max()) for camera in cameras)
+
+
+def _by_pose(shots: Sequence[Shot]) -> list[list[int]]:
+    groups: dict[bytes, list[int]] = defaultdict(list)
+    for i, shot in enumerate(shots):
+        groups[np.round(shot.w2c, 7).tobytes()].append(i)
+    return list(groups.values())
+
+
+def _gathered(shots: Sequence[Shot], exact: list[list[int]]) -> list[list[int]] | None:
+    """Shots of poses that differ a little, by camera: None where equal poses tell, or nothing does."""
+    if len({len(group) for group in exact}) == 1 and len(exact[0]) > 1:
+        return None
+    for labels in (
+        [shot.folder for shot in shots],
+        [shot.stem for shot in shots],
+        _nearest_at_first(shots),
+    ):
+        groups: dict[object, list[int]] = defaultdict(list)
+        for i, label in enumerate(labels):
+            groups[label].append(i)
+        found = list(groups.values())
+        if FEWEST <= len(found) < len(exact) and _agree(shots, found):
+            return found
+    return None
+
+
+def _nearest_at_first(shots: Sequence[Shot]) -> list[object]:
+    """For each shot the shot of the first time whose pose is nearest; without times nothing is gathered."""
+    times = [shot.time for shot in shots if shot.time is not None]
+    if len(times) < len(shots) or len(set(times)) < 2:
+        return list(range(len(shots)))
+    first = [i for i, shot in enumerate(shots) if shot.time == min(times)]
+    centres = np.array([shots[i].centre for i in first])
+    found: list[object] = [first[int(np.argmin(np.linalg.norm(centres - s.centre, axis=1)))] for s in shots]
+    twice = Counter(zip(found, times, strict=True)).most_common(1)[0][1] > 1
+    return list(range(len(shots))) if twice else found
+
+
+def _agree(shots: Sequence[Shot], groups: list[list[int]]) -> bool:
+    """Whether the poses of each group are one camera's, and those of others are others'."""
+    means = [replace(shots[g[0]], w2c=_mean_pose([shots[i].w2c for i in g])) for g in groups]
+    centres = np.array([mean.centre for mean in means])
+    size = float(np.median(np.linalg.norm(centres - centres.mean(0), axis=1)))
+    spread = max(
+        float(np.linalg.norm(shots[i].centre - centre)) for g, centre in zip(groups, centres, strict=True) for i in g
+    )
+    turn = max(
+        float(np.linalg.norm(shots[i].w2c[:, :3] - mean.w2c[:, :3]))
+        for g, mean in zip(groups, means, strict=True)
+        for i in g
+    )
+    between = np.linalg.norm(centres[:, None] - centres, axis=-1) + np.where(np.eye(len(groups)) > 0, np.inf, 0.0)
+    return spread < STILL * size and turn < STILL * np.sqrt(2) and APART * spread < float(between.min())
+
+
+def _time_names(times: Iterable[float]) -> dict[float, str]:
+    """Names of moments, in order: six digits, or all of them where six are not enough to tell them apart."""
+    ordered = sorted(set(times))
+    short = [f"{time:g}" for time in ordered]
+    return dict(zip(ordered, short if len(set(short)) == len(short) else map(repr, ordered), strict=True))
+
+
+def _frame_is_folder(shots: Sequence[Shot], groups: list[list[int]]) -> bool:
+    """Whether the images of one camera share their name (so that folders are frames) or their folder."""
+    return all(len({shots[i].stem for i in group}) == 1 for group in groups)
+
+
+def _unique(candidates: list[tuple[str, str]]) -> list[str]:
+    """Names of cameras: the first choice of each where these differ, else the second, else both, else numbered."""
+    for names in (
+        [first for first, _ in candidates],
+        [second for _, second in candidates],
+        [f"{second}/{first}" for first, second in candidates],
+    ):
+        if max(Counter(names).values()) == 1:
+            return names
+    return [f"{first}-{i}" for i, (first, _) in enumerate(candidates)]

@@ -1,0 +1,223 @@
+"""COLMAP's sparse models: cameras and registered images, of the text and of the binary files.
+
+Formats and the parameters of each camera model: colmap/colmap, scripts/python/read_write_model.py, and
+https://colmap.github.io/format.html (the corner of the first pixel is (0, 0), its centre (0.5, 0.5)). Points are
+skipped.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.reading import is_regular, read_bytes, read_text
+
+Array = NDArray[np.float64]
+
+MODELS = {
+    0: ("SIMPLE_PINHOLE", 3), 1: ("PINHOLE", 4), 2: ("SIMPLE_RADIAL", 4), 3: ("RADIAL", 5), 4: ("OPENCV", 8),
+    5: ("OPENCV_FISHEYE", 8), 6: ("FULL_OPENCV", 12), 7: ("FOV", 5), 8: ("SIMPLE_RADIAL_FISHEYE", 4),
+    9: ("RADIAL_FISHEYE", 5), 10: ("THIN_PRISM_FISHEYE", 12), 11: ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
+}  # fmt: skip
+"""Number in binary files -> name, count of parameters."""
+ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE")
+"""Their parameters begin with f, cx, cy; those of the others with fx, fy, cx, cy."""
+UNREAD = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE")
+_REMEDY = "write the model again (`colmap model_converter`)"
+
+
+@dataclass(frozen=True)
+class ModelCamera:
+    """Intrinsics.
+
+    Attributes:
+        size: (width, height).
+        K: (3, 3).
+        coefficients, fisheye: as of `lens.Lens`.
+        place: in its file.
+    """
+
+    size: tuple[int, int]
+    K: Array
+    coefficients: Array
+    fisheye: bool
+    place: str
+
+
+@dataclass(frozen=True)
+class ModelImage:
+    """A registered image.
+
+    Attributes:
+        name: its path below the folder of images.
+        camera: the number of its camera.
+        w2c: (3, 4).
+        place: in its file.
+    """
+
+    name: str
+    camera: int
+    w2c: Array
+    place: str
+
+
+def model_folder(root: Path) -> Path | None:
+    """Where cameras and images of a model lie: in `root`, or where COLMAP's own tools put them below it."""
+    for folder in (root, root / "sparse" / "0", root / "sparse", root / "colmap" / "sparse" / "0"):
+        if any(all(is_regular(folder / f"{n}.{kind}") for n in ("cameras", "images")) for kind in ("bin", "txt")):
+            return folder
+    return None
+
+
+def read_model(folder: Path) -> tuple[dict[int, ModelCamera], list[ModelImage], Path]:
+    """Cameras by number, images in the order of their names, and the images' file.
+
+    Raises:
+        UserError: if a file is garbled, cut off, or names a camera that is not there or a model that is not read.
+    """
+    kind = "bin" if is_regular(folder / "cameras.bin") and is_regular(folder / "images.bin") else "txt"
+    first, second = folder / f"cameras.{kind}", folder / f"images.{kind}"
+    rows = _cameras_bin(first) if kind == "bin" else _cameras_txt(first)
+    cameras = {number: _camera(name, size, values, first, place) for number, name, size, values, place in rows}
+    posed = _images_bin(second) if kind == "bin" else _images_txt(second)
+    images = [ModelImage(name, camera, _w2c(pose, second, place), place) for name, camera, pose, place in posed]
+    for image in images:
+        if image.camera not in cameras:
+            found = f"camera {image.camera}"
+            raise _wrong(second, image.place, "an image of a camera that is not there", f"one of {first.name}", found)
+    if not images:
+        raise _wrong(second, None, "no image is registered", "images with poses", "none")
+    return cameras, sorted(images, key=lambda image: image.name), second
+
+
+def _wrong(file: Path, place: str | None, message: str, expected: object, found: object) -> UserError:
+    return UserError(message, file=file, place=place, expected=expected, found=found, remedy=_REMEDY)
+
+
+Row = tuple[int, str, tuple[int, int], list[float], str]
+Posed = tuple[str, int, list[float], str]
+
+
+def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, place: str) -> ModelCamera:
+    counts = dict(MODELS.values())
+    if name not in counts or name in UNREAD:
+        read = ", ".join(model for model in counts if model not in UNREAD)
+        raise UserError(
+            "a camera model that is not read",
+            file=file,
+            place=place,
+            expected=read,
+            found=name,
+            remedy="undistort with COLMAP first (`colmap image_undistorter`) and point `path` at what it writes",
+        )
+    if len(values) != counts[name] or not (np.abs(values) <= HUGE).all() or not 1 <= min(size) <= max(size) < 1 << 20:
+        expected = f"width, height and {counts[name]} finite numbers of {name}"
+        raise _wrong(file, place, "a garbled camera", expected, f"{size[0]} x {size[1]}, {values}")
+    focal, rest = (values[:1] * 2, values[1:]) if name in ONE_FOCAL else (values[:2], values[2:])
+    K = np.array([[focal[0], 0, rest[0]], [0, focal[1], rest[1]], [0, 0, 1]])
+    fisheye = name.endswith("FISHEYE")
+    given = rest[2:]
+    # All but FULL_OPENCV lack the last of OpenCV's coefficients; FULL_OPENCV has k1 k2 p1 p2 k3 k4 k5 k6, as `Lens`.
+    length = 4 if fisheye else max(5, len(given))
+    return ModelCamera(size, K, np.array(given + [0.0] * (length - len(given))), fisheye, place)
+
+
+def _w2c(pose: list[float], file: Path, place: str) -> Array:
+    """(3, 4) from a quaternion w, x, y, z and a translation."""
+    q, t = np.array(pose[:4]), np.array(pose[4:])
+    length = np.linalg.norm(q)
+    if not (np.abs(pose) <= HUGE).all() or not 0.5 < length < 2:
+        raise _wrong(file, place, "a garbled pose", "a quaternion of length 1 and a translation", pose)
+    w, x, y, z = q / length
+    rotation = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.concatenate([np.array(rotation), t[:, None]], 1)
+
+
+def _cameras_txt(file: Path) -> Iterator[Row]:
+    for number, line in enumerate(read_text(file, _REMEDY, expected=file.name).splitlines(), 1):
+        if line.strip() and not line.startswith("#"):
+            place, parts = f"line {number}", line.split()
+            try:
+                size = (int(parts[2]), int(parts[3]))
+                yield int(parts[0]), parts[1], size, [float(part) for part in parts[4:]], place
+            except (ValueError, IndexError):
+                raise _wrong(file, place, "a garbled camera", "number, model, width, height, numbers", line) from None
+
+
+def _images_txt(file: Path) -> Iterator[Posed]:
+    """Every second line lists an image's points; it may be empty, and is skipped."""
+    points = False
+    for number, line in enumerate(read_text(file, _REMEDY, expected=file.name).splitlines(), 1):
+        if points:
+            points = False
+        elif line.strip() and not line.startswith("#"):
+            parts, points = line.strip().split(maxsplit=9), True
+            try:
+                yield parts[9], int(parts[8]), [float(part) for part in parts[1:8]], f"line {number}"
+            except (ValueError, IndexError):
+                expected = "number, qw, qx, qy, qz, tx, ty, tz, camera, name"
+                raise _wrong(file, f"line {number}", "a garbled image", expected, line[:200]) from None
+
+
+class _Bytes:
+    """A binary file, read from its beginning."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.data, self.at = file, read_bytes(file, _REMEDY), 0
+
+    def take(self, form: str) -> tuple[float, ...]:
+        size = struct.calcsize("<" + form)
+        self.check(size)
+        self.at += size
+        return struct.unpack_from("<" + form, self.data, self.at - size)
+
+    def name(self) -> str:
+        end = self.data.find(b"\0", self.at)
+        self.check(len(self.data) if end < 0 else 0)
+        start, self.at = self.at, end + 1
+        try:
+            return self.data[start:end].decode()
+        except UnicodeDecodeError:
+            raise _wrong(self.file, f"byte {start}", "a garbled name", "UTF-8", "other bytes") from None
+
+    def skip(self, size: int) -> None:
+        self.check(size)
+        self.at += size
+
+    def check(self, size: int) -> None:
+        if self.at + size > len(self.data):
+            found = f"{len(self.data)} bytes"
+            raise _wrong(self.file, f"byte {self.at}", "cut off, or garbled", "more bytes", found)
+
+
+def _cameras_bin(file: Path) -> Iterator[Row]:
+    data = _Bytes(file)
+    (count,) = data.take("Q")
+    for _ in range(int(count)):
+        place = f"byte {data.at}"
+        number, model, width, height = (int(value) for value in data.take("iiQQ"))
+        name, parameters = MODELS.get(model, (f"number {model}", 0))
+        yield number, name, (width, height), list(data.take("d" * parameters)), place
+
+
+def _images_bin(file: Path) -> Iterator[Posed]:
+    data = _Bytes(file)
+    (count,) = data.take("Q")
+    for _ in range(int(count)):
+        place = f"byte {data.at}"
+        values = data.take("idddddddi")
+        name = data.name()
+        (points,) = data.take("Q")
+        data.skip(24 * int(points))
+        yield name, int(values[8]), list(values[1:8]), place

@@ -1,0 +1,205 @@
+"""From a capture's pictures to the scene's: decoded, freed from distortion, averaged down, colours corrected.
+
+Cores work side by side, and the order of the pictures is the same on every machine: photos come in the order of the
+rows; of videos `LANES` are read at once, a picture of each in turn. Memory holds a few pictures a core, however long
+the capture is.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from queue import Empty, Full, Queue
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.capture import Capture, check_plate_size, wrong_size
+from facefolds_core.captures.images import corrected_colour, display_colour, downsample, to_8bit
+from facefolds_core.captures.lens import Lens, undistort
+from facefolds_core.captures.picture import Picture, VideoFrame, decoded
+from facefolds_core.captures.videos import Channels
+from facefolds_core.frame_store import Image
+from facefolds_core.params import NormalizeParams
+
+T = TypeVar("T")
+LANES = 8
+"""Videos that are read at once: the order of the rows in the frame store depends on it, so it is no parameter."""
+_AHEAD = 3
+"""Pictures that a lane may be ahead of the writer."""
+
+
+@dataclass(frozen=True)
+class Negative:
+    """A picture to develop.
+
+    Attributes:
+        key: (camera, frame) in the scene.
+        view: index of the camera in the capture.
+        picture: where it lies.
+        place: in words.
+    """
+
+    key: tuple[int, int]
+    view: int
+    picture: Picture
+    place: str
+
+
+Row = tuple[int, int, Image]
+"""Camera and frame in the scene, and the picture."""
+
+
+def photos(
+    capture: Capture, negatives: Sequence[Negative], width: int, height: int, params: NormalizeParams
+) -> Iterator[Row]:
+    """Colour pictures (height, width, 3).
+
+    Raises:
+        UserError: if one is damaged, or of another size than its camera's.
+    """
+
+    def finish(negative: Negative, photo: Image) -> Image:
+        values = downsample(photo, width, height)
+        colour = capture.views[negative.view].colour
+        if colour is not None:
+            values = corrected_colour(values, colour)
+        return to_8bit(display_colour(values) if params.display_colour else values)
+
+    return _developed(capture, negatives, "rgb", finish)
+
+
+def opacities(capture: Capture, negatives: Sequence[Negative], width: int, height: int) -> Iterator[Row]:
+    """Masks or mattes (height, width, 1); raises like `photos`."""
+    return _developed(capture, negatives, "opacity", lambda _, mask: to_8bit(downsample(mask, width, height)))
+
+
+def _developed(
+    capture: Capture, negatives: Sequence[Negative], channels: Channels, finish: Callable[[Negative, Image], Image]
+) -> Iterator[Row]:
+    """Rows of the scene, a bounded number of them ahead of who asks."""
+
+    def develop(negative: Negative, photo: Image) -> Row:
+        camera = capture.views[negative.view].camera
+        size = photo.shape[1], photo.shape[0]
+        if negative.picture is capture.plates.get(negative.view):
+            check_plate_size(capture, negative.view, size)
+        elif size != (camera.width, camera.height):
+            expected = f"{camera.width} x {camera.height}, as its header says"
+            raise wrong_size(negative.picture.file, negative.place, size, expected)
+        lens = capture.views[negative.view].lens
+        straight = photo if lens is None else undistort(photo, _maps(lens, *size))
+        return (*negative.key, finish(negative, straight))
+
+    cores = os.cpu_count() or 1
+    if not any(isinstance(negative.picture, VideoFrame) for negative in negatives):
+
+        def single(negative: Negative) -> Row:
+            (photo,) = decoded([(negative.picture, negative.place)], channels)
+            return develop(negative, photo)
+
+        yield from _in_order(single, negatives, cores)
+        return
+    working = threading.BoundedSemaphore(cores)  # full-size pictures in floats are large: one a core
+    threads = -(-cores // LANES)
+
+    def lane(wanted: Sequence[Negative]) -> Iterator[Row]:
+        pictures = decoded([(negative.picture, negative.place) for negative in wanted], channels, threads)
+        for negative, photo in zip(wanted, pictures, strict=True):
+            with working:
+                row = develop(negative, photo)
+            yield row
+
+    videos = [list(group) for _, group in itertools.groupby(negatives, lambda negative: negative.view)]
+    for start in range(0, len(videos), LANES):
+        yield from _in_turn([lane(wanted) for wanted in videos[start : start + LANES]])
+
+
+@lru_cache(maxsize=LANES)
+def _maps(lens: Lens, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """`Lens.maps`, kept while the frames of a camera are read."""
+    return lens.maps(width, height)
+
+
+def _in_order(function: Callable[[Negative], T], items: Sequence[Negative], cores: int) -> Iterator[T]:
+    """`map` on several threads, in order, two items a core ahead."""
+    with ThreadPoolExecutor(cores) as pool:
+        waiting: deque[Future[T]] = deque()
+        try:
+            for item in items:
+                waiting.append(pool.submit(function, item))
+                if len(waiting) > 2 * cores:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+class _End:
+    """What a lane puts last: the exception that ended it, or None."""
+
+    def __init__(self, error: BaseException | None) -> None:
+        self.error = error
+
+
+def _in_turn(lanes: Sequence[Iterator[T]]) -> Iterator[T]:
+    """One item of each lane in turn until all are at their end, each lane on its own thread."""
+    stop = threading.Event()
+    queues: list[Queue[T | _End]] = [Queue(_AHEAD) for _ in lanes]
+
+    def put(queue: Queue[T | _End], item: T | _End) -> None:
+        while not stop.is_set():
+            try:
+                return queue.put(item, timeout=0.2)
+            except Full:
+                continue
+
+    def run(lane: Iterator[T], queue: Queue[T | _End]) -> None:
+        error: BaseException | None = None
+        try:
+            for item in lane:
+                put(queue, item)
+                if stop.is_set():
+                    break
+        except BaseException as found:
+            error = found
+        put(queue, _End(error))
+
+    threads = [threading.Thread(target=run, args=pair, daemon=True) for pair in zip(lanes, queues, strict=True)]
+    for thread in threads:
+        thread.start()
+    try:
+        running = list(queues)
+        while running:
+            for queue in list(running):
+                item = queue.get()
+                if not isinstance(item, _End):
+                    yield item
+                    continue
+                if item.error is not None:
+                    raise item.error
+                running.remove(queue)
+    finally:
+        stop.set()
+        for queue in queues:
+            _empty(queue)
+        for thread in threads:
+            thread.join()
+
+
+def _empty(queue: Queue[T]) -> None:
+    """Empty a queue, so that who waits to put something there goes on."""
+    try:
+        while True:
+            queue.get_nowait()
+    except Empty:
+        return

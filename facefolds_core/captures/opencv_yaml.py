@@ -1,0 +1,66 @@
+"""Files that OpenCV's `FileStorage` writes: YAML 1.0 with matrices of its own tag, read as plain YAML.
+
+OpenCV's own reader is not used: it prints to the terminal, and says of a damaged file neither line nor key.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.values import is_number, short
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.parsing import parse_yaml
+from facefolds_core.reading import read_text
+
+REMEDY = "write the calibration again with the tool that made it"
+
+
+def read_storage(path: Path, missing: str) -> dict[str, Any]:
+    """Key -> value of such a file; matrices are mappings {rows, cols, dt, data} still (`matrix_of`).
+
+    Args:
+        missing: the remedy where there is no such file.
+
+    Raises:
+        UserError: if it is missing or garbled; names the line.
+    """
+    text = read_text(path, missing, expected=path.name)
+    # "%YAML:1.0" is no directive of any YAML, and the tag tells no more than the mapping itself.
+    text = re.sub(r"\A\s*%YAML[^\n]*\n", "\n", text).replace("!!opencv-matrix", "")
+    value = parse_yaml(text, path, REMEDY)
+    if not isinstance(value, dict):
+        raise UserError("not OpenCV's YAML", file=path, expected="keys and matrices", found=short(value), remedy=REMEDY)
+    return value
+
+
+def matrix_of(
+    storage: dict[str, Any], key: str, shapes: tuple[tuple[int, int], ...], path: Path
+) -> NDArray[np.float64] | None:
+    """(rows, cols) of finite numbers, or None where the key is not there.
+
+    Raises:
+        UserError: for anything else; names the key.
+    """
+    value = storage.get(key)
+    if value is None:
+        return None
+
+    def refuse(expected: str, found: object) -> UserError:
+        return UserError("not a matrix", file=path, place=key, expected=expected, found=found, remedy=REMEDY)
+
+    if not isinstance(value, dict) or not isinstance(value.get("data"), list):
+        raise refuse("rows, cols, dt, data", short(value))
+    shape, data = (value.get("rows"), value.get("cols")), value["data"]
+    if shape not in shapes or len(data) != shape[0] * shape[1]:
+        found = f"{shape[0]} x {shape[1]} of {len(data)} numbers"
+        raise refuse(" or ".join(f"{rows} x {cols}" for rows, cols in shapes[:3]), found)
+    odd = [number for number in data if not is_number(number) or not abs(number) <= HUGE]
+    if odd:
+        raise refuse(f"finite numbers, none above {HUGE:g}", short(odd[0]))
+    return np.array(data, float).reshape(shape)

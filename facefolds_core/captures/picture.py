@@ -1,0 +1,250 @@
+"""One picture of a capture, wherever it lies: a file, bytes inside a zip or an HDF5 file, a frame of a video.
+
+Readers say where pictures lie (`Picture`), `normalize` asks for their sizes without decoding them, then for their
+pixels. Frames of videos are decoded in order (`decoded`): a video is read once.
+"""
+
+from __future__ import annotations
+
+import itertools
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Protocol
+
+import h5py
+import numpy as np
+
+from facefolds_core.captures.images import Image, decode_image, decode_mask, image_size, opacity_of, rgb_of
+from facefolds_core.captures.videos import Channels, Video
+from facefolds_core.errors import UserError
+from facefolds_core.pictures import FORMATS, DamagedPictureError, picture_size
+from facefolds_core.reading import check_regular
+
+_REMEDY = "copy the file again from its source, or take this camera out of the capture"
+_HEAD = 1 << 16
+"""Bytes that hold the header of any picture that a camera or an encoder writes."""
+
+
+class Picture(Protocol):
+    """One picture. `place` is camera and frame in words, for messages; every method raises `UserError` with them."""
+
+    @property
+    def file(self) -> Path:
+        """The file that it lies in."""
+
+    def size(self, place: str) -> tuple[int, int]:
+        """(width, height), from a header: pixels are not decoded."""
+
+    def rgb(self, place: str) -> Image:
+        """(H, W, 3) uint8."""
+
+    def opacity(self, place: str) -> Image:
+        """(H, W, 1) uint8 of a picture that is a mask: 255 is the subject."""
+
+
+@dataclass(frozen=True)
+class FilePicture:
+    """A PNG or JPEG file."""
+
+    file: Path
+
+    def size(self, place: str) -> tuple[int, int]:
+        return image_size(self.file, place)
+
+    def rgb(self, place: str) -> Image:
+        return decode_image(self.file, place)
+
+    def opacity(self, place: str) -> Image:
+        return decode_mask(self.file, place)
+
+
+@dataclass(frozen=True)
+class ZipPicture:
+    """An encoded picture in a zip archive.
+
+    Attributes:
+        file: the archive.
+        member: the picture's name in it.
+        formats: what it may be.
+    """
+
+    file: Path
+    member: str
+    formats: tuple[str, ...] = FORMATS
+
+    def size(self, place: str) -> tuple[int, int]:
+        return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), self.formats)
+
+    def rgb(self, place: str) -> Image:
+        return rgb_of(self._bytes(place), self.file, self._at(place), self.formats)
+
+    def opacity(self, place: str) -> Image:
+        return opacity_of(self._bytes(place), self.file, self._at(place), self.formats)
+
+    def _at(self, place: str) -> str:
+        return f"{place} ({self.member})"
+
+    def _bytes(self, place: str, most: int = -1) -> bytes:
+        return read_member(self.file, self.member, self._at(place), most)
+
+
+@dataclass(frozen=True)
+class Hdf5Picture:
+    """An encoded picture in an HDF5 file: a data set of its bytes. Of a coloured mask the largest channel counts.
+
+    Attributes:
+        file: the HDF5 file.
+        dataset: the path of the data set in it.
+    """
+
+    file: Path
+    dataset: str
+
+    def size(self, place: str) -> tuple[int, int]:
+        data = self._bytes(place)
+        return _size_of(data, lambda: data, self.file, self._at(place), FORMATS)
+
+    def rgb(self, place: str) -> Image:
+        return rgb_of(self._bytes(place), self.file, self._at(place))
+
+    def opacity(self, place: str) -> Image:
+        return opacity_of(self._bytes(place), self.file, self._at(place), largest=True)
+
+    def _at(self, place: str) -> str:
+        return f"{place} ({self.dataset})"
+
+    def _bytes(self, place: str) -> bytes:
+        try:
+            value = open_hdf5(self.file)[self.dataset]
+            data = value[()] if isinstance(value, h5py.Dataset) else None
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            raise _wrong(self.file, self._at(place), "cannot read an image", str(error)) from None
+        if data is None or np.asarray(data).dtype.kind not in "uiSV":
+            raise _wrong(self.file, self._at(place), "cannot read an image", "a data set that is no bytes")
+        return np.asarray(data).tobytes()
+
+
+@dataclass(frozen=True)
+class VideoFrame:
+    """A frame of a video. `decoded` reads many in one go; by itself, all before it are decoded, too.
+
+    Attributes:
+        video: whose.
+        index: its position, from 0.
+    """
+
+    video: Video
+    index: int
+
+    @property
+    def file(self) -> Path:
+        return self.video.file
+
+    def size(self, place: str) -> tuple[int, int]:
+        return self.video.facts().size
+
+    def rgb(self, place: str) -> Image:
+        return next(self.video.frames([self.index], "rgb"))
+
+    def opacity(self, place: str) -> Image:
+        return next(self.video.frames([self.index], "opacity"))
+
+
+def decoded(pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1) -> Iterator[Image]:
+    """The pixels of pictures, one after the other; frames of one video that follow one another cost one reading.
+
+    Args:
+        pictures: each with its place; frames of a video in the order of time.
+        channels: "rgb" (H, W, 3) or "opacity" (H, W, 1).
+        threads: of a video's decoder.
+
+    Raises:
+        UserError: if one is missing or damaged.
+    """
+
+    def video_of(item: tuple[Picture, str]) -> Video | None:
+        return item[0].video if isinstance(item[0], VideoFrame) else None
+
+    for video, run in itertools.groupby(pictures, video_of):
+        if video is not None:
+            indices = [picture.index for picture, _ in run if isinstance(picture, VideoFrame)]
+            yield from video.frames(indices, channels, threads)
+        else:
+            for picture, place in run:
+                yield picture.rgb(place) if channels == "rgb" else picture.opacity(place)
+
+
+def _size_of(
+    head: bytes, whole: Callable[[], bytes], file: Path, place: str, formats: Sequence[str]
+) -> tuple[int, int]:
+    """(width, height) from a picture's first bytes, or from all of them where its header is longer."""
+    try:
+        return picture_size(head, formats)
+    except (OSError, DamagedPictureError):
+        pass
+    try:
+        return picture_size(whole(), formats)
+    except (OSError, DamagedPictureError) as error:
+        raise _wrong(file, place, "cannot read an image", str(error)) from None
+
+
+def _wrong(file: Path, place: str | None, message: str, found: str) -> UserError:
+    return UserError(message, file=file, place=place, found=found, remedy=_REMEDY)
+
+
+_DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, ValueError, NotImplementedError)
+
+
+def read_member(file: Path, member: str, place: str | None = None, most: int = -1) -> bytes:
+    """Bytes of a member of a zip archive: all, with its checksum, or the first `most`.
+
+    Raises:
+        UserError: if the archive or the member is missing or damaged.
+    """
+    try:
+        with open_zip(file).open(member) as stream:
+            return stream.read(most)
+    except KeyError:
+        raise _wrong(file, place, "an image is missing", f"no {member} in the archive") from None
+    except _DAMAGE as error:
+        raise _wrong(file, place, "a damaged zip archive", str(error) or type(error).__name__) from None
+
+
+def open_zip(file: Path) -> zipfile.ZipFile:
+    """An archive, opened once; threads may share it.
+
+    Raises:
+        UserError: if it is missing, or none.
+    """
+    check_regular(file, _REMEDY)
+    return _open_zip(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=256)
+def _open_zip(file: Path, _changed: int) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(file)
+    except _DAMAGE as error:
+        raise _wrong(file, None, "a damaged zip archive", str(error) or type(error).__name__) from None
+
+
+def open_hdf5(file: Path) -> h5py.File:
+    """An HDF5 file, opened once; threads may share it.
+
+    Raises:
+        UserError: if it is missing, or none.
+    """
+    check_regular(file, _REMEDY)
+    return _open_hdf5(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _open_hdf5(file: Path, _changed: int) -> h5py.File:
+    try:
+        return h5py.File(file, "r")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise _wrong(file, None, "a damaged HDF5 file", str(error)) from None

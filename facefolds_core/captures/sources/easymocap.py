@@ -1,0 +1,160 @@
+"""EasyMocap's layout, which ZJU-MoCap and EasyVolcap share.
+
+    intri.yml           names, K_CAM, D_CAM or dist_CAM, H_CAM and W_CAM
+    extri.yml           R_CAM (Rodrigues) or Rot_CAM, T_CAM
+    images/CAM/000000.jpg   or CAM/000000.jpg, as in ZJU-MoCap, or videos/CAM.mp4
+    mask*/CAM/000000.png    opacity, where there is any
+
+World to camera, OpenCV's axes, its five coefficients of distortion and its pixel coordinates (the first pixel's centre
+at 0); any unit. Read from zju3dv/EasyMocap: easymocap/mytools/camera_utils.py (keys) and doc/dataset.md (folders), and
+zju3dv/EasyVolcap: easyvolcap/utils/easy_utils.py (Rot_ where R_ is missing, ccm_). Masks of ZJU-MoCap (mask_cihp) are
+labels of parts, 0 to 19: what is not 0 is the subject, as zju3dv's readers take it. annots.npy of ZJU-MoCap is a
+pickle, which can run code, and is not read.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.gathering import Calibration, footage, gather, inside, pictures_in
+from facefolds_core.captures.images import decode_mask
+from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
+from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.recognition import Recognised
+from facefolds_core.captures.values import short
+from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.params import CaptureParams, Subject
+from facefolds_core.reading import is_regular
+
+FPS = 30.0
+PIXEL_CENTRES = 0.0
+VIDEOS = (".mp4", ".mov", ".mkv", ".avi", ".m4v", ".webm")
+_LABELS = 32
+"""A mask of no larger value than this has labels of parts of the body, not opacity."""
+_MISSING = "point `path` at the folder that holds intri.yml and extri.yml"
+
+
+def recognise(root: Path) -> Recognised | None:
+    """A folder with intri.yml and extri.yml."""
+    if not all(is_regular(root / name) for name in ("intri.yml", "extri.yml")):
+        return None
+    return Recognised("a capture of EasyMocap (ZJU-MoCap, EasyVolcap)", root)
+
+
+@dataclass(frozen=True)
+class MaskFile(FilePicture):
+    """A mask of opacity, or of labels."""
+
+    def opacity(self, place: str) -> NDArray[np.uint8]:
+        values = decode_mask(self.file, place)
+        return np.where(values > 0, 255, 0).astype(np.uint8) if values.max() <= _LABELS else values
+
+
+def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
+    """Read everything but the pixels.
+
+    Args:
+        root: folder with intri.yml and extri.yml.
+
+    Raises:
+        UserError: if these are missing or garbled, or neither pictures nor videos are there.
+    """
+    intri = read_storage(root / "intri.yml", _MISSING)
+    extri = read_storage(root / "extri.yml", _MISSING)
+    names = _names(intri, root / "intri.yml")
+    calibrations = [_calibration(root, intri, extri, name) for name in names]
+    folders = root / "images" if (root / "images").is_dir() else root
+    photos = {name: pictures_in(folders / name) for name in names}
+    if folders != root:
+        photos |= {folder.name: pictures_in(folder) for folder in inside(folders) if folder.is_dir()}
+    fps = FPS
+    if not any(photos.values()):
+        photos, fps = _videos(root, subject)
+    masks, facts = _masks(root, names)
+    return gather(
+        root, calibrations, photos, subject, masks=masks, fps=fps, pixel_centres=PIXEL_CENTRES, left_out=facts
+    )
+
+
+def _names(intri: dict[str, Any], path: Path) -> list[str]:
+    """`names`; where they are missing, those of K_NAME."""
+    names = intri.get("names", [key[2:] for key in intri if key.startswith("K_")])
+    if not isinstance(names, list) or not names or not all(isinstance(name, str | int) for name in names):
+        raise UserError(
+            "no names of cameras", file=path, place="names", expected="a list", found=short(names), remedy=REMEDY
+        )
+    texts = [str(name) for name in names if name != "none"]  # EasyMocap ends its lists with "none"
+    twice = [name for name, count in Counter(texts).items() if count > 1]
+    if twice:
+        raise UserError("a camera appears twice", file=path, place="names", found=shorten(twice), remedy=REMEDY)
+    return texts
+
+
+def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name: str) -> Calibration:
+    inner, outer = root / "intri.yml", root / "extri.yml"
+    K = matrix_of(intri, f"K_{name}", ((3, 3),), inner)
+    if K is None:
+        raise _lacks(inner, f"K_{name}")
+    lengths = tuple(shape for n in (5, 4, 8) for shape in ((n, 1), (1, n)))
+    bent = matrix_of(intri, f"D_{name}", lengths, inner)
+    bent = matrix_of(intri, f"dist_{name}", lengths, inner) if bent is None else bent
+    coefficients = np.zeros(5) if bent is None else np.pad(bent.ravel(), (0, max(0, 5 - bent.size)))
+    turn = matrix_of(extri, f"R_{name}", ((3, 1), (1, 3)), outer)
+    rotation = matrix_of(extri, f"Rot_{name}", ((3, 3),), outer)
+    if turn is not None:
+        rotation = np.asarray(cv2.Rodrigues(turn.ravel())[0], float)
+    if rotation is None:
+        raise _lacks(outer, f"R_{name}")
+    translation = matrix_of(extri, f"T_{name}", ((3, 1), (1, 3)), outer)
+    if translation is None:
+        raise _lacks(outer, f"T_{name}")
+    w2c = np.concatenate([rotation, translation.reshape(3, 1)], 1)
+    sides = [intri.get(f"{side}_{name}") for side in "WH"]
+    known = all(isinstance(s, int | float) and not isinstance(s, bool) and 1 <= s < 1e6 for s in sides)
+    size = (round(float(sides[0] or 0)), round(float(sides[1] or 0))) if known else None
+    return Calibration(name, K, w2c, inner, f"camera {name}", coefficients, size=size)
+
+
+def _lacks(path: Path, key: str) -> UserError:
+    return UserError("a key is missing", file=path, place=key, expected="a matrix", found="nothing", remedy=REMEDY)
+
+
+def _videos(root: Path, subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
+    """Camera -> frame -> picture, and frames a second."""
+    files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in VIDEOS}
+    if not files:
+        pickle = is_regular(root / "annots.npy")
+        raise UserError(
+            "neither pictures nor videos",
+            file=root,
+            expected="images/CAM/000000.jpg or videos/CAM.mp4",
+            found=shorten([path.name for path in inside(root)]) or "nothing",
+            remedy="copy the pictures" + (" (annots.npy is a pickle: it is not read)" if pickle else ""),
+        )
+    return footage(files, subject)
+
+
+def _masks(root: Path, names: list[str]) -> tuple[dict[str, dict[str, Picture]], list[Fact]]:
+    """Of the first folder mask* that has any, and a note where there are several."""
+    found: dict[str, dict[str, dict[str, Picture]]] = {}
+    for folder in inside(root):
+        if folder.is_dir() and folder.name.startswith("mask"):
+            masks: dict[str, dict[str, Picture]] = {
+                name: {stem: MaskFile(picture.file) for stem, picture in pictures_in(folder / name).items()}
+                for name in names
+            }
+            if any(masks.values()):
+                found[folder.name] = masks
+    if not found:
+        return {}, []
+    first, *others = found
+    return found[first], [fact("masks_chosen", chosen=first, others=others)] if others else []

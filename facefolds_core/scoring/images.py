@@ -1,0 +1,161 @@
+"""All metrics of renderings of one view (docs/reference/metrics.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors
+from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
+from facefolds_core.scoring.panels import ALL_METRICS, FOUND_METRICS, METRICS, SUBJECT_METRICS
+from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
+from facefolds_core.scoring.truths import MatteKind, Truth
+
+MASK_EDGE = 0.1
+"""The subject is where its opacity exceeds this: for the box of the perceptual metrics, and to tell an empty mask."""
+MASK_MARGIN = 8
+"""Pixels added to that box on each side, within the frame."""
+
+Image = NDArray[np.float32]
+Values = dict[str, float | None]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A picture that lets something through.
+
+    Attributes:
+        rgb: (H, W, 3) over black.
+        alpha: (H, W).
+    """
+
+    rgb: Image
+    alpha: Image
+
+    def over(self, background: ArrayLike) -> Image:
+        """(H, W, 3) over RGB in [0, 1], (3,) or (H, W, 3)."""
+        behind: Image = (1 - self.alpha)[..., None] * np.asarray(background, np.float32)
+        return self.rgb + behind
+
+
+def score_renderings(
+    renderings: Mapping[str, Rendering],
+    truth: Truth,
+    kind: MatteKind,
+    background: ArrayLike,
+    band: float,
+    perceptual: Perceptual,
+) -> dict[str, Values]:
+    """Every metric of every variant, `None` where it cannot be had.
+
+    Args:
+        renderings: by variant, "model" among them: it is what `found` goes by.
+        kind: which opacity says where the subject is.
+        background: RGB shown where a rendering is transparent.
+        band: pixels to both sides of the outline.
+    """
+    pictures = {variant: shown(one.over(background)) for variant, one in renderings.items()}
+    result = score_images(pictures, truth.picture, truth.mask, perceptual)
+    within = (
+        {} if kind == "true" else region_scores(pictures, truth.picture, region_of(kind, truth, renderings), perceptual)
+    )
+    parts = None if truth.mask is None else interior_and_band(truth.mask, band)
+    for variant, one in renderings.items():
+        values = result[variant]
+        if variant in within:
+            values |= dict(zip(FOUND_METRICS, within[variant].values(), strict=True))
+        over = None if truth.plate is None else shown(one.over(truth.plate))
+        if over is not None:
+            values |= {"psnr_over_plate": psnr(over, truth.picture), "ssim_over_plate": ssim(over, truth.picture)}
+        if truth.mask is not None and parts is not None:
+            alpha = np.clip(one.alpha.astype(np.float64), 0, 1)
+            values |= matte_errors(alpha, truth.mask)
+            values |= _outline(pictures[variant], over, truth.picture, truth.mask, *parts)
+    return result
+
+
+def region_of(kind: MatteKind, truth: Truth, renderings: Mapping[str, Rendering]) -> Array | None:
+    """(H, W) opacity of the subject, as far as it is known."""
+    if kind == "true":
+        return truth.mask
+    if kind == "scene":
+        return truth.matte
+    return np.clip(renderings["model"].alpha.astype(np.float64), 0, 1)
+
+
+def _outline(image: Array, over: Array | None, truth: Array, mask: Array, interior: Region, edge: Region) -> Values:
+    """PSNR inside the outline and along it.
+
+    Without a plate nobody knows what is behind a half-covered pixel: there the mask weighs.
+    """
+    return {
+        "psnr_interior": psnr(image, truth, interior.astype(np.float64)),
+        "psnr_band": psnr(image, truth, edge * mask),
+        "psnr_band_over_plate": None if over is None else psnr(over, truth, edge.astype(np.float64)),
+    }
+
+
+def score_images(
+    images: Mapping[str, Array], truth: Array, mask: Array | None, perceptual: Perceptual
+) -> dict[str, Values]:
+    """Metrics over the whole frame, and of the subject where its mask is known; all others None.
+
+    Args:
+        images: name -> (H, W, 3) in [0, 1].
+        truth: (H, W, 3).
+        mask: (H, W) opacity of the subject, or None.
+    """
+    pictures = list(images.values())
+    lpips = _distances(perceptual.lpips, pictures, truth)
+    st_lpips = _distances(perceptual.st_lpips, pictures, truth)
+    within = region_scores(images, truth, mask, perceptual)
+    result: dict[str, Values] = {}
+    for i, (name, image) in enumerate(images.items()):
+        values: Values = dict.fromkeys(ALL_METRICS)
+        whole = (psnr(image, truth), ssim(image, truth), lpips[i], st_lpips[i])
+        values |= dict(zip(METRICS, whole, strict=True))
+        if name in within:
+            values |= dict(zip(SUBJECT_METRICS, within[name].values(), strict=True))
+        result[name] = values
+    return result
+
+
+def region_scores(
+    images: Mapping[str, Array], truth: Array, region: Array | None, perceptual: Perceptual
+) -> dict[str, Values]:
+    """METRICS of each image, weighted with a region (H, W); nothing where there is none, or it is empty."""
+    box = None if region is None else subject_box(region)
+    if region is None or box is None:
+        return {}
+    cut = [(image * region[..., None])[box] for image in [truth, *images.values()]]
+    lpips = _distances(perceptual.lpips, cut[1:], cut[0])
+    st_lpips = _distances(perceptual.st_lpips, cut[1:], cut[0])
+    return {
+        name: dict(
+            zip(METRICS, (psnr(image, truth, region), ssim(image, truth, region), lpips[i], st_lpips[i]), strict=True)
+        )
+        for i, (name, image) in enumerate(images.items())
+    }
+
+
+def subject_box(mask: Array) -> tuple[slice, slice] | None:
+    """Rows and columns of the subject with a margin; None where the mask is empty."""
+    rows, columns = np.nonzero(mask > MASK_EDGE)
+    if not len(rows):
+        return None
+    return (
+        slice(max(0, rows.min() - MASK_MARGIN), rows.max() + 1 + MASK_MARGIN),
+        slice(max(0, columns.min() - MASK_MARGIN), columns.max() + 1 + MASK_MARGIN),
+    )
+
+
+def _distances(metric: PerceptualDistance | None, images: list[Array], truth: Array) -> list[float | None]:
+    if metric is None:
+        return [None] * len(images)
+    device = metric.shift.device
+    stack = torch.tensor(np.stack([truth, *images]), dtype=torch.float32, device=device).permute(0, 3, 1, 2)
+    return [float(d) for d in metric(stack[1:], stack[0])]

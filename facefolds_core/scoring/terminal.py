@@ -1,0 +1,83 @@
+"""metrics.json in a few aligned lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.panels import WITH_EFFECTS
+
+NAME, CELL = 42, 12
+"""Columns of the terminal: of a row's name, and of each figure."""
+
+HEADLINE_WORDS = {
+    "psnr_over_plate": "over the room's plate",
+    "psnr_subject": "of the subject",
+    "psnr_found": "within the matte that was found",
+    "psnr": "over the whole frame",
+}
+"""Metric -> what it is taken over, on held-out cameras."""
+
+ROWS = (
+    ("psnr_over_plate", "PSNR over the room's plate, dB", "{:.2f}"),
+    ("ssim_over_plate", "SSIM over the room's plate", "{:.3f}"),
+    ("psnr_subject", "PSNR of the subject, dB", "{:.2f}"),
+    ("psnr_interior", "  inside its outline", "{:.2f}"),
+    ("psnr_band_over_plate", "  along its outline, over the plate", "{:.2f}"),
+    ("psnr_band", "  along its outline", "{:.2f}"),
+    ("ssim_subject", "SSIM of the subject", "{:.3f}"),
+    ("lpips_subject", "LPIPS of the subject (0 is best)", "{:.3f}"),
+    ("st_lpips_subject", "ST-LPIPS of the subject (0 is best)", "{:.3f}"),
+    ("psnr_found", "PSNR within the found matte, dB", "{:.2f}"),
+    ("ssim_found", "SSIM within the found matte", "{:.3f}"),
+    ("lpips_found", "LPIPS within the found matte", "{:.3f}"),
+    ("st_lpips_found", "ST-LPIPS within the found matte", "{:.3f}"),
+    ("matte_iou", "matte: intersection over union", "{:.3f}"),
+    ("temporal", "change over time explained", "{:.0%}"),
+    ("flicker", "flicker of the error", "{:.4f}"),
+    ("psnr", "PSNR of the whole frame, without the room", "{:.2f}"),
+)
+"""Metric -> its words and its form; the whole frame comes last: it rewards whoever paints the room."""
+
+
+def score_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """The held-out cameras' means, and those of the cameras for validation."""
+    lines = _lines(metrics, "held out")
+    if isinstance(metrics.get("validate"), dict):
+        lines += ["", *_lines(metrics["validate"], "for validation")]
+    return lines
+
+
+def _lines(metrics: Mapping[str, Any], what: str) -> list[str]:
+    variants = ["model"]
+    # Without a view branch the two are the same figures twice.
+    variants += ["diffuse"] if metrics["diffuse"] != metrics["model"] else []
+    variants += ["asset", *([WITH_EFFECTS] if WITH_EFFECTS in metrics else [])]
+    lines = [_line(f"{metrics['images']} pictures {what}", variants)]
+    for key, words, form in ROWS:
+        values = [metrics[variant].get(key) for variant in variants]
+        if any(value is not None for value in values):
+            lines.append(_line(words, ["-" if value is None else form.format(value) for value in values]))
+    return lines
+
+
+def _line(name: str, cells: list[str]) -> str:
+    return f"{name:<{NAME}}" + "".join(f"{cell:>{CELL}}" for cell in cells)
+
+
+def result_lines(metrics: Mapping[str, Any], folders: SubjectFolders) -> list[str]:
+    """What there is to know at the end of a run: what is not well, where the asset is, what it weighs, how good it is,
+    and how to look at it."""
+    warnings = [line for one in metrics.get("warnings", ()) if (line := str(one.get("words", "")))]
+    cost, key = metrics["cost"], metrics.get("headline", "psnr")
+    size = sum(cost.get(name) or 0 for name in ("mesh_bytes", "texture_bytes", "view_effects_bytes"))
+    quality = metrics["asset"].get(key)
+    good = "not scored" if quality is None else f"{quality:.2f} dB {HEADLINE_WORDS[key]}"
+    return [
+        *([f"\nwhat is not well ({len(warnings)}):"] if warnings else []),
+        *(f"  {line.removeprefix('warning: ').removeprefix('note: ')}" for line in warnings),
+        f"\n{metrics.get('subject', folders.root.name)}: {folders.asset}, {size / 1e6:.2f} MB, {good}",
+        f"look at it:  make view ASSET={folders.asset}   (or: facefolds view {folders.asset})",
+        "read of it:  make report",
+    ]

@@ -1,0 +1,77 @@
+"""The yardstick of the layouts' tests: the filmed actor comes back whole from its own layout, and errors are seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facefolds_core.captures.actor.capture import krt_block
+from facefolds_core.captures.scene import Scene
+from facefolds_core.files import write_json
+from tests.captures.fixtures import intrinsics, opengl_matrix, save
+from tests.filmed import check_same, film, scene_of
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The film as a Multiface capture without mesh."""
+    root, truth = tmp_path_factory.mktemp("multiface"), film()
+    (root / "KRT").write_text("".join(krt_block(camera) for camera in truth.cameras))
+    for c, name in enumerate(truth.names):
+        for k in range(truth.frames):
+            save(root / "images" / "S" / name / f"{k:06d}.png", truth.images[c, k])
+            save(root / "masks" / "S" / name / f"{k:06d}.png", truth.mattes[c, k])
+    return scene_of(root, "multiface", root / "scene", truth.names)
+
+
+def test_multiface_brings_the_film_back(scene: Scene) -> None:
+    check_same(scene, film(), mattes="held")
+
+
+def test_so_does_transforms_json_whose_axes_are_others(tmp_path: Path) -> None:
+    truth, entries = film(), []
+    for c, camera in enumerate(truth.cameras):
+        for k in range(truth.frames):
+            save(tmp_path / camera.name / f"{k}.png", truth.images[c, k])
+            entry = {"file_path": f"{camera.name}/{k}.png", "transform_matrix": opengl_matrix(camera)}
+            entries.append(entry | intrinsics(camera))
+    write_json(tmp_path / "transforms.json", {"frames": entries})
+    check_same(scene_of(tmp_path, "transforms", tmp_path / "scene", truth.names), truth)
+
+
+@pytest.mark.parametrize("what", ["pose", "K", "pixels", "mattes", "names"])
+def test_what_is_wrong_is_seen(scene: Scene, what: str) -> None:
+    truth = film()
+    first = truth.cameras[0]
+    if what == "pose":
+        moved = replace(first, w2c=first.w2c + np.array([[0, 0, 0, 0.01]] * 3))
+        truth = replace(truth, cameras=(moved, *truth.cameras[1:]))
+    elif what == "K":
+        truth = replace(truth, cameras=(replace(first, K=first.K + np.eye(3) * [1e-3, 0, 0]), *truth.cameras[1:]))
+    elif what == "pixels":
+        truth = replace(truth, images=truth.images[:, ::-1])
+    elif what == "mattes":
+        truth = replace(truth, mattes=255 - truth.mattes)
+    names = {name: truth.names[1 - c] if c < 2 else name for c, name in enumerate(truth.names)}
+    with pytest.raises(AssertionError):
+        check_same(scene, truth, names if what == "names" else None, mattes="held")
+
+
+def test_a_loss_of_a_grey_level_is_within_the_limit_for_videos(scene: Scene) -> None:
+    truth = film()
+    near = np.where(truth.images > 0, truth.images - 1, 0).astype(np.uint8)
+    check_same(scene, replace(truth, images=near), lossless=False)
+    with pytest.raises(AssertionError, match="dB"):
+        check_same(scene, replace(truth, images=truth.images // 2), lossless=False)
+
+
+def test_plates_show_the_room_that_is_seen_beside_the_actor() -> None:
+    truth = film()
+    empty = truth.mattes[:, 0] == 0
+    # Pixels whose neighbours hold the actor are anti-aliased with them: three levels, and few of these.
+    difference = np.abs(truth.plates.astype(int) - truth.images[:, 0])[empty]
+    assert empty.mean() > 0.2
+    assert np.quantile(difference, 0.95) == 0

@@ -1,0 +1,181 @@
+"""Videos of a capture: read once, in order; what would put other moments side by side is refused."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from facefolds_core.captures import videos
+from facefolds_core.captures.developing import _in_turn
+from facefolds_core.captures.picture import VideoFrame, decoded
+from facefolds_core.captures.videos import Video, check_together
+from facefolds_core.errors import UserError
+
+FRAMES = np.random.default_rng(0).integers(0, 256, (12, 16, 24, 3), dtype=np.uint8)
+"""Of 24 x 16 pixels."""
+
+
+def write(
+    path: Path, frames: np.ndarray = FRAMES, times: Sequence[int] | None = None, rate: int = 25, **options: Any
+) -> Path:
+    """A video without loss; `times` in frames."""
+    with av.open(str(path), "w", options=options) as container:
+        stream = container.add_stream("libx264rgb", rate=rate, options={"crf": "0", "g": "5"})
+        stream.width, stream.height, stream.pix_fmt = frames.shape[2], frames.shape[1], "rgb24"
+        stream.codec_context.time_base = Fraction(1, 100 * rate)
+        for k, image in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(image, "rgb24")
+            frame.pts, frame.time_base = 100 * (k if times is None else times[k]), Fraction(1, 100 * rate)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+def video(path: Path) -> Video:
+    return Video(path, "c7")
+
+
+def refused(path: Path, match: str) -> UserError:
+    """What is said of a video by its index alone."""
+    with pytest.raises(UserError, match=match) as caught:
+        video(path).facts()
+    assert caught.value.file == path and "camera c7" in str(caught.value.place)
+    return caught.value
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".mov"])
+def test_facts_are_those_of_the_index(tmp_path: Path, suffix: str) -> None:
+    facts = video(write(tmp_path / f"a{suffix}")).facts()
+    assert (facts.size, facts.count, facts.rate, facts.start) == ((24, 16), 12, 25, 0.0)
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_frames_come_in_order_and_equal(tmp_path: Path, threads: int) -> None:
+    source = video(write(tmp_path / "a.mp4"))
+    wanted = [0, 3, 4, 11]
+    found = list(source.frames(wanted, "rgb", threads))
+    np.testing.assert_array_equal(found, FRAMES[wanted])
+
+
+def test_one_run_opens_the_video_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = video(write(tmp_path / "a.mp4"))
+    source.facts()
+    opened: list[object] = []
+    real = av.open
+    monkeypatch.setattr(videos.av, "open", lambda *a, **k: opened.append(a) or real(*a, **k))
+    found = list(decoded([(VideoFrame(source, k), "") for k in range(12)], "rgb"))
+    np.testing.assert_array_equal(found, FRAMES)
+    assert len(opened) == 1
+
+
+def test_opacity_is_one_channel(tmp_path: Path) -> None:
+    grey = np.repeat(FRAMES[..., :1], 3, -1)
+    (found,) = video(write(tmp_path / "a.mp4", grey)).frames([2], "opacity")
+    np.testing.assert_array_equal(found, grey[2, ..., :1])
+
+
+def test_limited_range_is_expanded(tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"crf": "0"})
+        stream.width, stream.height, stream.pix_fmt = 24, 16, "yuv420p"
+        planes = np.concatenate([np.full((16, 24), 235, np.uint8), np.full((8, 24), 128, np.uint8)])
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(planes, "yuv420p")))
+        container.mux(stream.encode())
+    (found,) = video(path).frames([0], "opacity")
+    assert found.min() >= 254
+
+
+def test_a_video_without_its_end(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mp4")
+    path.write_bytes(path.read_bytes()[:-3000])
+    assert "cut off, or no video" in str(refused(path, "cannot read a video").found)
+
+
+def test_a_video_that_is_cut_behind_its_index(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mp4", movflags="faststart")
+    path.write_bytes(path.read_bytes()[:-3000])
+    refused(path, "a video is cut off")
+
+
+def test_damage_within_names_the_frame(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mp4")
+    data = bytearray(path.read_bytes())
+    middle = (data.index(b"mdat") + data.index(b"moov")) // 2
+    data[middle : middle + 600] = b"\xff" * 600
+    path.write_bytes(data)
+    with pytest.raises(UserError, match="a damaged video") as caught:
+        list(video(path).frames(range(12), "rgb"))
+    assert "camera c7, frame" in str(caught.value.place)
+
+
+def test_a_variable_rate_names_the_gap(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mp4", times=[0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12])
+    assert str(refused(path, "variable frame rate").place) == "camera c7, frame 4"
+
+
+def test_a_tag_that_turns_it(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mp4")
+    data = bytearray(path.read_bytes())
+    matrix = data.index(b"tkhd") + 4 + 40
+    data[matrix : matrix + 36] = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 16 << 16, 0, 1 << 30)
+    path.write_bytes(data)
+    assert "90" in str(refused(path, "turns it").found)
+
+
+@pytest.mark.parametrize("content", [b"", b"no video at all" * 100])
+def test_what_is_no_video(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.mp4").write_bytes(content)
+    refused(tmp_path / "a.mp4", "cannot read a video")
+
+
+def test_a_missing_one_and_one_of_another_kind(tmp_path: Path) -> None:
+    refused(tmp_path / "a.mp4", "a video is missing")
+    (tmp_path / "a.gif").write_bytes(b"GIF89a")
+    refused(tmp_path / "a.gif", "a video of a kind that is not read")
+
+
+def several(folder: Path, *made: dict[str, Any]) -> list[Video]:
+    return [Video(write(folder / f"{c}.mp4", **keys), f"c{c}") for c, keys in enumerate(made)]
+
+
+def test_videos_that_run_side_by_side(tmp_path: Path) -> None:
+    assert check_together(several(tmp_path, {}, {}, {})) == (12, 25)
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [
+        ({"frames": FRAMES[:10]}, "videos of different lengths"),
+        ({"rate": 30}, "videos of different frame rates"),
+        ({"times": range(3, 15)}, "a camera with a time offset"),
+    ],
+)
+def test_one_that_does_not_is_named(tmp_path: Path, odd: dict[str, Any], words: str) -> None:
+    with pytest.raises(UserError, match=words) as caught:
+        check_together(several(tmp_path, {}, odd, {}))
+    assert "camera c1" in str(caught.value.place)
+
+
+def test_the_frames_that_all_have_may_be_used(tmp_path: Path) -> None:
+    made = several(tmp_path, {}, {"frames": FRAMES[:10]}, {})
+    assert check_together(made, most=8) == (10, 25)
+
+
+def test_lanes_take_turns_and_stop_when_one_fails() -> None:
+    def lane(name: str, count: int, fails: bool = False):  # type: ignore[no-untyped-def]
+        for k in range(count):
+            yield f"{name}{k}"
+        if fails:
+            raise UserError("broken")
+
+    assert list(_in_turn([lane("a", 3), lane("b", 1), lane("c", 2)])) == ["a0", "b0", "c0", "a1", "c1", "a2"]
+    with pytest.raises(UserError, match="broken"):
+        list(_in_turn([lane("a", 1000), lane("b", 2, fails=True)]))

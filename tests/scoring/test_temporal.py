@@ -1,0 +1,85 @@
+"""What is explained of films whose change is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
+
+FRAMES = 10
+Array = np.ndarray
+
+
+def truth() -> Array:
+    """(FRAMES, 8, 8, 3) noise."""
+    return np.random.default_rng(0).uniform(0, 1, (FRAMES, 8, 8, 3))
+
+
+def change(pictures: Array, photos: Array, weights: Array | None = None, at: list[int] | None = None) -> Change:
+    film = Film()
+    for i, k in enumerate(range(FRAMES) if at is None else at):
+        film.add(k, {"asset": pictures[i]}, photos[i], np.ones((8, 8)) if weights is None else weights[i])
+    return change_of([film.sums()["asset"]])
+
+
+def test_the_photos_explain_all_of_their_change() -> None:
+    found = change(truth(), truth())
+    assert (found.temporal, found.flicker) == (pytest.approx(1), pytest.approx(0, abs=1e-12))
+
+
+@pytest.mark.parametrize("value", [0.0, 0.7])
+def test_a_frozen_film_explains_nothing(value: float) -> None:
+    found = change(np.full((FRAMES, 8, 8, 3), value), truth())
+    assert found.temporal == pytest.approx(0, abs=1e-12)
+
+
+def test_a_constant_error_costs_nothing() -> None:
+    found = change(truth() + 0.25, truth())
+    assert (found.temporal, found.flicker) == (pytest.approx(1), pytest.approx(0, abs=1e-9))
+
+
+@pytest.mark.parametrize(("share", "explained"), [(0.5, 0.75), (-1.0, -3.0), (2.0, 0.0)])
+def test_so_much_of_the_motion_explains_so_much_of_the_variance(share: float, explained: float) -> None:
+    mean = truth().mean(0)
+    assert change(mean + share * (truth() - mean), truth()).temporal == pytest.approx(explained)
+
+
+def test_an_error_that_comes_and_goes_flickers() -> None:
+    blinking = truth() + 0.1 * (np.arange(FRAMES) % 2)[:, None, None, None]
+    assert change(blinking, truth()).flicker == pytest.approx(0.1)
+
+
+def test_the_change_of_the_photos_is_their_deviation_over_time() -> None:
+    assert change(truth(), truth()).truth_change == pytest.approx(
+        float(truth().std(0, ddof=0).__pow__(2).mean()) ** 0.5
+    )
+
+
+def test_frames_apart_are_no_pair() -> None:
+    blinking = truth() + 0.1 * (np.arange(FRAMES) % 2)[:, None, None, None]
+    found = change(blinking, truth(), at=[0, 1, *range(3, 11)])  # 1 and 3 are no neighbours: the error is not taken
+    assert found.flicker == pytest.approx(0.1)
+    assert change(blinking[:2], truth()[:2], at=[0, 5]).flicker is None
+
+
+def test_what_is_uncovered_once_does_not_count() -> None:
+    weights = np.ones((FRAMES, 8, 8))
+    weights[4, :, 4:] = 0  # the right half shows the room in one frame
+    wrong = truth()
+    wrong[:, :, 4:] = 0
+    assert change(wrong, truth(), weights).temporal == pytest.approx(1)
+
+
+def test_one_frame_does_not_change() -> None:
+    assert change(truth()[:1], truth()[:1], at=[0]) == Change(None, None, None)
+
+
+def test_a_still_life_has_no_variance_to_explain() -> None:
+    still = np.repeat(truth()[:1], FRAMES, 0)
+    assert change(still, still).temporal is None
+
+
+def test_cameras_are_summed_not_averaged() -> None:
+    found = change_of([Sums(left=1, truth=10, values=1, pairs=1), Sums(left=89, truth=90, values=1, pairs=1)])
+    assert found.temporal == pytest.approx(0.1)
