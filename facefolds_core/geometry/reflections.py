@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
-from facefolds_core.geometry.sphere_uv import library_of
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.geometry.sphere_uv import Window, library_of
 
 
 def reflected(directions: Any, normals: Any) -> Any:
@@ -21,3 +25,22 @@ def sphere_position(directions: Any) -> Any:
     lib = library_of(directions)
     scale = 0.5 / lib.sqrt(lib.clip(2 * (1 + directions[..., 0]), 1e-6, None))
     return lib.stack([0.5 + scale * directions[..., 1], 0.5 - scale * directions[..., 2]], -1)
+
+
+@dataclass(frozen=True)
+class ReflectionMaps:
+    """A reflection as it is shown: `model.reflection` says what the maps mean. float32.
+
+    Attributes:
+        window: (u0, u1, v0, v1) that gloss, offset and normals cover.
+        gloss: (h, w), not negative.
+        offset: (h, w, 3), not negative.
+        normals: (h, w, 3), about unit length.
+        environment: (e, e, 3), not negative.
+    """
+
+    window: Window
+    gloss: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    environment: NDArray[np.float32]

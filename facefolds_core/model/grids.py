@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import grid_sample
 
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.model.textures import Shaded
@@ -56,6 +57,10 @@ class GridTextures(nn.Module):
     @property
     def num_frames(self) -> int:
         return len(self.frame_alpha)
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """The reflection, as an asset has it."""
+        return None if self.reflection is None else self.reflection.maps(self.window)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.intersection import Crossings
@@ -75,6 +76,10 @@ class RadianceManifolds(nn.Module):
     def centre(self) -> Tensor:
         """[3], c."""
         return self.manifolds.centre
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """The reflection that all layers and frames share, where the textures have one."""
+        return self.textures.reflection_maps()
 
     def trace(self, origins: Tensor, directions: Tensor, time: Tensor, view_effects: bool) -> Traced:
         """Cross, shade and composite rays, all at once and differentiable.

@@ -18,7 +18,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import grid_sample, normalize
 
-from facefolds_core.geometry.reflections import reflected, sphere_position
+from facefolds_core.geometry.reflections import ReflectionMaps, reflected, sphere_position
+from facefolds_core.geometry.sphere_uv import Window
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,13 @@ class Reflection(nn.Module):
     def shape(self) -> ReflectionShape:
         h, w = self.gloss.shape
         return ReflectionShape((h, w), len(self.environment))
+
+    def maps(self, window: Window) -> ReflectionMaps:
+        """As arrays."""
+        gloss, offset, normals, environment = (
+            part.detach().cpu().numpy().copy() for part in (self.gloss, self.offset, self.normals, self.environment)
+        )
+        return ReflectionMaps(window, gloss, offset, normals, environment)
 
     def added(self, st: Tensor, directions: Tensor) -> Tensor:
         """[P, 3] to be added to colours at st [P, 2] over the window, seen along unit directions [P, 3]."""

@@ -23,6 +23,7 @@ from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, Hits, composite
 from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.scoring.analysis import Sums as SeenSums
 from facefolds_core.scoring.images import Rendering, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
@@ -154,14 +155,15 @@ def rendered(
 ) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, Rendering]]]:
     """The asset's textures, and the variants' renderings, of each of the scene's `frames`."""
     view = ModelView(model, camera)
-    maps = asset.effects()
+    reflection, maps = asset.full.reflection(), asset.effects()
+    glossy = None if reflection is None else reflected_colours(hits, camera, asset.full.windows, reflection)
     added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
         with_view, without_view, alpha = view.render(float(k))
         images = {
             "model": Rendering(with_view, alpha),
             "diffuse": Rendering(without_view, alpha),
-            "asset": Rendering(*composite(hits, textures)),
+            "asset": Rendering(*composite(hits, textures, added=glossy)),
         }
         if added is not None:
             images[WITH_EFFECTS] = Rendering(*composite(hits, textures, added=added))

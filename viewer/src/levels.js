@@ -6,7 +6,7 @@ import { openVideo } from "./video/open.js";
 
 /**
  * @typedef {{info: import("./manifest.js").Level, geometries: THREE.BufferGeometry[], texture: THREE.VideoFrameTexture,
- *   effects: THREE.Texture | null, source: import("./video/open.js").FrameSource,
+ *   effects: THREE.Texture | null, reflection: THREE.Texture | null, source: import("./video/open.js").FrameSource,
  *   video: import("./manifest.js").VideoEntry, dispose: () => void}} LoadedLevel
  * @param {import("./manifest.js").Level} info
  * @param {import("./files.js").Files} files
@@ -15,13 +15,14 @@ import { openVideo } from "./video/open.js";
  * @returns {Promise<LoadedLevel>}
  */
 export async function loadLevel(info, files, onVideoError, refused) {
-  const [geometries, effects, opened] = await allOrNothing([
+  const [geometries, effects, opened, reflection] = await allOrNothing([
     Promise.all(info.layers.map(async (layer) => {
       const buffer = await files.bytes(layer.mesh);
       return decodeMesh(buffer, layer, files.address(layer.mesh.name));
     })),
-    info.effects ? loadEffects(info.effects, files) : null,
+    info.effects ? loadPicture(info.effects.file, files) : null,
     openVideo(info, files, onVideoError, refused),
+    info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
   const texture = new THREE.VideoFrameTexture();
   texture.colorSpace = THREE.NoColorSpace;
@@ -31,12 +32,14 @@ export async function loadLevel(info, files, onVideoError, refused) {
   texture.setFrame(opened.first);
   const dispose = () => {
     for (const geometry of geometries) geometry.dispose();
-    effects?.dispose();
-    effects?.image.close?.();
+    for (const one of [effects, reflection]) {
+      one?.dispose();
+      one?.image.close?.();
+    }
     texture.dispose();
     opened.source.close();
   };
-  return { info, geometries, texture, effects, source: opened.source, video: opened.video, dispose };
+  return { info, geometries, texture, effects, reflection, source: opened.source, video: opened.video, dispose };
 }
 
 /** Like Promise.all, but a video opened in vain is closed. */
@@ -48,14 +51,14 @@ async function allOrNothing(work) {
   throw failed.reason;
 }
 
-async function loadEffects(entry, files) {
-  const blob = new Blob([await files.bytes(entry.file)], { type: "image/png" });
+async function loadPicture(entry, files) {
+  const blob = new Blob([await files.bytes(entry)], { type: "image/png" });
   let image;
   try {
     image = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   } catch (cause) {
-    const file = files.address(entry.file.name);
-    throw new PlayerError(`The picture ${entry.file.name} is damaged`, {
+    const file = files.address(entry.name);
+    throw new PlayerError(`The picture ${entry.name} is damaged`, {
       file,
       cause,
       remedy: "Copy or make the asset again.",
@@ -78,6 +81,6 @@ export function gpuBytes(level) {
       bytes += attribute.array.byteLength;
   }
   bytes += 4 * level.info.texture.width * level.info.texture.height;
-  if (level.effects) bytes += 4 * level.effects.image.width * level.effects.image.height;
+  for (const one of [level.effects, level.reflection]) if (one) bytes += 4 * one.image.width * one.image.height;
   return bytes;
 }

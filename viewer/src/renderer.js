@@ -86,6 +86,7 @@ export class LayerRenderer {
       };
       colour.effectsScale = { value: level.info.effects.scale };
     }
+    if (level.reflection) Object.assign(colour, reflectionUniforms(level, info, shared.eye));
     const slice = [(index + 0.05) / count, (index + 0.95) / count];
     const pass = (uniforms, fragmentShader, options, order) => {
       const material = new THREE.ShaderMaterial({
@@ -101,7 +102,7 @@ export class LayerRenderer {
     };
     const depth = { depthFunc: THREE.LessDepth, depthWrite: true, colorWrite: false, blending: THREE.NoBlending };
     const equal = { depthFunc: THREE.EqualDepth, depthWrite: false, blending: THREE.NormalBlending };
-    const defines = level.effects ? { EFFECTS: 1 } : {};
+    const defines = { ...(level.effects && { EFFECTS: 1 }), ...(level.reflection && { REFLECTION: 1 }) };
     const meshes = [pass(shared, DEPTH_FRAGMENT, depth, 0), pass(colour, COLOUR_FRAGMENT, { ...equal, defines }, 1)];
     const wire = { ...shared, wire: { value: wireColour(index, count) } };
     const lines = { depthTest: false, depthWrite: false, wireframe: true };
@@ -139,6 +140,8 @@ export class LayerRenderer {
       layer.meshes.forEach((mesh, pass) => (mesh.visible = layer.visible && (pass < 2 || this.wireframe)));
       if (layer.colour.effectsScale)
         layer.colour.effectsScale.value = this.effectsOn ? this.level.info.effects.scale : 0;
+      if (layer.colour.reflectionScales)
+        layer.colour.reflectionScales.value.fromArray(this.effectsOn ? this.level.info.reflection.scales : [0, 0, 0]);
     });
   }
 
@@ -192,6 +195,21 @@ export class LayerRenderer {
     this.scene.clear();
     this.three.dispose();
   }
+}
+
+/** What the shader needs of a level's reflection, for one of its layers. */
+function reflectionUniforms(level, layer, eye) {
+  const { environment, gloss, offset, normals, window, scales } = level.info.reflection;
+  const [u0, u1, v0, v1] = layer.window;
+  const [mu0, mu1, mv0, mv1] = window;
+  const rect = (values) => ({ value: new THREE.Vector4(...values) });
+  return {
+    reflection: { value: level.reflection },
+    ...{ environmentRect: rect(environment), glossRect: rect(gloss), offsetRect: rect(offset), normalsRect: rect(normals) },
+    reflectionScales: { value: new THREE.Vector3(...scales) },
+    toMaps: rect([(v1 - v0) / (mv1 - mv0), (u1 - u0) / (mu1 - mu0), (v0 - mv0) / (mv1 - mv0), (mu1 - u1) / (mu1 - mu0)]),
+    viewer: eye,
+  };
 }
 
 /** From warm (outermost) to cold (innermost). */

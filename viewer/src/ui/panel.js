@@ -27,7 +27,7 @@ export function connectPanel(element) {
     const { levels } = element;
     input("level").replaceChildren(...levels.map((name) => new Option(name, name, false, name === element.level)));
     input("level").disabled = levels.length < 2;
-    input("effects").closest(".row").hidden = !player.level.info.effects;
+    input("effects").closest(".row").hidden = !(player.level.info.effects || player.level.info.reflection);
     const one = (name, layer) => `<button type="button" data-layer="${layer}" class="${layer}">${name}</button>`;
     const chips = element.layers.map((_, i) => one(String(i + 1), i));
     panel.querySelector(".layers div").innerHTML = [...chips, one("All", "all")].join("");
