@@ -205,9 +205,19 @@ function reflectionUniforms(level, layer, eye) {
   const rect = (values) => ({ value: new THREE.Vector4(...values) });
   return {
     reflection: { value: level.reflection },
-    ...{ environmentRect: rect(environment), glossRect: rect(gloss), offsetRect: rect(offset), normalsRect: rect(normals) },
+    ...{
+      environmentRect: rect(environment),
+      glossRect: rect(gloss),
+      offsetRect: rect(offset),
+      normalsRect: rect(normals),
+    },
     reflectionScales: { value: new THREE.Vector3(...scales) },
-    toMaps: rect([(v1 - v0) / (mv1 - mv0), (u1 - u0) / (mu1 - mu0), (v0 - mv0) / (mv1 - mv0), (mu1 - u1) / (mu1 - mu0)]),
+    toMaps: rect([
+      (v1 - v0) / (mv1 - mv0),
+      (u1 - u0) / (mu1 - mu0),
+      (v0 - mv0) / (mv1 - mv0),
+      (mu1 - u1) / (mu1 - mu0),
+    ]),
     viewer: eye,
   };
 }
