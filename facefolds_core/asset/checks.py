@@ -188,6 +188,7 @@ def _reflection_problems(level: Level) -> list[str]:
     if one is None:
         return []
     problems = _size_problems(one.width, one.height)
+    problems += ["view effects and a reflection"] * (level.view_effects is not None)
     u0, u1, v0, v1 = one.uv_window
     if not (u0 < u1 and v0 < v1):
         problems.append(f"uv_window {[u0, u1, v0, v1]} of the reflection is empty")

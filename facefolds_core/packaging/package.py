@@ -115,7 +115,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
             levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
         level = _level(temporary, FULL, full, params, meter, cameras)
-        if params.view_effects:
+        if params.view_effects and export.reflection is None:
             photographed = replace(full, textures=export.textures, frames=frames)
             allowed = params.effects.share * level.bytes
             level = _with_effects(temporary, level, fit_effects(photographed, scene, allowed, params.effects))
