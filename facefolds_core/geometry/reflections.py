@@ -44,3 +44,11 @@ class ReflectionMaps:
     offset: NDArray[np.float32]
     normals: NDArray[np.float32]
     environment: NDArray[np.float32]
+
+
+def window_to_window(given: Window, wanted: Window) -> tuple[float, float, float, float]:
+    """(a, b, c, d): (s, t) over `given` is (a s + c, b t + d) over `wanted`."""
+    u0, u1, v0, v1 = given
+    wu0, wu1, wv0, wv1 = wanted
+    height, width = wu1 - wu0, wv1 - wv0
+    return (v1 - v0) / width, (u1 - u0) / height, (v0 - wv0) / width, (wu1 - u1) / height

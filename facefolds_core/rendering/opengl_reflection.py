@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.reflections import ReflectionMaps, window_to_window
 from facefolds_core.geometry.sphere_uv import Window
 
 FRAGMENT_WITH_REFLECTION = """
@@ -46,11 +46,7 @@ class Glossy:
 
     def to_maps(self, layer: int) -> NDArray[np.float32]:
         """(4,) the uniform `to_maps` of a layer."""
-        u0, u1, v0, v1 = self.windows[layer]
-        mu0, mu1, mv0, mv1 = self.maps.window
-        height, width = mu1 - mu0, mv1 - mv0
-        values = [(v1 - v0) / width, (u1 - u0) / height, (v0 - mv0) / width, (mu1 - u1) / height]
-        return np.array(values, np.float32)
+        return np.array(window_to_window(self.windows[layer], self.maps.window), np.float32)
 
     def textures(self, context: moderngl.Context) -> list[tuple[str, moderngl.Texture]]:
         """Names of the samplers, and what they read."""
