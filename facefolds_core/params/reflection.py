@@ -15,16 +15,16 @@ class ReflectionParams(Section):
     enabled: bool = False
     """Try it; it is left out all the same where it does not help (`min_gain`)."""
 
-    texels: Annotated[int, Field(ge=2, le=256)] = 24
+    texels: Annotated[int, Field(ge=2, le=256)] = 64
     """Of the maps of gloss, offset and normals, along the longer side of the window."""
 
     environment_texels: Annotated[int, Field(ge=2, le=256)] = 16
     """A side of the environment's picture."""
 
-    normal_blur: Pixels = 3.0
+    normal_blur: Pixels = 1.5
     """Smoothing of the radius map before normals are taken of it, standard deviation, nodes of the map."""
 
-    gloss_smoothness: Weight = 0.3
+    gloss_smoothness: Weight = 0.1
     """Of the maps of gloss and offset: price of squared differences between neighbours, in the mean weight of a
     texel's rays."""
 
