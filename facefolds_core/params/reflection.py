@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,6 +14,10 @@ class ReflectionParams(Section):
 
     enabled: bool = False
     """Try it; it is left out all the same where it does not help (`min_gain`)."""
+
+    begin: Literal["rounds", "full", "end"] = "rounds"
+    """When it is fitted first: in the first round of geometry, at full resolution, or once the textures are done, which
+    then are those of a model without it."""
 
     texels: Annotated[int, Field(ge=2, le=256)] = 64
     """Of the maps of gloss, offset and normals, along the longer side of the window."""

@@ -12,6 +12,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
+from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
     Maps,
     Seen,
@@ -49,10 +50,21 @@ class GlossFit:
             self.maps = replace(self.maps, normals=self._normals)
             self._shine(state, self._look(state, views, images))
 
-    def due(self, step: int, steps: int) -> bool:
+    def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
-        fits = self.params.fits
-        return self.on and (step + 1) * fits // steps > step * fits // steps
+        fits, steps = self.params.fits, level.iterations
+        begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
+        return self.on and begun and (step + 1) * fits // steps > step * fits // steps
+
+    def after(self, number: int, rounds: int, state: TextureState, views: Views, images: Images) -> Fact | None:
+        """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
+        `begin: end` it is fitted now."""
+        if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
+            return None
+        found = self.decide(state, views, images)
+        if self.on and self.params.begin == "end":
+            self.fit(state, views, images)
+        return found
 
     def fit(self, state: TextureState, views: Views, images: Images) -> None:
         """Fit to what the textures leave over now."""
@@ -66,10 +78,9 @@ class GlossFit:
         self.maps = centred(fit_maps(used, start, rounds, self.params), used, self.params)
         self._shine(state, seen)
 
-    def decide(self, state: TextureState, views: Views, images: Images) -> Fact | None:
+    def decide(self, state: TextureState, views: Views, images: Images) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
-        if not self.on or self._normals is None:
-            return None
+        assert self._normals is not None
         start = replace(Maps.blank(self.window, self.params), normals=self._normals)
         gain = gain_on_cameras(self._used(self._look(state, views, images)), start, self.params)
         self.on = gain >= self.params.min_gain

@@ -121,8 +121,7 @@ class _Trainer:
         saved = self.state.snapshot()
         for _ in range(self.params.divergence.attempts):
             if self._attempt(level, number, live, bar):
-                if number == len(self.params.geometry.rounds) - 1:
-                    self._judge_reflection(bar)
+                self._judge_reflection(number, bar)
                 return
             self.state.restore(saved)
             self.rate /= self.params.divergence.slow_down
@@ -135,10 +134,11 @@ class _Trainer:
             remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
         )
 
-    def _judge_reflection(self, bar: tqdm) -> None:
-        """After the rounds of geometry: before layers of full resolution can swallow what depends on the view."""
+    def _judge_reflection(self, number: int, bar: tqdm) -> None:
+        """After a level, where it is time: whether the reflection helps."""
         assert self.state is not None and self.views is not None
-        found = self.gloss.decide(self.state, self.views, self.images)
+        rounds = len(self.params.geometry.rounds)
+        found = self.gloss.after(number, rounds, self.state, self.views, self.images)
         if found is not None:
             self.events.append(found)
             bar.write(f"train: {found}")
@@ -213,7 +213,7 @@ class _Trainer:
             best = min(best, recent)
             if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
                 return False
-            if self.gloss.due(i, level.iterations):
+            if self.gloss.due(i, level):
                 self.gloss.fit(self.state, self.views, self.images)
             self.iteration += 1
             self.rays += len(rays)
