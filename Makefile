@@ -6,6 +6,7 @@
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
+# make package dist/facefolds-player-*.tgz: the web player as an npm package, with types (nothing is published)
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/guide/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
@@ -22,11 +23,12 @@ PLAYER := viewer/dist/index.html
 WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
 PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: repro check test nightly view report lint lint-player wheel bench charts blender clean
+.PHONY: repro check test nightly view report lint lint-player wheel package bench charts blender clean
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
+	@echo && $(BIN)/facefolds scores
 
 check: $(READY)
 	$(PYTEST) -m "not (slow or pipeline or browser or nightly)"
@@ -64,6 +66,10 @@ viewer/node_modules/.package-lock.json: viewer/package-lock.json
 
 wheel: $(READY) $(PLAYER)
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
+package: $(PLAYER)
+	mkdir -p dist
+	cd viewer && npm pack --silent --pack-destination ../dist
 
 bench: $(READY)
 	$(BIN)/python -m bench.speed_accuracy

@@ -99,11 +99,11 @@ def truth_of(folders: SubjectFolders, scene: Scene, camera: int, factor: int) ->
     found = [render(view, float(t), seed=params.seed) for t in progress(wanted, desc=view.name, unit="picture")]
     opacity = [np.rint(255 * picture.opacity).astype(np.uint8) for picture in found]
     truth = Truth(np.stack([picture.rgb for picture in found]), np.stack(opacity))
-    if not np.array_equal(truth.pictures[0], scene.open_frames().image(camera, 0)):
+    if scene.poses is not None or not np.array_equal(truth.pictures[0], scene.open_frames().image(camera, 0)):
         raise UserError(
             "the scene does not show what the actor's renderer shows",
             file=scene.folder,
-            expected="the actor's pictures at their own size, not stabilised",
+            expected="the actor's pictures at their own size, its head still",
             remedy="use a subject of source actor with default `normalize`",
         )
     return truth

@@ -107,9 +107,11 @@ def score_model(
     model = load_model(folder, device)
     truths, masks = scene.open_frames(), scene.open_masks()
     for index in scene.indices(scene.choice_split):
-        view = ModelView(model, scene.cameras[index])
+        view = None
         for k, time in times.items():
             if (index, k) in truths:
+                if view is None or scene.poses is not None:
+                    view = ModelView(model, scene.camera_in_head(index, k))
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
                 picture = shown(view.render(time)[1])
                 values = score_images({"": picture}, truths.image(index, k) / 255.0, mask, perceptual)[""]

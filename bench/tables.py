@@ -21,8 +21,8 @@ from facefolds_core.files import read_json, write_text
 README = ("<!-- results: written by bench/tables.py -->", "<!-- end of results -->")
 # FaceFolds, comparisons (row 1) and mesh resolution, R^m = 32 (row 2). It gives no training time.
 README_ROWS = [
-    "| paper, 5 Multiface subjects, 768x500 | 25.49 | 0.788 | LPIPS 0.356 | | | | | 118 MiB | V100 |",
-    "| paper, 002914589, R^m = 32 | 29.12 | 0.831 | LPIPS 0.291 | | | | 9 962 | 170 KB + 5.9 MB | V100 |",
+    "| paper, 5 Multiface subjects, 768x500 | | | | | 118 MiB | V100 | 25.49 | 0.788 | LPIPS 0.356 |",
+    "| paper, 002914589, R^m = 32 | | | | 9 962 | 170 KB + 5.9 MB | V100 | 29.12 | 0.831 | LPIPS 0.291 |",
 ]
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
 """Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
@@ -186,29 +186,32 @@ def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | No
 
 
 def readme_table(data: Path) -> str:
-    """The asset over the whole frame, then asset, diffuse model and model over the subject, and what it took."""
+    """Asset, diffuse model and model over the subject, what it took, and last the asset over the whole frame, which
+    rewards whoever paints the room: it is there for the paper's sake, which has nothing else."""
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = ["", "PSNR", "SSIM", "perceptual", "PSNR of the subject: asset", "diffuse", "model", "triangles"]
+    head = ["", "PSNR of the subject: asset", "diffuse", "model", "triangles", "mesh + video", "trained on, for"]
+    head += ["whole frame: PSNR", "SSIM", "perceptual"]
     rows = []
     for path in files:
         metrics = read_json(path)
         asset, cost = metrics["asset"], metrics["cost"]
         lpips, st_lpips = asset.get("lpips"), asset.get("st_lpips")
-        perceptual = f"LPIPS {lpips:.3f}" if lpips is not None else f"ST-LPIPS {number(st_lpips, 3)}"
+        known = {"LPIPS": lpips, "ST-LPIPS": st_lpips}
+        perceptual = next((f"{name} {value:.3f}" for name, value in known.items() if value is not None), "")
         preset = read_json(path.parent / "model" / "training.json")["preset"]
         rows.append(
             [
-                *(f"ours, `{path.parent.name}`, preset `{preset}`", number(asset["psnr"], 2), number(asset["ssim"], 3)),
-                perceptual,
+                f"ours, `{path.parent.name}`, preset `{preset}`",
                 *(number(metrics[variant].get("psnr_subject"), 2) for variant in ("asset", "diffuse", "model")),
                 spaced(cost["triangles"]),
                 f"{size(cost['mesh_bytes'])} + {size(cost['texture_bytes'])}",
                 f"{cost['device']}, {cost['train_seconds']:.0f} s",
+                *(number(asset["psnr"], 2), number(asset["ssim"], 3), perceptual),
             ]
         )
-    whole = markdown([*head, "mesh + video", "trained on, for"], rows).splitlines()
+    whole = markdown(head, rows).splitlines()
     return "\n".join([*whole[:2], *README_ROWS, *whole[2:]])
 
 

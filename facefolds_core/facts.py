@@ -40,9 +40,16 @@ WORDS = {
     "krt_is_of_full_size": "note: K of KRT is for full-size images; scaled (median principal point ({point[0]:.1f}, "
     "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
     "front_guessed": "note: no `front` camera and no tracked mesh; +x is the cameras' mean direction",
+    "front_found": "note: no `front` and no tracked mesh: the subject is taken to face where most cameras stand, near "
+    "camera {camera} ({share:.0%} of them within 60 degrees of there); if it does not, name one that it faces in "
+    "`front`",
     "pictures_disagree": "note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation "
     "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
     "another's?",
+    "head_turns": "note: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of its size: "
+    "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
+    "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
+    "its size, and `stabilize: false` takes it to stand still: expect a blurred or doubled face",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did

@@ -86,19 +86,20 @@ def export_asset(
     """
     params = ExportParams() if params is None else params
     steps.check_frames(model, scene)
-    cameras = scene.cameras_of("train")
     with TemporaryDirectory(prefix="facefolds-export-") as temporary:
         sampled, resampled, baked = (Path(temporary) / name for name in ("sampled", "resampled", "baked"))
         for place in (sampled, resampled, baked):
             place.mkdir()
-        grids = steps.sample_model(model, cameras, params.sample, sampled)
+        views = scene.views_of("train", params.sample.auto_window.moving_views)
+        grids = steps.sample_model(model, views, params.sample, sampled)
         surfaces = steps.surfaces_in(steps.reconstruct(grids, params.reconstruct))
         meshes = steps.decimate(surfaces, grids, params.decimate)
         wanted = sorted({level.mesh_resolution for level in params.compress.levels})
         coarser = steps.decimate_levels(surfaces, grids, params.decimate, wanted)
         resample_store(sampled / steps.TEXTURES, resampled / steps.TEXTURES, params.texture.resolution)
         stores = (sampled / steps.TEXTURES, resampled / steps.TEXTURES)
-        steps.bake(cameras, grids, meshes, *stores, params.bake, baked)
+        views = scene.views_of("train", params.bake.moving_views)
+        steps.bake(views, grids, meshes, *stores, params.bake, baked)
         made = Export.of(grids, meshes, baked / steps.TEXTURES, coarser)
         package(Path(folder), made, scene, params.compress)
     return read_asset(folder)

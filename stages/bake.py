@@ -13,14 +13,15 @@ from stages.common import run_stage
 
 
 def bake(folders: SubjectFolders) -> str:
+    params = read_stage(BakeParams, folders.config)
     with atomic_folder(folders.textures) as temporary:
         rays = steps.bake(
-            read_scene(folders.scene).cameras_of("train"),
+            read_scene(folders.scene).views_of("train", params.moving_views),
             read_grids(folders.samples / "grids.npz"),
             read_meshes(folders.meshes / "meshes.npz"),
             folders.samples / steps.TEXTURES,
             folders.resampled / steps.TEXTURES,
-            read_stage(BakeParams, folders.config),
+            params,
             temporary,
         )
     if rays == 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.actor import write_capture
+from facefolds_core.captures.sources import is_generated
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
@@ -17,7 +18,7 @@ from stages.common import run_stage
 
 def capture(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
-    if subject.source == "actor":
+    if is_generated(subject.source):
         return _generate(folders, subject, read_stage(CaptureParams, folders.config))
     path = check_capture_place(subject.path, folders)
     if not (is_folder(path) or is_regular(path)):

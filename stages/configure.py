@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from facefolds_core.captures.sources import is_generated
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import STAGE_SECTIONS
 from facefolds_core.params_file import idle_keys, load_params, write_configs
@@ -22,7 +23,7 @@ def configure(data: Path) -> str:
     """Write all subjects' files below `data`; returns a line that says what was made."""
     params = load_params("params.yaml")
     for name, subject in params.subjects.items():
-        if subject.source != "actor":
+        if not is_generated(subject.source):
             check_capture_place(subject.path, SubjectFolders(data / name))
     code = digests_of_stages(ROOT, STAGE_SECTIONS)
     with atomic_folder(data / ".config") as temporary:

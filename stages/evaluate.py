@@ -49,17 +49,17 @@ def evaluate_subject(folders: SubjectFolders) -> str:
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     cost = read_cost(folders, asset.manifest)
     perceptual, model = find_perceptual(device), load_model(folders.model, device)
-    result = evaluate(scene, model, asset, params, perceptual)
-    fresh = None
-    if params.fresh_views and read_subject(folders.config).source == "actor":
-        capture = read_stage(CaptureParams, folders.config)
-        fresh = fresh_json(score_fresh_views(scene, model, asset, params, capture))
-    about = Circumstances(result.matte, params.band, result.changes, fresh, noticed(folders, scene, asset, result))
-    metrics = metrics_json(scene.subject, result.scores, cost, about)
     with atomic_folder(folders.evaluation) as temporary:
+        result = evaluate(scene, model, asset, params, perceptual, temporary)
+        fresh = None
+        if params.fresh_views and read_subject(folders.config).source == "actor":
+            capture = read_stage(CaptureParams, folders.config)
+            fresh = fresh_json(score_fresh_views(scene, model, asset, params, capture))
+        about = Circumstances(result.matte, params.band, result.changes, fresh, noticed(folders, scene, asset, result))
+        metrics = metrics_json(scene.subject, result.scores, cost, about)
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
-        write_record(temporary, result.panels, result.worst, result.seen, shape_of(asset), asset)
+        write_record(temporary, result.panels, result.worst, result.seen, shape_of(asset), asset, result.films)
     write_json(folders.metrics, metrics)
     notes = list(perceptual.missing)
     factor = frame_rate_factor(scene, asset)

@@ -29,12 +29,12 @@ def summary(plan: Plan) -> str:
 
 
 def left_out(scene: Scene) -> list[str]:
-    """The first lines on what the scene does not have, and on what is odd in it."""
-    lines = scene.left_out
+    """The first lines on what the scene does not have, and on what is odd in it: notes come first."""
+    lines = sorted(map(str, scene.left_out), key=lambda line: not line.startswith("note:"))
     shown = [f"  {line}" for line in lines[:SHOWN]]
     if len(lines) > SHOWN:
         shown.append(f"  ... and {len(lines) - SHOWN} more lines in scene.json")
-    return [f"normalize: left out, and notes ({len(lines)}):", *shown] if lines else []
+    return [f"normalize: notes, and what is left out ({len(lines)}):", *shown] if lines else []
 
 
 def normalize(folders: SubjectFolders) -> str:

@@ -20,7 +20,7 @@ def sample(folders: SubjectFolders) -> str:
     scene = read_scene(folders.scene)
     check_frames(model, scene, folders.model)
     with atomic_folder(folders.samples) as temporary:
-        grids = sample_model(model, scene.cameras_of("train"), params, temporary)
+        grids = sample_model(model, scene.views_of("train", params.auto_window.moving_views), params, temporary)
         write_grids(temporary / "grids.npz", grids)
     u0, u1, v0, v1 = grids.windows[0]
     return (

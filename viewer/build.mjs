@@ -1,5 +1,6 @@
-// Bundles src/ into dist/: one module, the page, and the Draco decoder. dist/ works from any static server, offline.
-import { cp, mkdir, rm } from "node:fs/promises";
+// Bundles src/ into dist/: the module and what it loads later, the page, the Draco decoder, and single.js for
+// `facefolds export-html`. dist/ works from any static server, offline.
+import { cp, mkdir, readFile, rm, stat } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -7,24 +8,65 @@ import { build } from "esbuild";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const out = join(here, "dist");
-const draco = join(dirname(createRequire(import.meta.url).resolve("three")), "../examples/jsm/libs/draco");
+const three = dirname(createRequire(import.meta.url).resolve("three"));
+const draco = join(three, "../examples/jsm/libs/draco/gltf"); // without point clouds: a third smaller
+const wasm = join(draco, "draco_decoder.wasm");
+const wrapper = join(draco, "draco_wasm_wrapper.js");
+
+const common = {
+  bundle: true,
+  target: "es2022",
+  minify: true,
+  loader: { ".css": "text" },
+  logLevel: "warning",
+  define: { DRACO_BYTES: String((await stat(wasm)).size) },
+};
 
 await rm(out, { recursive: true, force: true });
 await mkdir(join(out, "draco"), { recursive: true });
 await build({
+  ...common,
   entryPoints: { "facefolds-player": join(here, "src/index.js"), page: join(here, "src/page.js") },
   outdir: out,
-  bundle: true,
   splitting: true,
   format: "esm",
-  target: "es2022",
-  minify: true,
   sourcemap: true,
   legalComments: "linked",
-  loader: { ".css": "text" },
-  logLevel: "warning",
 });
 await cp(join(here, "public"), out, { recursive: true });
-for (const file of ["draco_wasm_wrapper.js", "draco_decoder.wasm"])
-  await cp(join(draco, file), join(out, "draco", file));
+for (const file of [wrapper, wasm]) await cp(file, join(out, "draco", file.slice(draco.length + 1)));
+const worker = { ...common, entryPoints: [join(here, "src/draco/worker.js")], format: "iife" };
+await build({
+  ...worker,
+  outfile: join(out, "draco/worker.js"),
+  banner: { js: 'importScripts("draco_wasm_wrapper.js");' },
+});
+const bare = await build({ ...worker, write: false });
+
+const texts = {
+  wrapper: await readFile(wrapper, "utf8"),
+  worker: bare.outputFiles[0].text,
+  wasm: (await readFile(wasm)).toString("base64"),
+};
+await build({
+  ...common,
+  entryPoints: [join(here, "src/single.js")],
+  outfile: join(out, "single.js"),
+  format: "iife",
+  charset: "ascii",
+  define: { ...common.define, "import.meta.url": "document.baseURI" },
+  plugins: [
+    {
+      name: "draco-files",
+      setup(plugged) {
+        plugged.onResolve({ filter: /^draco-files$/ }, () => ({ path: "draco-files", namespace: "texts" }));
+        plugged.onLoad({ filter: /.*/, namespace: "texts" }, () => ({
+          contents: Object.entries(texts)
+            .map(([name, text]) => `export const ${name} = ${JSON.stringify(text)};`)
+            .join("\n"),
+        }));
+      },
+    },
+  ],
+});
 console.log(`built ${out}`);

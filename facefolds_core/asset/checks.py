@@ -55,6 +55,7 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
     problems += _order_problems(manifest)
     problems += _coordinate_problems(manifest.coordinates)
+    problems += _track_problems(manifest)
     for photo in manifest.photos:
         problems += [f"{photo.file}: {problem}" for problem in _photo_problems(photo, manifest.full.texture.frames)]
     pictures = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
@@ -73,6 +74,16 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         for text in texts
         if len(text) > LONGEST_TEXT or not text.isprintable()
     ]
+    return problems
+
+
+def _track_problems(manifest: Manifest) -> list[str]:
+    track = manifest.head_track()
+    if track is None:
+        return []
+    problems = [f"track: {problem}" for problem in track.problems(manifest.full.texture.frames)]
+    if not problems and np.abs(track.translations).max() > FARTHEST:
+        problems.append(f"track: the head is more than {FARTHEST:g} units away")
     return problems
 
 

@@ -28,6 +28,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.track import Track
 
 TO_Y_UP = [-0.5, -0.5, -0.5, 0.5]
 """Quaternion (x, y, z, w) of the rotation (x, y, z) -> (y, z, x)."""
@@ -112,15 +113,18 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
         images.append({"name": label, "mimeType": "image/png", "bufferView": builder.view(_png(textures[index]))})
         materials.append(_material(label, place))
         nodes.append({"name": label, "mesh": place})
-    count = len(nodes)
+    count, children = len(nodes), list(range(len(nodes)))
+    if level.track is not None:
+        nodes.append({"name": "head", "children": children, **_pose(level.track, frame)})
+        children = [count]
     used = [UNLIT, *([DRACO] if draco else [])]
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
         "extensionsUsed": used,
         **({"extensionsRequired": [DRACO]} if draco else {}),
         "scene": 0,
-        "scenes": [{"nodes": [count]}],
-        "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": list(range(count))}],
+        "scenes": [{"nodes": [len(nodes)]}],
+        "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": children}],
         "meshes": meshes,
         "materials": materials,
         "textures": [{"source": place, "sampler": 0} for place in range(count)],
@@ -132,6 +136,12 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
     }
     with atomic_file(path) as temporary:
         temporary.write_bytes(_container(document, bytes(builder.binary)))
+
+
+def _pose(track: Track, frame: int) -> dict[str, list[float]]:
+    """Of a node: where the head stands in a frame."""
+    w, x, y, z = track.quaternions[frame].tolist()
+    return {"rotation": [x, y, z, w], "translation": track.translations[frame].tolist()}
 
 
 def _material(name: str, texture: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from facefolds_core.asset.codecs import CodecName
@@ -18,6 +19,7 @@ from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track
 
 FORMAT_VERSION = 2
 MANIFEST_NAME = "manifest.json"
@@ -257,6 +259,37 @@ class Photo(Poster):
     w2c: tuple[Row, Row, Row]
 
 
+class Pose(Part):
+    """Where the head stands in one frame: X_world = R X_mesh + t, normalised coordinates.
+
+    Attributes:
+        quaternion: w, x, y, z of R, of unit length.
+        translation: t.
+    """
+
+    quaternion: Row
+    translation: Vector
+
+
+class FilmedView(Part):
+    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
+
+    Attributes:
+        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
+        elevation: the range of the training cameras, degrees.
+    """
+
+    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
+    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
+
+    @field_validator("azimuth", "elevation")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not value[0] <= value[1] <= value[0] + 360:
+            raise ValueError("from the lower to the higher angle, at most a full turn")
+        return value
+
+
 class Compositing(Part):
     """How the layers are put together."""
 
@@ -273,6 +306,8 @@ class Manifest(Part):
         levels: coarsest first; the last is the full one.
         audio: of the sequence; it is in the MP4 files too.
         photos: for comparison.
+        track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
+        view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
@@ -286,11 +321,34 @@ class Manifest(Part):
     audio: StoredFile | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
+    track: Annotated[tuple[Pose, ...] | None, Field(exclude_if=lambda track: track is None)] = None
+    view: Annotated[FilmedView | None, Field(exclude_if=lambda view: view is None)] = None
     manifest_sha256: Sha256 = _UNSEALED
+
+    @field_validator("track")
+    @classmethod
+    def _absent_or_poses(cls, value: tuple[Pose, ...] | None) -> tuple[Pose, ...] | None:
+        if value is None:
+            raise ValueError("poses, or no such key")
+        return value
+
+    @field_validator("view")
+    @classmethod
+    def _absent_or_whole(cls, value: FilmedView | None) -> FilmedView:
+        if value is None:
+            raise ValueError("the filmed range, or no such key")
+        return value
 
     @property
     def full(self) -> Level:
         return self.levels[-1]
+
+    def head_track(self) -> Track | None:
+        """`track` as it is computed with."""
+        if self.track is None:
+            return None
+        quaternions, translations = ([list(getattr(pose, name)) for pose in self.track] for name in Pose.model_fields)
+        return Track(np.array(quaternions, float), np.array(translations, float))
 
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of every file but the manifest."""
@@ -308,15 +366,24 @@ def manifest_schema() -> dict[str, Any]:
     level["properties"]["reflection"] = reflection
     level["required"] = [key for key in level["required"] if key != "reflection"]
     layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
+    poses = schema["properties"]["track"]["anyOf"][0]
+    schema["properties"]["track"] = poses | {"title": "Track"}
+    schema["properties"]["view"] = {"$ref": "#/$defs/FilmedView"}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
+
+
+def sealed(manifest: Manifest) -> tuple[str, str]:
+    """The text of the manifest's file, with its own checksum in it, and that checksum."""
+    value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
+    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'), digest
 
 
 def write_manifest(manifest: Manifest, path: Path) -> Manifest:
     """Write the manifest with its own checksum; returns it as written."""
-    value = manifest.model_dump(mode="json") | {"manifest_sha256": _UNSEALED}
-    text = json.dumps(value, indent=1, allow_nan=False) + "\n"
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    write_text(path, text.replace(f'"manifest_sha256": "{_UNSEALED}"', f'"manifest_sha256": "{digest}"'))
+    text, digest = sealed(manifest)
+    write_text(path, text)
     return manifest.model_copy(update={"manifest_sha256": digest})
 
 

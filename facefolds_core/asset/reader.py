@@ -29,9 +29,11 @@ from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.track import Track
 
 Frame = tuple[NDArray[np.uint8], ...]
 """N textures (h, w, 4) RGBA, straight alpha, layers outermost first, row 0 at the top of the head."""
@@ -46,12 +48,14 @@ class AssetLevel:
         entry: its part of the manifest.
         layers: N meshes, outermost first.
         video: index of the video that is decoded.
+        track: the meshes' motion as a whole; None where they stand still.
     """
 
     folder: Path
     entry: Level
     layers: tuple[TexturedMesh, ...]
     video: int = 0
+    track: Track | None = None
 
     @property
     def num_layers(self) -> int:
@@ -60,6 +64,10 @@ class AssetLevel:
     @property
     def num_frames(self) -> int:
         return self.entry.texture.frames
+
+    def camera_in_head(self, camera: Camera, time: float) -> Camera:
+        """A camera of the world as the meshes' own frame has it at a time in frames."""
+        return camera if self.track is None else self.track.camera(camera, time)
 
     def effects(self) -> tuple[Map, ...] | None:
         """The view effects, one map (h, w, 3, 3) a layer; None where the level has none.
@@ -175,6 +183,14 @@ class Asset:
     def num_frames(self) -> int:
         return self.full.num_frames
 
+    @property
+    def track(self) -> Track | None:
+        return self.full.track
+
+    def camera_in_head(self, camera: Camera, time: float) -> Camera:
+        """As `AssetLevel.camera_in_head`."""
+        return self.full.camera_in_head(camera, time)
+
     def effects(self) -> tuple[Map, ...] | None:
         """As `AssetLevel.effects`."""
         return self.full.effects()
@@ -206,16 +222,20 @@ def read_asset(folder: str | Path) -> Asset:
         problem = check_file(folder / name, size, sha256)
         if problem:
             raise UserError("damaged asset", file=folder / name, found=problem, remedy=REMEDY)
-    return Asset(folder, manifest, tuple(read_level(folder, level) for level in manifest.levels))
+    track = manifest.head_track()
+    return Asset(folder, manifest, tuple(read_level(folder, level, track) for level in manifest.levels))
 
 
-def read_level(folder: Path, level: Level) -> AssetLevel:
+def read_level(folder: Path, level: Level, track: Track | None = None) -> AssetLevel:
     """One level of an asset, its meshes decoded.
+
+    Args:
+        track: of the asset.
 
     Raises:
         UserError: if a mesh is damaged.
     """
-    return AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers))
+    return AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers), track=track)
 
 
 def _read_layer(folder: Path, layer: Layer) -> TexturedMesh:

@@ -23,6 +23,7 @@ from facefolds_core.asset.manifest import (
     Layer,
     Level,
     Manifest,
+    Pose,
     Texture,
     Transform,
     Video,
@@ -36,6 +37,7 @@ from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.track import Track
 
 STATIC_FPS = 1.0
 """Written for a static scene, whose one frame has no rate."""
@@ -61,12 +63,14 @@ class AssetSource:
         fps: frames a second; 0 for a static scene.
         to_capture: normalised coordinates -> capture coordinates.
         sphere_centre: c of the UV map, normalised.
+        track: the meshes' motion as a whole, at the asset's frame rate; None where they stand still.
     """
 
     subject: str
     fps: float
     to_capture: Similarity
     sphere_centre: tuple[float, float, float]
+    track: Track | None = None
 
 
 def write_asset(
@@ -99,12 +103,17 @@ def write_asset(
 
 def manifest_of(source: AssetSource, levels: Sequence[Level]) -> Manifest:
     """A manifest without sound and pictures."""
-    return Manifest(
+    manifest = Manifest(
         generator=f"facefolds {__version__}",
         subject=source.subject,
         coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
         levels=tuple(levels),
     )
+    if source.track is None:
+        return manifest
+    pairs = zip(source.track.quaternions.tolist(), source.track.translations.tolist(), strict=True)
+    poses = tuple(Pose(quaternion=tuple(q), translation=tuple(t)) for q, t in pairs)
+    return manifest.model_copy(update={"track": poses})
 
 
 @dataclass(frozen=True)

@@ -10,20 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.agreement import AGREE, agreement
-from facefolds_core.captures.capture import Capture, Tracking, check_image_sizes, complete_subset
+from facefolds_core.captures.capture import Capture, check_image_sizes, complete_subset
 from facefolds_core.captures.developing import Negative, opacities, photos
 from facefolds_core.captures.images import fit_box
-from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras, stabilizing_similarities
+from facefolds_core.captures.motion import head_motion, in_head
+from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras
 from facefolds_core.captures.picture import Picture
-from facefolds_core.captures.scene import Scene, Split, write_scene
+from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
-from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import FrameStore, write_frames
-from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
 
@@ -52,7 +50,7 @@ class Plan:
         capture: what it is made from.
         scene: all of it but pixels and mesh.
         rows: its images, ordered by camera, then frame.
-        vertices: (K, V, 3) float32 normalised tracked mesh, or None.
+        vertices: (K, V, 3) float32 tracked mesh in the head's own frame, or None.
         sound_start: seconds, where the first frame lies in the capture's sound; None without a sound that fits.
     """
 
@@ -73,9 +71,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     Raises:
         UserError: for everything that is wrong with the capture and shows without decoding its images.
     """
-    moves = _stabilizing(capture, params)
-    still = capture if capture.tracking is None else replace(capture, tracking=_moved(capture.tracking, moves))
-    similarity, notes = normalizing_similarity(still, subject.front)
+    similarity, notes = normalizing_similarity(capture, subject.front)
     culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
     kept, frames, incomplete = complete_subset(capture, culling.kept)
     left_out = [*capture.left_out, *notes, *culling.facts, *incomplete]
@@ -86,61 +82,28 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     splits = split_cameras([capture.views[c].name for c in kept], subject, left_out, capture.root)
     width, height = fit_box(*check_image_sizes(capture, kept, frames), params.long_side, params.short_side)
 
-    cameras: list[Camera] = []
-    rows: list[Row] = []
-    each: list[Split] = []
-    for c, split in zip(kept, splits, strict=True):
-        camera = capture.views[c].camera.resized(width, height)
-        for f, source in enumerate(frames):
-            if params.stabilize:
-                moved = replace(camera, name=f"{camera.name}@{capture.frame_ids[source]}").transformed(moves[source])
-                cameras.append(moved.transformed(similarity))
-            elif f == 0:
-                cameras.append(camera.transformed(similarity))
-            each += [split] * (len(cameras) - len(each))
-            rows.append(Row(len(cameras) - 1, f, (c, source)))
+    cameras = [capture.views[c].camera.resized(width, height).transformed(similarity) for c in kept]
+    rows = [Row(i, f, (c, source)) for i, c in enumerate(kept) for f, source in enumerate(frames)]
+    motion = head_motion(capture, frames, similarity, params)
+    left_out += motion.facts
     scene = Scene(
         subject=name,
         cameras=tuple(cameras),
-        splits=tuple(each),
+        splits=splits,
         frame_ids=tuple(capture.frame_ids[f] for f in frames),
         times=np.arange(len(frames)) / (capture.fps or 1.0),
         fps=fps,
         from_capture=similarity,
         left_out=tuple(left_out),
         folder=folder,
+        poses=motion.track,
     )
-    vertices = None
-    if still.tracking is not None:
-        vertices = similarity.apply(still.tracking.world_vertices()[frames]).astype(np.float32)
-    seen: list[list[int]] = [[] for _ in cameras]
-    for row in rows:
-        seen[row.camera].append(row.frame)
-    check_sight(cameras, seen, scene.frame_ids, vertices, capture.root)
+    vertices, there = None, None
+    if capture.tracking is not None:
+        there = similarity.apply(capture.tracking.world_vertices()[frames])
+        vertices = in_head(there, motion.track).astype(np.float32)
+    check_sight(cameras, scene.frame_ids, None if there is None else there.astype(np.float32), capture.root)
     return Plan(capture, scene, tuple(rows), vertices, sound)
-
-
-def _stabilizing(capture: Capture, params: NormalizeParams) -> list[Similarity]:
-    """For each frame of the capture, what moves its world so that the head stands still; else identities."""
-    if not params.stabilize:
-        return [Similarity.identity()] * len(capture.frame_ids)
-    if capture.tracking is None:
-        raise UserError(
-            "there are no head poses to stabilise by",
-            file=capture.root,
-            expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
-            remedy="set `stabilize: false` in `normalize` for this subject",
-        )
-    return stabilizing_similarities(capture.tracking)
-
-
-def _moved(tracking: Tracking, moves: list[Similarity]) -> Tracking:
-    """The tracked head after the world of each frame was moved."""
-    poses = [
-        np.concatenate([move.rotation @ pose[:, :3], move.apply(pose[:, 3])[:, None]], 1)
-        for move, pose in zip(moves, tracking.poses, strict=True)
-    ]
-    return replace(tracking, poses=np.array(poses))
 
 
 def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
@@ -187,7 +150,7 @@ def _doubts(plan: Plan, written: Path) -> list[Fact]:
         return []
     first = [row.camera for row in plan.rows if row.frame == 0]
     store = FrameStore(written / "frames.arrow")
-    cameras, vertices = [plan.scene.cameras[c] for c in first], plan.vertices[0].astype(np.float64)
+    cameras, vertices = [plan.scene.camera_in_head(c, 0) for c in first], plan.vertices[0].astype(np.float64)
     found = agreement(cameras, vertices, tracking.faces, lambda i: store.image(first[i], 0))
     if found is None or found >= AGREE:
         return []

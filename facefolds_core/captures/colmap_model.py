@@ -132,7 +132,7 @@ def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, p
 def _w2c(pose: list[float], file: Path, place: str) -> Array:
     """(3, 4) from a quaternion w, x, y, z and a translation."""
     q, t = np.array(pose[:4]), np.array(pose[4:])
-    length = np.linalg.norm(q)
+    length = np.linalg.norm(np.where(np.abs(q) <= HUGE, q, np.inf))
     if not (np.abs(pose) <= HUGE).all() or not 0.5 < length < 2:
         raise _wrong(file, place, "a garbled pose", "a quaternion of length 1 and a translation", pose)
     w, x, y, z = q / length

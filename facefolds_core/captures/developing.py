@@ -21,6 +21,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.area_kernel import area_mean
 from facefolds_core.captures.capture import Capture, check_plate_size, wrong_size
 from facefolds_core.captures.images import corrected_colour, display_colour, downsample, to_8bit
 from facefolds_core.captures.lens import Lens, undistort
@@ -67,22 +68,49 @@ def photos(
     """
 
     def finish(negative: Negative, photo: Image) -> Image:
-        values = downsample(photo, width, height)
         colour = capture.views[negative.view].colour
+        if colour is None and not params.display_colour:
+            return _averaged_8bit(negative, photo, width, height)
+        values = _averaged(negative, photo, width, height)
         if colour is not None:
             values = corrected_colour(values, colour)
         return to_8bit(display_colour(values) if params.display_colour else values)
 
-    return _developed(capture, negatives, "rgb", finish)
+    return _developed(capture, negatives, "rgb", width, finish)
 
 
 def opacities(capture: Capture, negatives: Sequence[Negative], width: int, height: int) -> Iterator[Row]:
     """Masks or mattes (height, width, 1); raises like `photos`."""
-    return _developed(capture, negatives, "opacity", lambda _, mask: to_8bit(downsample(mask, width, height)))
+    return _developed(capture, negatives, "opacity", width, lambda one, mask: _averaged_8bit(one, mask, width, height))
+
+
+def _averaged(negative: Negative, photo: Image, width: int, height: int) -> NDArray[np.float32]:
+    """(height, width, C) in 0..255: area averages."""
+    if _quickly(negative, photo, width, height):
+        return area_mean(photo, width, height)
+    return downsample(photo, width, height)
+
+
+def _averaged_8bit(negative: Negative, photo: Image, width: int, height: int) -> Image:
+    """`_averaged`, rounded."""
+    if photo.shape[:2] == (height, width):
+        return photo
+    if _quickly(negative, photo, width, height):
+        return area_mean(photo, width, height, whole=True).astype(np.uint8)
+    return to_8bit(downsample(photo, width, height))
+
+
+def _quickly(negative: Negative, photo: Image, width: int, height: int) -> bool:
+    """Whether `area_mean` does it: it rounds its sums otherwise, so that photos, which came first, keep OpenCV's."""
+    return isinstance(negative.picture, VideoFrame) and photo.shape[0] >= height and photo.shape[1] >= width
 
 
 def _developed(
-    capture: Capture, negatives: Sequence[Negative], channels: Channels, finish: Callable[[Negative, Image], Image]
+    capture: Capture,
+    negatives: Sequence[Negative],
+    channels: Channels,
+    width: int,
+    finish: Callable[[Negative, Image], Image],
 ) -> Iterator[Row]:
     """Rows of the scene, a bounded number of them ahead of who asks."""
 
@@ -111,7 +139,8 @@ def _developed(
     threads = -(-cores // LANES)
 
     def lane(wanted: Sequence[Negative]) -> Iterator[Row]:
-        pictures = decoded([(negative.picture, negative.place) for negative in wanted], channels, threads)
+        fine = 4 * width > 3 * capture.views[wanted[0].view].camera.width
+        pictures = decoded([(negative.picture, negative.place) for negative in wanted], channels, threads, fine)
         for negative, photo in zip(wanted, pictures, strict=True):
             with working:
                 row = develop(negative, photo)

@@ -29,7 +29,7 @@ Photos = Mapping[str, Mapping[str, Picture]]
 SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """One camera, as its layout has it.
 

@@ -203,4 +203,5 @@ def corrected_colour(values: NDArray[np.float32], colour: Colour) -> NDArray[np.
 
 def to_8bit(values: NDArray[np.float32]) -> Image:
     """Round 0..255 to uint8."""
-    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+    rounded = np.round(values)
+    return np.clip(rounded, 0, 255, out=rounded).astype(np.uint8)

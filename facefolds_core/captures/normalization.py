@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking
+from facefolds_core.captures.front import find_front
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
@@ -83,20 +84,8 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
     cameras = [view.camera for view in capture.views]
     centre = nearest_to_axes(cameras)
     if front is None:
-        facing = np.mean([camera.centre - centre for camera in cameras], axis=0)
-        up = np.mean([-camera.rotation[1] for camera in cameras], axis=0)
-        if np.linalg.norm(facing) < 1e-9 or np.linalg.norm(np.cross(facing, up)) < 1e-9:
-            raise UserError(
-                "the cameras do not tell where the subject faces",
-                file=capture.root,
-                place="front",
-                remedy="set `front` of this subject in params.yaml to a camera that faces it, upright",
-            )
-        return (
-            centre,
-            orientation(facing, up),
-            [fact("front_guessed")],
-        )
+        facing, up, note = find_front(cameras, centre, capture.root)
+        return centre, orientation(facing, up), [note]
     names = [camera.name for camera in cameras]
     if front not in names:
         raise UserError(
@@ -136,15 +125,6 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
             remedy="check the camera poses; cameras must look at one subject from different places",
         )
     return Similarity(1 / distance, rotation, -(rotation @ centre) / distance), notes
-
-
-def stabilizing_similarities(tracking: Tracking) -> list[Similarity]:
-    """For each frame, world -> the world in which the head has its mean pose."""
-    facing, up = _mean_pose(tracking)
-    still = Similarity(
-        1.0, orientation(facing, up).T @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), tracking.poses[:, :, 3].mean(0)
-    )
-    return [still.after(Similarity(1.0, pose[:, :3], pose[:, 3]).inverse()) for pose in tracking.poses]
 
 
 def view_angles(cameras: Sequence[Camera]) -> Array:
@@ -200,9 +180,21 @@ def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact]
         unused: facts on cameras that were left out, to say why one that is named is not there.
 
     Raises:
-        UserError: if a camera that is named is not there, or for both, or no camera is left for training.
+        UserError: if a camera that is named is not there, or for both, no camera is left for training, or `every` of
+            `holdout` finds none.
     """
     held = _named("holdout", subject.holdout, names, unused, file)
+    if isinstance(subject.holdout, HoldoutEvery) and not held:
+        every = subject.holdout.every
+        raise UserError(
+            "too few cameras to hold one out",
+            file=str(file),
+            place="holdout",
+            expected=f"at least {every} cameras for `holdout: {{every: {every}}}`",
+            found=f"{len(names)}: {shorten(names)}",
+            remedy=f"name one or two in `holdout` of this subject, such as ['{names[len(names) // 2]}']; with "
+            "`holdout: []` all are trained on, and `evaluate` has nothing to score",
+        )
     rest = [name for name in names if name not in held]
     validating = _named("validate", subject.validation or (), names, unused, file, rest)
     both = sorted(held & validating)

@@ -105,8 +105,7 @@ class Hdf5Picture:
     dataset: str
 
     def size(self, place: str) -> tuple[int, int]:
-        data = self._bytes(place)
-        return _size_of(data, lambda: data, self.file, self._at(place), FORMATS)
+        return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), FORMATS)
 
     def rgb(self, place: str) -> Image:
         return rgb_of(self._bytes(place), self.file, self._at(place))
@@ -117,10 +116,13 @@ class Hdf5Picture:
     def _at(self, place: str) -> str:
         return f"{place} ({self.dataset})"
 
-    def _bytes(self, place: str) -> bytes:
+    def _bytes(self, place: str, most: int | None = None) -> bytes:
         try:
             value = open_hdf5(self.file)[self.dataset]
-            data = value[()] if isinstance(value, h5py.Dataset) else None
+            part = (
+                slice(most) if isinstance(value, h5py.Dataset) and value.shape[:1] and value.dtype.itemsize == 1 else ()
+            )
+            data = value[part] if isinstance(value, h5py.Dataset) else None
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise _wrong(self.file, self._at(place), "cannot read an image", str(error)) from None
         if data is None or np.asarray(data).dtype.kind not in "uiSV":
@@ -154,13 +156,15 @@ class VideoFrame:
         return next(self.video.frames([self.index], "opacity"))
 
 
-def decoded(pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1) -> Iterator[Image]:
+def decoded(
+    pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1, fine: bool = True
+) -> Iterator[Image]:
     """The pixels of pictures, one after the other; frames of one video that follow one another cost one reading.
 
     Args:
         pictures: each with its place; frames of a video in the order of time.
         channels: "rgb" (H, W, 3) or "opacity" (H, W, 1).
-        threads: of a video's decoder.
+        threads, fine: of `Video.frames`.
 
     Raises:
         UserError: if one is missing or damaged.
@@ -172,7 +176,7 @@ def decoded(pictures: Sequence[tuple[Picture, str]], channels: Channels, threads
     for video, run in itertools.groupby(pictures, video_of):
         if video is not None:
             indices = [picture.index for picture, _ in run if isinstance(picture, VideoFrame)]
-            yield from video.frames(indices, channels, threads)
+            yield from video.frames(indices, channels, threads, fine)
         else:
             for picture, place in run:
                 yield picture.rgb(place) if channels == "rgb" else picture.opacity(place)

@@ -1,18 +1,20 @@
 """The normalised scene: what `normalize` writes and every later stage reads.
 
 A folder with
-- `scene.json`: cameras, split, times, the transform from the capture (this module's `Scene`);
+- `scene.json`: cameras, split, times, the transform from the capture, and where the head turns much its pose in each
+  frame (this module's `Scene`);
 - `frames.arrow`: all images, one row per (camera, frame) (`frames.FrameStore`);
 - `masks.arrow`: true opacity of images of cameras that do not train, where the capture has it (same format, one
   channel);
 - `plates.arrow`: a clean plate, the picture without the subject, of cameras for which the capture has one (frame 0);
 - `mattes.arrow`: opacity that training may use, of any camera and frame, where the capture has it (one channel);
-- `surface.npz`: tracked mesh in normalised coordinates, where the capture has one: `vertices` (K, V, 3) float32 and
+- `surface.npz`: tracked mesh in the head's own frame, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32;
 - `audio.wav`: the sound from the first frame on, where the capture has it.
 
 Normalised world: the subject is at the origin, faces +x, up is +z, its left is +y; camera centres are about 1 unit
-away.
+away. Cameras stand in the world. The head's own frame is the world in which a turning head would stand in its mean
+pose; without `poses` it is the world itself.
 """
 
 from __future__ import annotations
@@ -31,10 +33,11 @@ from facefolds_core.files import read_json, write_json
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track
 from facefolds_core.reading import check_regular, is_there, remake
 
-SCENE_VERSION = 2
-"""Version 1 had lines of text in `left_out`; it is still read."""
+SCENE_VERSION = 3
+"""Version 1 had lines of text in `left_out`, version 2 no `poses`; both are still read."""
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
 
@@ -58,6 +61,7 @@ class Scene:
         from_capture: capture coordinates -> normalised coordinates.
         left_out: a fact for each camera, frame or image of the capture that is not here, with the reason.
         folder: where it was read from.
+        poses: the head's own frame -> world in each of the K frames; None where the head is taken to stand still.
     """
 
     subject: str
@@ -69,6 +73,7 @@ class Scene:
     from_capture: Similarity
     left_out: tuple[Fact, ...]
     folder: Path
+    poses: Track | None = None
 
     @property
     def width(self) -> int:
@@ -97,9 +102,25 @@ class Scene:
         """The cameras by which something may be chosen: those for validation; without any, the held-out ones."""
         return "validate" if "validate" in self.splits else "holdout"
 
-    def cameras_of(self, split: Split) -> list[Camera]:
-        """The cameras of one split."""
-        return [self.cameras[i] for i in self.indices(split)]
+    def camera_in_head(self, index: int, frame: int) -> Camera:
+        """Camera `index` as it stands in the head's own frame in frame `frame`: all rays at the subject are its."""
+        return self.cameras[index] if self.poses is None else self.poses.camera(self.cameras[index], frame)
+
+    def views_of(self, split: Split, poses: int = 1) -> list[Camera]:
+        """Cameras of one split in the head's own frame: of a still head the cameras, else each in `poses` frames.
+
+        The frames are spread evenly, and differ from camera to camera, so that few cameras see the head in most poses.
+        """
+        indices, frames = self.indices(split), self.num_frames
+        if self.poses is None:
+            return [self.cameras[i] for i in indices]
+        count = min(poses, frames)
+        turns = [
+            (position + part * len(indices)) * frames // (count * len(indices))
+            for position in range(len(indices))
+            for part in range(count)
+        ]
+        return [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)]
 
     def open_frames(self) -> FrameStore:
         return FrameStore(self.folder / "frames.arrow")
@@ -170,8 +191,22 @@ def write_scene(scene: Scene, folder: Path) -> None:
             "fps": scene.fps,
             "from_capture": scene.from_capture.to_json(),
             "left_out": [one.to_json() for one in scene.left_out],
+            "poses": None if scene.poses is None else _poses_json(scene.poses),
         },
     )
+
+
+def _poses_json(poses: Track) -> list[dict[str, list[float]]]:
+    pairs = zip(poses.quaternions.tolist(), poses.translations.tolist(), strict=True)
+    return [{"quaternion": q, "translation": t} for q, t in pairs]
+
+
+def _read_poses(value: Any) -> Track | None:
+    if value is None:
+        return None
+    rows = [[*one["quaternion"], *one["translation"]] for one in value]
+    numbers = np.array(rows, float).reshape(len(rows), 7)
+    return Track(numbers[:, :4].copy(), numbers[:, 4:].copy())
 
 
 def read_scene(folder: str | Path) -> Scene:
@@ -208,6 +243,7 @@ def read_scene(folder: str | Path) -> Scene:
             from_capture=Similarity.from_json(value["from_capture"]),
             left_out=tuple(read_fact(one) for one in value["left_out"]),
             folder=folder,
+            poses=_read_poses(value.get("poses")),
         )
         _check(scene)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -231,6 +267,8 @@ def _check(scene: Scene) -> None:
         raise ValueError(f"splits {sorted(set(scene.splits))}")
     if scene.times.shape != (frames,) or not np.isfinite([*scene.times, scene.fps]).all() or not 0 <= scene.fps < 1e4:
         raise ValueError("times or a rate that are none")
+    if scene.poses is not None and (problems := scene.poses.problems(frames)):
+        raise ValueError(f"poses: {problems[0]}")
     similarity = scene.from_capture
     if (similarity.rotation.shape, similarity.translation.shape) != ((3, 3), (3,)):
         raise ValueError("from_capture is no similarity")

@@ -33,7 +33,6 @@ _CALIBRATION = "mend the calibration of these cameras, or take them out of the c
 
 def check_sight(
     cameras: Sequence[Camera],
-    seen: Sequence[Sequence[int]],
     frame_ids: Sequence[str],
     vertices: NDArray[np.floating] | None,
     file: object,
@@ -42,7 +41,6 @@ def check_sight(
 
     Args:
         cameras: C, normalised.
-        seen: for each camera the frames (indices) that it has images of.
         frame_ids: K names of frames.
         vertices: (K, V, 3) of the tracked mesh, normalised, or None.
         file: the capture, for the message.
@@ -53,7 +51,7 @@ def check_sight(
             if the mesh is absurdly small or large, or in a frame lies in no camera's picture. Names the cameras.
     """
     _check_angles(cameras, str(file))
-    _check_places(cameras, seen, str(file))
+    _check_places(cameras, str(file))
     if vertices is None:
         around = np.array([d for d in product((-1, 0, 1), repeat=3) if any(d)], float)
         ball = RADIUS * around / np.linalg.norm(around, axis=1, keepdims=True)
@@ -63,7 +61,7 @@ def check_sight(
         _check_size(vertices, frame_ids, str(file))
         points = np.asarray(vertices[:, :: max(1, vertices.shape[1] // SAMPLES)], float)
         what = "the tracked mesh"
-    views = [in_picture(camera, points[list(frames)]) for camera, frames in zip(cameras, seen, strict=True)]
+    views = [in_picture(camera, points) for camera in cameras]
     blind = [camera.name for camera, view in zip(cameras, views, strict=True) if not view.any()]
     if blind:
         every = len(blind) == len(cameras)
@@ -76,8 +74,8 @@ def check_sight(
             remedy=_CALIBRATION,
         )
     lost = set(range(len(frame_ids)))
-    for frames, view in zip(seen, views, strict=True):
-        lost -= {frame for frame, visible in zip(frames, view, strict=True) if visible.any()}
+    for view in views:
+        lost -= {frame for frame, visible in enumerate(view) if visible.any()}
     if lost:
         raise UserError(
             "the tracked mesh lies in no camera's picture",
@@ -111,7 +109,7 @@ def _check_angles(cameras: Sequence[Camera], file: str) -> None:
         )
 
 
-def _check_places(cameras: Sequence[Camera], seen: Sequence[Sequence[int]], file: str) -> None:
+def _check_places(cameras: Sequence[Camera], file: str) -> None:
     centres = np.array([camera.centre for camera in cameras])
     distances = np.linalg.norm(centres, axis=1)
     odd = [
@@ -127,13 +125,12 @@ def _check_places(cameras: Sequence[Camera], seen: Sequence[Sequence[int]], file
             expected=f"{NEAR} to {FAR:g} times the median camera's distance",
             remedy=_CALIBRATION,
         )
-    first = centres[[frames[0] == seen[0][0] for frames in seen]]  # of one moment, if cameras move
-    if len(first) > 1 and np.linalg.norm(first - first[0], axis=1).max() < 1e-3:
+    if len(centres) > 1 and np.linalg.norm(centres - centres[0], axis=1).max() < 1e-3:
         raise UserError(
             "all cameras stand in one place",
             file=file,
             expected="cameras around the subject",
-            found=f"{len(first)} cameras less than a thousandth of their distance from the subject apart",
+            found=f"{len(centres)} cameras less than a thousandth of their distance from the subject apart",
             remedy="check the camera poses; cameras must look at one subject from different places",
         )
 

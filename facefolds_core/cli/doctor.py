@@ -1,13 +1,20 @@
-"""Check that this machine has what pip cannot install, and that DVC's files are whole; say or mend what is wrong."""
+"""Check that this machine has what pip cannot install, and that DVC's files are whole; say or mend what is wrong.
+
+With a path: say what capture lies there, and what the pipeline would make of it.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import sys
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from facefolds_core.cli.mending import mend
-from facefolds_core.errors import report_user_errors
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.reading import is_there
 
 SYSTEM_LIBRARIES = {
     # shared object -> (who needs it, Debian/Ubuntu package, Fedora package)
@@ -32,7 +39,15 @@ def missing_libraries(libraries: dict[str, tuple[str, str, str]] = SYSTEM_LIBRAR
     return lines
 
 
-def command() -> None:
+def command(
+    path: Annotated[
+        Path | None, typer.Argument(help="A folder or file: say what it is, and how it would be used.")
+    ] = None,
+) -> None:
+    if path is not None:
+        with report_user_errors("doctor"):
+            _appraise(path)
+        return
     with report_user_errors("doctor"):
         for line in mend(Path.cwd()):
             print(f"doctor: {line}")
@@ -45,3 +60,17 @@ def command() -> None:
         print("doctor: not needed by the pipeline, but missing:\n  " + "\n  ".join(optional))
     else:
         print("doctor: all system libraries are here")
+
+
+def _appraise(path: Path) -> None:
+    if not is_there(path):
+        raise UserError("nothing there", file=path, remedy="correct the path")
+    try:
+        from facefolds_core.captures.appraisal import appraise  # here: without a path the base is enough
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("facefolds_core"):
+            raise
+        remedy = "pip install 'facefolds[train]'"
+        raise UserError(f"the package {error.name} is missing", remedy=remedy) from None
+    for line in appraise(path):
+        typer.echo(line)

@@ -11,6 +11,7 @@ import typer
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting.build import make_report
+from facefolds_core.reporting.index import make_index
 
 
 def evaluated_subjects(data: Path) -> list[Path]:
@@ -32,11 +33,20 @@ def command(
         list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
     ] = None,
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    against: Annotated[
+        Path | None,
+        typer.Option(help="Another run's metrics.json, kept earlier: the page says what is better and worse."),
+    ] = None,
 ) -> None:
-    """Write one self-contained page a subject, report.html in its folder: pictures, scores, layers, costs."""
+    """Write one self-contained page a subject, report.html in its folder: pictures, scores, layers, costs.
+
+    Without names, an index of all subjects too: report.html in the folder that holds theirs.
+    """
     with report_user_errors("report"):
         for folder in subjects or evaluated_subjects(data):
             start = time.perf_counter()
-            path = make_report(SubjectFolders(folder))
+            path = make_report(SubjectFolders(folder), against)
             seconds = time.perf_counter() - start
             typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
+        if not subjects:
+            typer.echo(f"report: {make_index(data, evaluated_subjects(data))}, all subjects")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -72,18 +74,20 @@ class RadialManifolds(nn.Module):
 
     def compiled_distances(self, offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
+        return self.tracer()(offsets, directions)
+
+    def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
         rho = self.radii().detach().cpu().numpy()
         window = np.array(self.window)
-        found: np.ndarray = crossing_distances(
-            np.ascontiguousarray(offsets),
-            np.ascontiguousarray(directions),
-            rho,
-            window,
-            ceiling(rho, window),
-            self.radius,
-            STEP,
-        )
-        return found
+        top = ceiling(rho, window)
+
+        def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
+            offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
+            found: np.ndarray = crossing_distances(offsets, directions, rho, window, top, self.radius, STEP)
+            return found
+
+        return distances
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         """Directions (u, v) [M, 2] -> rho [M, N], and whether they lie inside the window [M, N]."""

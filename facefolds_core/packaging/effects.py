@@ -79,7 +79,9 @@ def fit_effects(
     views = _views(content, scene, cameras, frames, rays)
     for downscale in params.downscales:
         sizes = [(-(-layer.crop[3] // downscale), -(-layer.crop[2] // downscale)) for layer in content.layers]
-        parts = [_equations(view, textures, sizes, params) for view in views if view.photos]
+        parts = [
+            Equations.joined([_equations(view, textures, sizes, params) for view in of_camera]) for of_camera in views
+        ]
         picture = _solved(parts, sizes, params)
         if picture is None or len(picture.png()) <= allowed_bytes:
             return picture
@@ -130,16 +132,22 @@ def _maps(solution: Array, sizes: Sequence[tuple[int, int]]) -> list[Map]:
 
 def _views(
     content: LevelContent, scene: Scene, cameras: Sequence[int], frames: Sequence[int], rays: int
-) -> list[Pixels]:
-    """Of each camera, `rays` pixels that hit anything, and what its photos show there."""
+) -> list[list[Pixels]]:
+    """Of each camera with photos, `rays` pixels that hit anything, and what its photos show there: the same pixels in
+    all frames; of a head that turns, others in each."""
     meshes, photos = [layer.mesh for layer in content.layers], scene.open_frames()
     rng, views = np.random.default_rng(0), []
     for index in progress(cameras, desc="view effects", unit="camera"):
-        camera = scene.cameras[index]
-        hits = cast_layers(camera, meshes)
-        chosen = hits.choose(rng, rays)
-        shown = {k: _photo(photos.image(index, k), chosen) for k in frames if (index, k) in photos}
-        views.append(Pixels(hits.at(chosen), to_eye(camera).reshape(-1, 3)[chosen], shown))
+        of_camera = []
+        for together in [list(frames)] if scene.poses is None else [[k] for k in frames]:
+            camera = scene.camera_in_head(index, together[0])
+            hits = cast_layers(camera, meshes)
+            chosen = hits.choose(rng, rays)
+            shown = {k: _photo(photos.image(index, k), chosen) for k in together if (index, k) in photos}
+            if shown:
+                of_camera.append(Pixels(hits.at(chosen), to_eye(camera).reshape(-1, 3)[chosen], shown))
+        if of_camera:
+            views.append(of_camera)
     return views
 
 

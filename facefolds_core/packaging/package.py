@@ -17,6 +17,7 @@ from PIL import Image
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.effects import EffectsPicture
+from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.manifest import (
     MANIFEST_NAME,
     Level,
@@ -99,9 +100,10 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         UserError: if the export cannot be an asset.
     """
     _check_order(params.levels)
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     factor = params.frame_rate_factor if frames > 1 else 1
+    track = None if scene.poses is None else scene.poses.resampled(factor)
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, track)
     cameras = training_cameras(scene)
     with (
         atomic_folder(folder) as temporary,
@@ -221,15 +223,17 @@ def _crf(
 def _with_extras(
     folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
 ) -> Manifest:
-    """Add sound, a poster and photos."""
+    """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
         path = folder / f"audio{scene.audio.suffix}"
         shutil.copyfile(scene.audio, path)
         update["audio"] = StoredFile(**_stored(path))
-    cameras = training_cameras(scene)
-    if cameras:
-        update["poster"] = _poster(folder / "poster.jpg", manifest.full, _frontal(cameras), jpeg_quality)
+    train = scene.indices("train")
+    if train:
+        update["view"] = filmed_view([scene.cameras[index] for index in train])
+        frontal = _frontal([scene.camera_in_head(index, 0) for index in train])
+        update["poster"] = _poster(folder / "poster.jpg", manifest.full, frontal, jpeg_quality)
     return manifest.model_copy(update=update)
 
 

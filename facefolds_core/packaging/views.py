@@ -32,7 +32,8 @@ def spread(count: int, wanted: int) -> list[int]:
 
 
 def training_cameras(scene: Scene) -> list[Camera]:
-    return [scene.cameras[index] for index in scene.indices("train")]
+    """In the head's own frame."""
+    return scene.views_of("train")
 
 
 class ViewMeter:

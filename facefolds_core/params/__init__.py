@@ -5,7 +5,7 @@ below takes a number that somebody might tune from anywhere but a section (tests
 """
 
 from facefolds_core.params.base import Section, merged, nested, value_at
-from facefolds_core.params.capture import CaptureParams, NormalizeParams
+from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams
 from facefolds_core.params.compress import (
     BetweenParams,
     CodecName,
@@ -25,6 +25,7 @@ from facefolds_core.params.explicit import (
     ExplicitParams,
     GridTextureParams,
     LossParams,
+    MovingParams,
     PruningParams,
 )
 from facefolds_core.params.export import (
@@ -85,6 +86,8 @@ __all__ = [
     "MeterParams",
     "MlpParams",
     "MlpStartParams",
+    "MotionParams",
+    "MovingParams",
     "NormalizeParams",
     "Overrides",
     "Preset",

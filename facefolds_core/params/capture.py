@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -27,6 +27,9 @@ class CaptureParams(Section):
     fps: FrameRate = 30.0
     """Frames a second."""
 
+    head_motion: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """Degrees by which the head turns to each side as it performs, with a nod of half as much."""
+
     seed: Seed = 0
     """Of the procedural skin, freckles and hair."""
 
@@ -35,6 +38,16 @@ class CaptureParams(Section):
 
     mattes: bool = False
     """Offer the true opacity of all cameras to the training. Off: it serves scoring only, as in a real capture."""
+
+
+class MotionParams(Section):
+    """When `stabilize: auto` stabilises: if either is exceeded in any frame, against the mean pose."""
+
+    degrees: Annotated[float, Field(ge=0, le=180)] = 2.0
+    """Turn of the head."""
+
+    shift: Annotated[float, Field(ge=0, le=10)] = 0.02
+    """Shift of the head, shares of the tracked mesh's largest extent (of a head about 5 mm)."""
 
 
 class NormalizeParams(Section):
@@ -55,6 +68,10 @@ class NormalizeParams(Section):
     display_colour: bool = False
     """Apply Multiface's display colour correction."""
 
-    stabilize: bool = False
-    """Move each frame's cameras by the head pose so that the head stands still. Cameras then move from frame to frame,
-    which the static background and held-out scoring do not expect: see docs/guide/subjects.md."""
+    stabilize: bool | Literal["auto"] = "auto"
+    """Whether the model is made in the head's own frame: true moves each frame's cameras by the head's pose, false
+    takes the head to stand still, "auto" decides by `motion`. Where the poses of the capture are all alike, those are
+    taken that lay its tracked meshes over one another. See docs/guide/subjects.md."""
+
+    motion: MotionParams = MotionParams()
+    """How much motion of the head is much."""

@@ -36,6 +36,15 @@ class EvaluateParams(Section):
     """To both sides of the outline, pixels: how far the subject's mask is eroded and dilated for the scores inside and
     along it."""
 
+    films: bool = True
+    """Film the held-out cameras, truth and asset side by side: the report plays them."""
+
+    film_crf: Annotated[int, Field(ge=0, le=51)] = 18
+    """Constant rate factor of these films, of libx264: smaller is finer."""
+
+    cvvdp_frames: Count = 60
+    """Of each camera that CVVDP judges, where it is installed: they are held in memory together."""
+
     fresh_views: Natural = 0
     """For the embedded actor: so many new views, filmed for the purpose and scored by their angle; 0 films none."""
 

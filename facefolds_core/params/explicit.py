@@ -100,8 +100,29 @@ class BackgroundParams(Section):
     frames: Count = 5
     """Frames whose mean is taken, at most: rooms stand still."""
 
+    moving_frames: Count = 12
+    """The same of a head that turns: each frame uncovers another part of the room, and costs a look at the volume."""
+
     rate: Annotated[float, Field(ge=0, le=1)] = 0.5
     """A pixel moves by this, times the cube of the transmittance, times its error, each time it is met."""
+
+
+class MovingParams(Section):
+    """What a head that turns (`normalize.stabilize`) needs beside: its rays meet other texels in each frame."""
+
+    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 2048
+    """Memory in which the crossings of all frames' rays are kept, 56 bytes a ray of twelve layers; what does not fit is
+    traced anew each time, which takes longer."""
+
+    shares: Count = 3
+    """The rays of a frame are dealt into shares of as many as a step takes; so many of them are used, in each frame
+    others. Tracing them takes longer than the steps themselves: more cost time, and win little."""
+
+    sample: Count = 64
+    """One ray in so many is looked at to know how many meet the subject,"""
+
+    sample_frames: Count = 6
+    """in so many frames."""
 
 
 class PruningParams(Section):
@@ -191,6 +212,9 @@ class ExplicitParams(Section):
 
     background: BackgroundParams = BackgroundParams()
     """Of each camera."""
+
+    moving: MovingParams = MovingParams()
+    """Of a head that turns."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""

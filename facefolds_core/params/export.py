@@ -23,6 +23,9 @@ class AutoWindowParams(Section):
     frames: Count = 3
     """Frames that are looked at, evenly spread: the first, the middle and the last."""
 
+    moving_views: Count = 3
+    """Frames of each training camera that are looked at where the head turns: it shows other sides in each."""
+
     margin: Factor = 2.0
     """On each side, in steps of the lattice of rays on the surface: it covers what lies between the rays."""
 
@@ -139,6 +142,10 @@ class BakeParams(Section):
 
     hold_frames: Count = 6
     """Frames, evenly spread, in which it is looked how much a texel shows; the greatest counts."""
+
+    moving_views: Count = 2
+    """Frames whose pose each training camera is given where the head turns: memory and time grow with them, and the
+    rays need to meet each texel only."""
 
     damping: Annotated[float, Field(gt=0, le=1e6)] = 0.05
     """Added to a texel's sum of weights in each step: what is hardly seen hardly moves."""

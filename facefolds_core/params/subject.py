@@ -82,20 +82,20 @@ class Subject(Overrides):
     """Folder of the capture; for "actor" the generator's package."""
 
     segment: str | None = None
-    """Multiface segment; null takes the only one."""
+    """Which of a capture's segments (Multiface), sequences or performances; null takes the only one."""
 
     frames: FrameRange | Many[str] | None = None
     """A range of positions, or a list of frame names; null takes all."""
 
     holdout: Many[str] | HoldoutEvery = HoldoutEvery(every=12)
-    """Camera names, or {every: n}: cameras for scoring only. Nothing is chosen by them."""
+    """Camera names, or {every: n}: cameras for scoring only. Nothing is chosen by them. [] holds out none."""
 
     validation: Annotated[Many[str] | HoldoutEvery | None, Field(alias="validate")] = None
     """Camera names, or {every: n} of the cameras that are not held out: set aside from training and scored apart, while
     something is to be chosen (sweeps, `recommend`). null trains on all."""
 
     front: str | None = None
-    """For captures without a tracked mesh, the name of a camera that faces the subject upright."""
+    """For captures without a tracked mesh, a camera that faces the subject upright; null finds the front."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""
@@ -104,4 +104,4 @@ class Subject(Overrides):
     """Where the capture's K puts the centre of the first pixel, 0 or 0.5; null takes the source's habit."""
 
     fps: FrameRate | None = None
-    """Frames a second; null takes the source's (30 for Multiface)."""
+    """Frames a second; null takes the source's (30 for Multiface, a video's own)."""

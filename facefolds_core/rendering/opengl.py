@@ -20,7 +20,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.effects import Map
 from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy
-from facefolds_core.rendering.reference import BLACK, Image, Layered
+from facefolds_core.rendering.reference import BLACK, Image, Layered, seen_from
 
 VERTEX = """
 #version 330
@@ -116,11 +116,13 @@ class OpenGLRenderer:
         """As `render_asset`: rgb (H, W, 3) and alpha (H, W), float32 in [0, 1], of frame `frame`.
 
         Args:
+            camera: in the world; an asset with a track stands there as it did in that frame.
             background: RGB in [0, 1], (3,) or (H, W, 3).
 
         Raises:
             UserError: if the picture is larger than the card allows.
         """
+        camera = seen_from(self._asset, camera, frame)
         self._show_frame(frame)
         target = self._sized_target(camera)
         _write(target, colour=True, depth=True)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.compositing import FrontToBack
 from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 
@@ -149,5 +150,15 @@ def composite(
 
 
 def render_asset(asset: Layered, camera: Camera, frame: int, background: ArrayLike = BLACK) -> tuple[Image, Image]:
-    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`. For many, keep an `AssetCaster` and its `Hits`."""
-    return composite(AssetCaster(asset).cast(camera), asset.frame(frame), background)
+    """One picture: rgb (H, W, 3) and alpha (H, W) of frame `frame`. For many, keep an `AssetCaster` and its `Hits`.
+
+    Args:
+        camera: in the world; an asset with a track stands there as it did in that frame.
+    """
+    return composite(AssetCaster(asset).cast(seen_from(asset, camera, frame)), asset.frame(frame), background)
+
+
+def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:
+    """A camera of the world in the frame of the meshes, which an asset with a `track` moves."""
+    track: Track | None = getattr(asset, "track", None)
+    return camera if track is None else track.camera(camera, frame)

@@ -16,9 +16,13 @@ from facefolds_core.facts import worded
 from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
-from facefolds_core.reporting.facts import Facts, read_facts
+from facefolds_core.reporting.facts import Facts, read_facts, read_metrics
+from facefolds_core.reporting.films import films
+from facefolds_core.reporting.verdicts import verdicts
+from facefolds_core.scoring.panels import HEADLINES
 from facefolds_core.scoring.record import Record, View, read_record
 from facefolds_core.scoring.sheets import MAX_ERROR
+from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 REPORT_NAME = "report.html"
 MOST_PIXELS = 2_500_000
@@ -42,26 +46,31 @@ class Subject:
     scene: Scene | None
     record: Record | None
     views: tuple[View, ...]
+    reference: dict[str, Any] | None = None
 
 
-def make_report(folders: SubjectFolders) -> Path:
+def make_report(folders: SubjectFolders, reference: Path | None = None) -> Path:
     """Write `report.html` into the subject's folder; returns its path.
+
+    Args:
+        reference: metrics.json of another run, to be compared with.
 
     Raises:
         UserError: if the folder is not an evaluated subject's, or something in it is damaged.
     """
-    page = render_page(gather(folders), folders.root.resolve().name)
+    page = render_page(gather(folders, reference), folders.root.resolve().name)
     path = folders.root / REPORT_NAME
     write_text(path, page)
     return path
 
 
-def gather(folders: SubjectFolders) -> Subject:
+def gather(folders: SubjectFolders, reference: Path | None = None) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
     record = read_record(folders.evaluation, asset)
-    return Subject(facts, asset, scene, record, chosen_views(record) if record else ())
+    other = None if reference is None else read_metrics(reference)
+    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), other)
 
 
 def chosen_views(record: Record) -> tuple[View, ...]:
@@ -79,16 +88,21 @@ def render_page(subject: Subject, folder: str) -> str:
     Args:
         folder: the subject's name in commands: that of its folder.
     """
-    environment = Environment(
+    environment = page_environment()
+    files = {name: Markup(_source(environment, name)) for name in ("report.css", "report.js")}
+    return environment.get_template("report.html.j2").render(
+        css=files["report.css"], js=files["report.js"], folder=folder, **context(subject)
+    )
+
+
+def page_environment() -> Environment:
+    """For the templates in `page/`."""
+    return Environment(
         loader=PackageLoader("facefolds_core.reporting", "page"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-    )
-    files = {name: Markup(_source(environment, name)) for name in ("report.css", "report.js")}
-    return environment.get_template("report.html.j2").render(
-        css=files["report.css"], js=files["report.js"], folder=folder, **context(subject)
     )
 
 
@@ -104,25 +118,30 @@ def context(subject: Subject) -> dict[str, Any]:
     places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
     pairs = {(view.camera, view.frame): i for i, view in enumerate(subject.views)}
     seen = record.seen if record else None
+    compared = comparisons(subject, places)
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
         "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "generator": manifest.generator,
-        "of_subject": key == "psnr_subject",
+        "of_what": HEADLINE_WORDS[key],
+        "warnings": warnings(facts.metrics),
+        "verdicts": verdicts(facts.metrics, subject.reference) if subject.reference else [],
+        **films(record, scene),
         "tiles": tiles(subject, key),
         "summary": words.summary(facts, manifest, scene, seen),
         "scores": tables.scores(facts.metrics),
-        "comparisons": comparisons(subject, places),
+        "comparisons": compared,
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
         "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
         "camera_map": camera_map(scene) if scene else None,
         "validating": scene is not None and "validate" in scene.splits,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
         "angles": tables.angles(seen) if seen else [],
+        "worst": next((one for one in compared if one["worst"]), None),
         "views": record.on_sheet if record else 0,
         "masked": seen is not None and seen.masked,
         **layers(subject),
-        "textures": textures(subject.asset),
+        "textures": textures(subject),
         "curves": curves(facts),
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "waterfall": tables.waterfall(facts.waterfall),
@@ -133,16 +152,25 @@ def context(subject: Subject) -> dict[str, Any]:
     }
 
 
+def warnings(metrics: dict[str, Any]) -> list[str]:
+    """What is not well, and what to do."""
+    listed = [str(one.get("words", "")) for one in metrics.get("warnings", ()) if isinstance(one, dict)]
+    return [line.removeprefix("warning: ").removeprefix("note: ") for line in listed]
+
+
 def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
     """The figures at the head of the page."""
     metrics, manifest = subject.facts.metrics, subject.asset.manifest
     asset, cost, suffix = metrics.get("asset", {}), metrics.get("cost", {}), key.removeprefix("psnr")
-    where = "of the subject" if suffix else "whole frame"
+    where = HEADLINE_WORDS[key]
+    # There is no ST-LPIPS over a plate: that of the subject stands for it.
+    near = suffix if suffix != "_over_plate" else "_subject"
+    beside = HEADLINE_WORDS[f"psnr{near}"]
     files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
     return [
         {"name": "PSNR", "value": number_unit(asset.get(key), "dB"), "note": f"{where}, held-out cameras"},
         {"name": "SSIM", "value": words.number(asset.get(f"ssim{suffix}"), 3), "note": f"{where}, 1 is best"},
-        {"name": "ST-LPIPS", "value": words.number(asset.get(f"st_lpips{suffix}"), 3), "note": f"{where}, 0 is best"},
+        {"name": "ST-LPIPS", "value": words.number(asset.get(f"st_lpips{near}"), 3), "note": f"{beside}, 0 is best"},
         {"name": "Size", "value": words.size(files), "note": "meshes and video"},
         {
             "name": "Triangles",
@@ -163,20 +191,25 @@ def manifest_layers(subject: Subject) -> str:
 
 def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
     """Truth, asset and error of each view."""
-    result = []
+    result: list[dict[str, Any]] = []
     for view in subject.views:
-        values = [f"{words.number(view.psnr)} dB over the whole frame", *place_words(places.get(view.camera))]
-        if view.psnr_subject is not None:
-            values.insert(0, f"{words.number(view.psnr_subject)} dB of the subject")
+        known = [name for name in HEADLINES if getattr(view, name) is not None]
+        values = [f"{words.number(getattr(view, name))} dB {HEADLINE_WORDS[name]}" for name in known]
+        values += place_words(places.get(view.camera))
         worst = subject.record is not None and view is subject.record.views[subject.record.worst]
         result.append(
             {
                 "name": f"{view.camera}, frame {view.frame}{' (the worst)' if worst else ''}",
                 "scores": ", ".join(values),
+                "worst": worst,
+                "camera": view.camera,
+                "frame": view.frame,
+                "best": ", ".join([values[0], *place_words(places.get(view.camera))]),
+                "index": len(result),
                 "height": view.truth.shape[0],
                 "width": view.truth.shape[1],
                 "truth": pictures.photo(view.truth),
-                "asset": pictures.photo(view.asset),
+                "asset": pictures.photo(view.asset if view.over is None else view.over),
                 "error": pictures.error_map(view.asset, view.truth, view.mask),
             }
         )
@@ -221,12 +254,22 @@ def layers(subject: Subject) -> dict[str, Any]:
     }
 
 
-def textures(asset: Asset) -> dict[str, Any]:
+def frame_name(subject: Subject, frame: int) -> str:
+    """Of a frame of the asset: as the capture calls it; frames between those of the capture have numbers only."""
+    scene, asset = subject.scene, subject.asset
+    step = asset.num_frames // scene.num_frames if scene else 0
+    if scene is None or not step or frame % step:
+        return f"number {frame + 1}"
+    return scene.frame_ids[frame // step]
+
+
+def textures(subject: Subject) -> dict[str, Any]:
     """Every layer's texture of the middle frame."""
+    asset = subject.asset
     frame = asset.num_frames // 2
     texture = asset.manifest.full.texture
     return {
-        "frame": frame + 1,
+        "frame": frame_name(subject, frame),
         "frames": asset.num_frames,
         "picture": f"{texture.width} × {texture.height}",
         "layers": [

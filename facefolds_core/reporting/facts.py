@@ -18,6 +18,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import read_json
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reading import check_regular, is_there, no_memory
+from facefolds_core.scoring.panels import HEADLINES
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 
@@ -65,13 +66,15 @@ class ImageScores:
     """One row of per_image.parquet, of the asset.
 
     Attributes:
-        psnr, psnr_subject: dB; None where the value cannot be had.
+        psnr, psnr_subject, psnr_found, psnr_over_plate: dB; None where the value cannot be had.
     """
 
     camera: str
     frame: str
     psnr: float | None
     psnr_subject: float | None
+    psnr_found: float | None = None
+    psnr_over_plate: float | None = None
 
 
 @dataclass(frozen=True)
@@ -115,13 +118,7 @@ def read_facts(folders: SubjectFolders) -> Facts:
             found="no such file" if folders.root.is_dir() else "no such folder",
             remedy=f"name a folder like data/actor; if nothing is in it yet, {REMEDY}",
         )
-    metrics = read_mapping(folders.metrics) or {}
-    for part in ("asset", "cost"):
-        if not isinstance(metrics.get(part), dict):
-            raise UserError(
-                "garbled file", file=folders.metrics, place=part, expected="a JSON object", found=metrics.get(part),
-                remedy=REMEDY,
-            )  # fmt: skip
+    metrics = read_metrics(folders.metrics)
     waterfall = read_mapping(folders.waterfall) or {}
     return Facts(
         metrics=metrics,
@@ -134,6 +131,23 @@ def read_facts(folders: SubjectFolders) -> Facts:
         config={path.stem: read_mapping(path) or {} for path in sorted(folders.config.glob("*.json"))},
         versions=versions(Path(__file__).resolve().parents[2]),
     )
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """A metrics.json.
+
+    Raises:
+        UserError: if it is missing or garbled.
+    """
+    metrics = read_mapping(path)
+    if metrics is None:
+        raise UserError("file not found", file=path, expected="a metrics.json", remedy=REMEDY)
+    for part in ("asset", "cost"):
+        if not isinstance(metrics.get(part), dict):
+            raise UserError(
+                "garbled file", file=path, place=part, expected="a JSON object", found=metrics.get(part), remedy=REMEDY
+            )
+    return metrics
 
 
 def read_mapping(path: Path) -> dict[str, Any] | None:
@@ -153,7 +167,7 @@ def read_mapping(path: Path) -> dict[str, Any] | None:
 
 
 def read_images(path: Path) -> tuple[ImageScores, ...]:
-    """The asset's rows of per_image.parquet, in the file's order; empty where there is no such file.
+    """The asset's rows of per_image.parquet on held-out cameras, in the file's order; empty where it is not there.
 
     Raises:
         UserError: if it is damaged or lacks columns.
@@ -162,16 +176,18 @@ def read_images(path: Path) -> tuple[ImageScores, ...]:
         return ()
     check_regular(path, REMEDY)
     columns = ["camera", "frame", "variant", "psnr", "psnr_subject"]
+    more = ["psnr_found", "psnr_over_plate", "split"]
     try:
-        rows = pq.read_table(path, columns=columns).to_pylist()
+        known = pq.read_schema(path).names
+        rows = pq.read_table(path, columns=[*columns, *(name for name in more if name in known)]).to_pylist()
     except MemoryError:
         raise no_memory(path) from None
     except (pa.ArrowException, OSError, KeyError, ValueError, TypeError, OverflowError) as error:
         raise UserError("damaged scores", file=path, found=str(error), remedy=REMEDY) from None
     return tuple(
-        ImageScores(row["camera"], row["frame"], finite(row["psnr"]), finite(row["psnr_subject"]))
+        ImageScores(row["camera"], row["frame"], **{name: finite(row.get(name)) for name in HEADLINES})
         for row in rows
-        if row["variant"] == "asset"
+        if row["variant"] == "asset" and row.get("split", "holdout") == "holdout"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -43,6 +44,16 @@ def error_map(image: Array, truth: Array, mask: Array | None) -> str:
 def error_colours(count: int) -> Array:
     """(count, 3) in [0, 1], from no error to MAX_ERROR and more."""
     return np.asarray(colormaps[ERROR_COLOURS](np.linspace(0, 1, count))[:, :3])
+
+
+def film(path: Path) -> str:
+    """An MP4 as it is."""
+    return f"data:video/mp4;base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def jpeg(path: Path) -> str:
+    """A JPEG as it is."""
+    return f"data:image/jpeg;base64,{base64.b64encode(path.read_bytes()).decode()}"
 
 
 def _bytes(image: Array) -> NDArray[np.uint8]:

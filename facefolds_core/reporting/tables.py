@@ -15,7 +15,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
 from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
 from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
-from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, WITH_EFFECTS
+from facefolds_core.scoring.panels import VARIANTS, WITH_EFFECTS
 from facefolds_core.scoring.record import Seen, Spacing
 
 Row = dict[str, Any]
@@ -51,26 +51,37 @@ def share(value: float | None, most: float) -> float:
     return 0.0 if value is None or most <= 0 else max(0.0, min(100.0, 100 * value / most))
 
 
+GROUPS: dict[str, dict[str, tuple[str, int]]] = {
+    "over the plate": {"psnr_over_plate": ("PSNR, dB", 2), "ssim_over_plate": ("SSIM", 3)},
+    "subject": {f"{key}_subject": (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
+    "found matte": {f"{key}_found": (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
+    "outline": {
+        "psnr_interior": ("PSNR inside", 2),
+        "psnr_band": ("PSNR along it", 2),
+        "psnr_band_over_plate": ("along it, over the plate", 2),
+    },
+    "matte": {"matte_iou": ("IoU", 3), "matte_sad": ("SAD", 2)},
+    "over time": {"temporal": ("share explained", 2), "flicker": ("flicker", 4), "cvvdp": ("CVVDP, JOD", 2)},
+    "whole frame": {key: (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
+}
+"""Group -> metric -> its name and its digits; the whole frame comes last."""
+
+
 def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     """Means of each variant; metrics that nothing has are left out."""
     variants = [name for name in (*VARIANTS, WITH_EFFECTS) if name in metrics]
-    kept = [
-        key
-        for pair in zip(SUBJECT_METRICS, METRICS, strict=True)
-        for key in pair
-        if any(finite(metrics[name].get(key)) is not None for name in variants)
-    ]
-    ordered = [key for key in kept if key in SUBJECT_METRICS] + [key for key in kept if key in METRICS]
+    groups, names, keys = [], [], []
+    for group, listed in GROUPS.items():
+        kept = [key for key in listed if any(finite(metrics[one].get(key)) is not None for one in variants)]
+        if kept:
+            groups.append({"name": group, "span": len(kept)})
+            names += [listed[key][0] for key in kept]
+            keys += [(key, listed[key][1]) for key in kept]
     rows = [
-        {
-            "name": VARIANT_NAMES[name],
-            "values": [number(metrics[name].get(key), 2 if "psnr" in key else 3) for key in ordered],
-        }
-        for name in variants
+        {"name": VARIANT_NAMES[one], "values": [number(metrics[one].get(key), digits) for key, digits in keys]}
+        for one in variants
     ]
-    subject = sum(key in SUBJECT_METRICS for key in ordered)
-    names = [METRIC_NAMES[key.removesuffix("_subject")] for key in ordered]
-    return {"names": names, "rows": rows, "subject": subject, "whole": len(ordered) - subject}
+    return {"groups": groups, "names": names, "rows": rows}
 
 
 def heat_map(

@@ -11,6 +11,8 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.captures.scene import Scene
 from facefolds_core.reporting.facts import Facts, ImageScores, StageCost, finite
 from facefolds_core.scoring.record import AngleBin, Seen
+from facefolds_core.scoring.report import headline
+from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 NONE = "–"
 """Stands for a value that is not there."""
@@ -69,12 +71,13 @@ def listed(names: list[str]) -> str:
 
 
 def quality_key(metrics: dict[str, Any]) -> str:
-    """The PSNR that says most: the subject's where there are masks, else the whole frame's."""
-    return "psnr_subject" if finite(metrics.get("asset", {}).get("psnr_subject")) is not None else "psnr"
+    """The PSNR that says most: over the plate, of the subject, within the found matte, or of the whole frame."""
+    return headline(metrics)
 
 
 def image_psnr(image: ImageScores, key: str) -> float | None:
-    return image.psnr_subject if key == "psnr_subject" else image.psnr
+    value: float | None = getattr(image, key)
+    return value
 
 
 def curve_name(series: str) -> str:
@@ -109,13 +112,12 @@ def asset_words(manifest: Manifest) -> str:
 def quality_words(metrics: dict[str, Any]) -> str:
     """The asset's means, what the export cost, and what the whole frame says."""
     key = quality_key(metrics)
-    subject = key == "psnr_subject"
     asset, diffuse = metrics.get("asset", {}), metrics.get("diffuse", {})
-    ssim = asset.get("ssim_subject" if subject else "ssim")
-    images = metrics.get("images_with_mask" if subject else "images")
+    ssim = asset.get(key.replace("psnr", "ssim"))
+    images = metrics.get("images_with_mask" if key == "psnr_subject" else "images")
     text = (
         f"On {count(images)} held-out pictures the asset reaches {number(asset.get(key))} dB PSNR and "
-        f"{number(ssim, 3)} SSIM {'of the subject' if subject else 'over the whole frame'}."
+        f"{number(ssim, 3)} SSIM {HEADLINE_WORDS[key]}."
     )
     here, before = finite(asset.get(key)), finite(diffuse.get(key))
     if here is not None and before is not None:
@@ -124,9 +126,15 @@ def quality_words(metrics: dict[str, Any]) -> str:
             f" The model without its view branch, of which the asset is made, reaches {number(before)} dB: "
             f"the export {'costs' if loss >= 0 else 'adds'} {number(abs(loss))} dB."
         )
-    if subject:
-        return f"{text} Over the whole frame, the room with it, it is {number(asset.get('psnr'))} dB."
-    return f"{text} There are no masks: what the layers do not show of the room counts as an error."
+    inside, along = finite(asset.get("psnr_interior")), finite(asset.get("psnr_band"))
+    if inside is not None and along is not None:
+        text += f" Inside its outline it is {number(inside)} dB, along it {number(along)} dB."
+    temporal = finite(asset.get("temporal"))
+    if temporal is not None:
+        text += f" It shows {percent(temporal, 0)} of what changes from frame to frame."
+    if key == "psnr":
+        text += " It is not known where the subject is: what the layers do not show of the room counts as an error."
+    return text
 
 
 def extremes_words(images: tuple[ImageScores, ...], key: str) -> str | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +22,15 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, Hits, composite
-from facefolds_core.rendering.effects import added_colours, to_eye
-from facefolds_core.rendering.reflection import reflected_colours
+from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.analysis import Sums as SeenSums
+from facefolds_core.scoring.cvvdp import Screening, mean_jod
+from facefolds_core.scoring.films import FilmFile, FilmFolder
 from facefolds_core.scoring.images import Rendering, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
-from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.panels import WITH_EFFECTS, ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
 from facefolds_core.scoring.truths import MatteKind, Truths
@@ -48,6 +49,7 @@ class Evaluation:
         seen: what the asset's layers do in the pictures of the contact sheet.
         matte: which opacity says where the subject is.
         changes: split -> variant -> what it shows of what changes from frame to frame.
+        films: of the held-out cameras, where they were asked for.
     """
 
     scores: list[ImageScore]
@@ -56,11 +58,12 @@ class Evaluation:
     seen: Seen
     matte: MatteKind = "true"
     changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
+    films: Sequence[FilmFile] = ()
 
 
 @dataclass(frozen=True)
 class _Shot:
-    """A scored picture: textures of the asset, renderings and pictures by variant, and where the subject is."""
+    """A scored picture: textures of the asset, pictures by variant."""
 
     panel: Panel
     scores: list[ImageScore]
@@ -69,49 +72,81 @@ class _Shot:
 
 
 def evaluate(
-    scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, perceptual: Perceptual
+    scene: Scene,
+    model: RadianceManifolds,
+    asset: Asset,
+    params: EvaluateParams,
+    perceptual: Perceptual,
+    films: Path | None = None,
 ) -> Evaluation:
     """Render and score every frame of every camera that did not train; shows a progress bar.
+
+    Args:
+        films: folder in which films of the held-out cameras are put; None makes none.
 
     Raises:
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
     _check(scene, model, scene.indices("holdout"))
     scorer = _Scorer(scene, model, asset, params, perceptual)
-    on_sheet = set(spread(scene.num_frames, params.sheet_frames))
-    found, panels, seen = [], [], SeenSums(asset.layers)
-    worst: Panel | None = None
-    films: dict[Split, list[dict[str, Sums]]] = {}
+    show = _Show(asset, set(spread(scene.num_frames, params.sheet_frames)))
+    rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
+    found, changes = [], {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
-        for split, index in [(one, index) for one in SCORED for index in scene.indices(one)]:
-            camera, film = scene.cameras[index], Film()
-            hits = scorer.caster.cast(camera)
-            for k, shot in scorer.shots(split, index, hits):
-                found += shot.scores
-                if shot.panel.mask is not None:
-                    film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
-                if split == "holdout":
-                    worst = shot.panel if worst is None else min(worst, shot.panel, key=lambda one: one.rank)
-                    if k in on_sheet:
-                        panels.append(shot.panel)
-                        known = None if scorer.kind == "found" else shot.panel.mask
-                        seen.add_picture(camera, hits, shot.textures, shot.panel.asset - shot.panel.truth, known)
-                bar.update()
-            films.setdefault(split, []).append(film.sums())
-    if worst is None:
+        for split in SCORED:
+            sums, judged = [], []
+            for index in scene.indices(split):
+                film, view = Film(), scorer.view(scene.cameras[index])
+                screening = Screening(perceptual.cvvdp, params.cvvdp_frames)
+                shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
+                with shown_split.roll(scene.cameras[index].name) as roll:
+                    for k, shot in scorer.shots(split, index, view):
+                        found += shot.scores
+                        if shot.panel.mask is not None:
+                            film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
+                            screening.add(shot.pictures, shot.panel.truth, shot.panel.mask)
+                        if split == "holdout":
+                            show.add(k, shot, view, scorer.kind)
+                        if roll is not None:
+                            roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
+                        bar.update()
+                sums.append(film.sums())
+                judged.append(screening.judge(scene.fps))
+            changes[split] = _changes(sums, mean_jod(judged))
+    if show.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
             file=scene.folder / "frames.arrow",
             remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
         )
-    changes = {split: _changes(each) for split, each in films.items()}
-    return Evaluation(found, panels, worst, seen.result(), scorer.kind, changes)
+    return Evaluation(found, show.panels, show.worst, show.seen.result(), scorer.kind, changes, rolls.files)
 
 
-def _changes(films: Sequence[dict[str, Sums]]) -> dict[str, Change]:
+class _Show:
+    """What is kept of the held-out cameras' pictures: those of the contact sheet, and the worst."""
+
+    def __init__(self, asset: Asset, on_sheet: set[int]) -> None:
+        self._on_sheet = on_sheet
+        self.panels: list[Panel] = []
+        self.worst: Panel | None = None
+        self.seen = SeenSums(asset.layers)
+
+    def add(self, frame: int, shot: _Shot, view: PosedView, kind: MatteKind) -> None:
+        panel = shot.panel
+        self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
+        if frame in self._on_sheet:
+            self.panels.append(panel)
+            known = None if kind == "found" else panel.mask
+            self.seen.add_picture(view.seen_by, view.hits, shot.textures, panel.asset - panel.truth, known)
+
+
+def _changes(films: Sequence[dict[str, Sums]], jod: Mapping[str, float]) -> dict[str, Change]:
     """By variant, over all cameras."""
     variants = dict.fromkeys(variant for film in films for variant in film)
-    return {variant: change_of(film[variant] for film in films if variant in film) for variant in variants}
+    return {
+        variant: change_of((film[variant] for film in films if variant in film), jod.get(variant))
+        for variant in variants
+    }
 
 
 class _Scorer:
@@ -129,16 +164,20 @@ class _Scorer:
         self._params, self._perceptual = params, perceptual
         self._step = frame_rate_factor(scene, asset)
         self._truths = Truths(scene)
-        self.caster = AssetCaster(asset)
+        self._caster = AssetCaster(asset)
         cameras = [index for split in SCORED for index in scene.indices(split)]
         self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
         self.kind = self._truths.matte_kind(self.keys)
 
-    def shots(self, split: Split, index: int, hits: Hits) -> Iterator[tuple[int, _Shot]]:
+    def view(self, camera: Camera) -> PosedView:
+        """Of a camera of the world."""
+        return PosedView(self._scene, self._model, self._asset, self._caster, camera, self._step)
+
+    def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
         """All frames of a camera that have a photo."""
         camera, params = self._scene.cameras[index], self._params
         frames = [k for c, k in self.keys if c == index]
-        for k, textures, renderings in rendered(self._model, self._asset, hits, camera, frames, self._step):
+        for k, textures, renderings in rendered(view, self._asset, frames, self._step):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
             values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
@@ -146,27 +185,25 @@ class _Scorer:
             pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
             region = region_of(self.kind, truth, renderings)
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]
-            panel = Panel(camera.name, frame, truth.picture, *both, region)
+            over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
+            panel = Panel(camera.name, frame, truth.picture, *both, region, over)
             yield k, _Shot(panel, list(group.values()), textures, pictures)
 
 
 def rendered(
-    model: RadianceManifolds, asset: Asset, hits: Hits, camera: Camera, frames: list[int], step: int
+    view: PosedView, asset: Asset, frames: list[int], step: int
 ) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, Rendering]]]:
     """The asset's textures, and the variants' renderings, of each of the scene's `frames`."""
-    view = ModelView(model, camera)
-    reflection, maps = asset.full.reflection(), asset.effects()
-    glossy = None if reflection is None else reflected_colours(hits, camera, asset.full.windows, reflection)
-    added = None if maps is None else added_colours(hits, to_eye(camera), maps)
     for k, textures in shipped(asset, frames, step):
-        with_view, without_view, alpha = view.render(float(k))
+        view.turn(k)
+        with_view, without_view, alpha = view.model.render(float(k))
         images = {
             "model": Rendering(with_view, alpha),
             "diffuse": Rendering(without_view, alpha),
-            "asset": Rendering(*composite(hits, textures, added=glossy)),
+            "asset": Rendering(*composite(view.hits, textures, added=view.glossy)),
         }
-        if added is not None:
-            images[WITH_EFFECTS] = Rendering(*composite(hits, textures, added=added))
+        if view.added is not None:
+            images[WITH_EFFECTS] = Rendering(*composite(view.hits, textures, added=view.added))
         yield k, textures, images
 
 

@@ -20,6 +20,7 @@ from facefolds_core.scoring.evaluation import frame_rate_factor, rendered
 from facefolds_core.scoring.images import score_renderings
 from facefolds_core.scoring.panels import VARIANTS, ImageScore
 from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.report import averages, rounded
 from facefolds_core.scoring.truths import Truth
 
@@ -46,9 +47,9 @@ def score_fresh_views(
     found = []
     with progress(total=params.fresh_views, desc="fresh views", unit="image") as bar:
         for view in film_fresh_views(scene, capture, params.fresh_views):
-            hits = caster.cast(view.camera)
+            posed = PosedView(scene, model, asset, caster, view.camera, step)
             truth = Truth(view.rgb / 255.0, mask=view.opacity)
-            for _, _, images in rendered(model, asset, hits, view.camera, [view.frame], step):
+            for _, _, images in rendered(posed, asset, [view.frame], step):
                 values = score_renderings(images, truth, "true", params.background, params.band, NO_WEIGHTS)
             frame = scene.frame_ids[view.frame]
             scores = tuple(ImageScore(view.camera.name, frame, variant, values[variant]) for variant in values)

@@ -19,7 +19,7 @@ REGION_METRICS = ("psnr_interior", "psnr_band", "psnr_band_over_plate")
 MATTE_METRICS = ("matte_sad", "matte_mse", "matte_gradient", "matte_iou")
 ALL_METRICS = (*METRICS, *SUBJECT_METRICS, *FOUND_METRICS, *PLATE_METRICS, *REGION_METRICS, *MATTE_METRICS)
 """Of each picture; docs/reference/metrics.md defines them."""
-FILM_METRICS = ("temporal", "flicker")
+FILM_METRICS = ("temporal", "flicker", "cvvdp")
 """Of each variant, over all frames of its cameras."""
 HEADLINES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
 """The first that is there says most of the asset."""
@@ -52,7 +52,8 @@ class ImageScore:
 class Panel:
     """What the contact sheet shows of one camera and frame: images (H, W, 3) in [0, 1], and their scores.
 
-    `mask` is the subject's opacity (H, W), or None where neither capture nor scene has one.
+    `mask` is the subject's opacity (H, W) by which it is scored, None where none is known; `over` the asset over the
+    camera's clean plate, where there is one.
     """
 
     camera: str
@@ -63,6 +64,12 @@ class Panel:
     model_score: ImageScore
     asset_score: ImageScore
     mask: Array | None = None
+    over: Array | None = None
+
+    @property
+    def shown(self) -> Array:
+        """The asset over the plate, else over the background colour."""
+        return self.asset if self.over is None else self.over
 
     @property
     def rank(self) -> tuple[bool, float]:

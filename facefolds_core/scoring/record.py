@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,8 +18,9 @@ from facefolds_core.asset.manifest import MANIFEST_NAME
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.pictures import DamagedPictureError, open_picture
+from facefolds_core.scoring.films import FilmFile
 from facefolds_core.scoring.metrics import Array
-from facefolds_core.scoring.panels import Panel
+from facefolds_core.scoring.panels import HEADLINES, Panel
 
 VERSION = 1
 NAME = "analysis.json"
@@ -101,6 +103,10 @@ class View:
     mask: Array | None
     psnr: float | None
     psnr_subject: float | None
+    psnr_found: float | None = None
+    psnr_over_plate: float | None = None
+    over: Array | None = None
+    """The asset over the camera's clean plate."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +118,8 @@ class Record:
         on_sheet: how many of them are of the contact sheet.
         worst: index of the view with the lowest PSNR of all held-out pictures.
         seen, shape: of the asset.
+        films: of the held-out cameras, in `folder`.
+        folder: of the evaluation.
     """
 
     views: tuple[View, ...]
@@ -119,9 +127,19 @@ class Record:
     worst: int
     seen: Seen
     shape: Shape
+    films: tuple[FilmFile, ...] = ()
+    folder: Path = Path()
 
 
-def write_record(folder: Path, panels: Sequence[Panel], worst: Panel, seen: Seen, shape: Shape, asset: Asset) -> None:
+def write_record(
+    folder: Path,
+    panels: Sequence[Panel],
+    worst: Panel,
+    seen: Seen,
+    shape: Shape,
+    asset: Asset,
+    films: Sequence[FilmFile] = (),
+) -> None:
     """Write into `folder`, which `evaluate` makes."""
     listed = panels if any(panel is worst for panel in panels) else [*panels, worst]
     (folder / PICTURES).mkdir()
@@ -142,14 +160,15 @@ def write_record(folder: Path, panels: Sequence[Panel], worst: Panel, seen: Seen
         "no_layer": asdict(seen.bare),
         "layers": layers,
         "sections": {name: points.tolist() for name, points in shape.sections.items()},
+        "films": [asdict(film) for film in films],
     }
     write_json(folder / NAME, _rounded(value))
 
 
 def _write_view(folder: Path, index: int, panel: Panel) -> dict[str, Any]:
-    images = {"truth": panel.truth, "asset": panel.asset, "mask": panel.mask}
+    images = {"truth": panel.truth, "asset": panel.asset, "mask": panel.mask, "over": panel.over}
     entry: dict[str, Any] = {"camera": panel.camera, "frame": panel.frame}
-    entry |= {name: panel.asset_score.values[name] for name in ("psnr", "psnr_subject")}
+    entry |= {name: panel.asset_score.values.get(name) for name in reversed(HEADLINES)}
     for name, image in images.items():
         entry[name] = None if image is None else f"{PICTURES}/{index:03d}_{name}.png"
         if image is not None:  # multiples of 1/255: nothing is lost
@@ -205,18 +224,28 @@ def read_record(folder: Path, asset: Asset) -> Record | None:
                 spacing=tuple(Spacing(**row["to_next"]) for row in layers[:-1]),
                 sections={name: np.array(p, float) for name, p in value["sections"].items()},
             ),
+            films=tuple(_read_film(one) for one in value.get("films", ())),
+            folder=folder,
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise UserError("garbled record of an evaluation", file=path, found=repr(error), remedy=REMEDY) from None
 
 
+def _read_film(entry: dict[str, Any]) -> FilmFile:
+    file = str(entry["file"])
+    if not re.fullmatch(r"films/[0-9]+\.mp4", file):
+        raise ValueError(f"{file[:80]} is no film of an evaluation")
+    return FilmFile(str(entry["camera"]), file, float(entry["fps"]), tuple(map(str, entry["frames"])))
+
+
 def _read_view(folder: Path, entry: dict[str, Any]) -> View:
     images: dict[str, Any] = {}
-    for name in ("truth", "asset", "mask"):
-        file = entry[name]
+    for name in ("truth", "asset", "mask", "over"):
+        file: Any = entry.get(name)
         try:
             images[name] = None if file is None else np.asarray(open_picture(folder / file)) / 255.0
         except (OSError, DamagedPictureError) as error:
             raise UserError("a picture of the evaluation is damaged", file=folder / file, found=str(error),
                             remedy=REMEDY) from None  # fmt: skip
-    return View(entry["camera"], entry["frame"], **images, psnr=entry["psnr"], psnr_subject=entry["psnr_subject"])
+    values: dict[str, Any] = {name: entry.get(name) for name in HEADLINES}
+    return View(entry["camera"], entry["frame"], **images, **values)

@@ -43,20 +43,23 @@ class Change:
         themselves, 0 for a film that stands still, below for one that moves otherwise; None where nothing changes.
     flicker: RMS of the error's change from frame to frame, colours in [0, 1]; None with less than two frames.
     truth_change: RMS of what the photos differ from their mean over time; None with less than two frames.
+    cvvdp: of the film, JOD, mean over the cameras; None where it cannot be had.
     """
 
     temporal: float | None
     flicker: float | None
     truth_change: float | None
+    cvvdp: float | None = None
 
 
-def change_of(sums: Iterable[Sums]) -> Change:
+def change_of(sums: Iterable[Sums], cvvdp: float | None = None) -> Change:
     """Of all cameras together."""
     total = sum(sums, Sums())
     return Change(
         temporal=1 - total.left / total.truth if total.truth > 0 else None,
         flicker=float(np.sqrt(total.steps / total.pairs)) if total.pairs > 0 else None,
         truth_change=float(np.sqrt(total.truth / total.values)) if total.pairs > 0 else None,
+        cvvdp=cvvdp,
     )
 
 

@@ -36,6 +36,7 @@ ROWS = (
     ("matte_iou", "matte: intersection over union", "{:.3f}"),
     ("temporal", "change over time explained", "{:.0%}"),
     ("flicker", "flicker of the error", "{:.4f}"),
+    ("cvvdp", "CVVDP of the film, JOD (10 is best)", "{:.2f}"),
     ("psnr", "PSNR of the whole frame, without the room", "{:.2f}"),
 )
 """Metric -> its words and its form; the whole frame comes last: it rewards whoever paints the room."""

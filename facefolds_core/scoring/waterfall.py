@@ -77,7 +77,10 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
 
     Args:
         folders: of the subject, with all export stages run.
-        frames: indices of the frames that are rendered.
+        frames: indices of the frames that are rendered, where the camera has a photo.
+
+    Raises:
+        UserError: if there is no photo to compare with.
     """
     sources = list(_sources(scene, model, folders))
     truths, masks = scene.open_frames(), scene.open_masks()
@@ -86,9 +89,11 @@ def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, f
     cameras = scene.indices(scene.choice_split)
     with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
         for index in cameras:
-            view = ModelView(model, scene.cameras[index])
-            hits = [source.hits(scene.cameras[index]) for source in sources]
             for k in frames:
+                if k == frames[0] or scene.poses is not None:
+                    camera = scene.camera_in_head(index, k)
+                    view = ModelView(model, camera)
+                    hits = [source.hits(camera) for source in sources]
                 truth = truths.image(index, k) / 255.0
                 has_mask = masks is not None and (index, k) in masks
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None

@@ -41,8 +41,7 @@ class RaySampler:
         device: where batches go. Drawing itself is on the CPU, so that it repeats on any device.
 
     Raises:
-        UserError: if the training cameras do not all have as many images (each camera has every frame, or, in a
-            stabilised scene, one), or no pixel of any camera meets the ball.
+        UserError: if the training cameras do not all have as many images, or no pixel of any camera meets the ball.
     """
 
     def __init__(self, scene: Scene, centre: Tensor, radius: float, device: torch.device) -> None:
@@ -52,9 +51,13 @@ class RaySampler:
         self.device = device
         self.frames = torch.from_numpy(self._frames_of_cameras(scene))
         pixels = []
+        turns = range(1 if scene.poses is None else scene.num_frames)
         for camera in self.cameras:
-            origins, directions = (torch.from_numpy(a.reshape(-1, 3).copy()) for a in scene.cameras[camera].rays())
-            valid = search_interval(origins, directions, centre.cpu().to(origins.dtype), radius)[2]
+            valid = torch.zeros(scene.height * scene.width, dtype=torch.bool)
+            for frame in turns:
+                rays = scene.camera_in_head(camera, frame).rays()
+                origins, directions = (torch.from_numpy(a.reshape(-1, 3).copy()) for a in rays)
+                valid |= search_interval(origins, directions, centre.cpu().to(origins.dtype), radius)[2]
             pixels.append(valid.nonzero().squeeze(1).to(torch.int32))
         self.pixels = torch.cat(pixels)
         self.ends = torch.tensor([len(p) for p in pixels]).cumsum(0)
@@ -65,10 +68,12 @@ class RaySampler:
                 expected="cameras that look at the origin",
                 remedy="check the capture's calibration, and `front` or the head poses",
             )
-        # Pixel (x, y, 1) -> direction in the world: R^T K^-1.
-        unproject = [scene.cameras[c].rotation.T @ np.linalg.inv(scene.cameras[c].K) for c in self.cameras]
+        # Pixel (x, y, 1) -> direction in the head's frame: R^T K^-1. Of a still head one camera serves all frames.
+        self.turns = len(turns)
+        views = [scene.camera_in_head(c, k) for c in self.cameras for k in turns]
+        unproject = [view.rotation.T @ np.linalg.inv(view.K) for view in views]
         self.unproject = torch.tensor(np.stack(unproject), dtype=torch.float32, device=device)
-        centres = np.stack([scene.cameras[c].centre for c in self.cameras])
+        centres = np.stack([view.centre for view in views])
         self.centres = torch.tensor(centres, dtype=torch.float32, device=device)
 
     def draw(self, count: int, generator: torch.Generator) -> Rays:
@@ -80,7 +85,7 @@ class RaySampler:
         pixel = self.pixels[index].long()
         colours = self._colours(camera.numpy(), frame.numpy(), pixel.numpy())
         xy1 = torch.stack([pixel % self.width + 0.5, pixel // self.width + 0.5, torch.ones(count)], -1)
-        cam = camera.to(self.device)
+        cam = (camera * self.turns + frame % self.turns).to(self.device)
         directions = torch.einsum("rij,rj->ri", self.unproject[cam], xy1.to(self.device))
         return Rays(
             origins=self.centres[cam],

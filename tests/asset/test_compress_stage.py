@@ -14,6 +14,7 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.draco import encode_mesh
 from facefolds_core.asset.effects import EffectsPicture
+from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
@@ -155,6 +156,8 @@ def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     assert manifest.audio is not None and manifest.audio.file == "audio.wav"
     assert manifest.poster is not None and (manifest.poster.width, manifest.poster.height) == (48, 48)
     assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
+    scene = read_scene(folders.scene)
+    assert manifest.view == filmed_view([scene.cameras[index] for index in scene.indices("train")])
     camera = read_scene(folders.scene).cameras[1]
     np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
     np.testing.assert_array_equal(manifest.photos[0].K, camera.K)

@@ -237,7 +237,9 @@ def test_garbled_json_names_line_and_column(tmp_path: Path) -> None:
 
 def test_missing_transforms(tmp_path: Path) -> None:
     (tmp_path / "c").mkdir()
-    assert refused(tmp_path / "c", "transforms").file == tmp_path / "c" / "transforms.json"
+    error = refused(tmp_path / "c", "transforms")
+    assert error.file == tmp_path / "c"
+    assert "transforms.json" in str(error.expected)
 
 
 def test_no_image_of_transforms_exists(tmp_path: Path) -> None:
@@ -316,6 +318,18 @@ def test_a_scene_that_is_there_survives_a_failed_run(tmp_path: Path) -> None:
         run(tmp_path / "c", "multiface")
     assert (folders.scene / "scene.json").read_text() == before
     assert sorted(path.name for path in folders.root.iterdir()) == ["scene"]
+
+
+def test_the_front_that_was_found_is_said_before_what_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    value = json.loads(path.read_text())
+    value["frames"] += [{**value["frames"][0], "file_path": f"images/none{i}.png"} for i in range(9)]
+    path.write_text(json.dumps(value))
+    run(tmp_path / "c", "transforms")
+    said = capsys.readouterr().out.splitlines()
+    assert "taken to face where most cameras stand" in said[1]
 
 
 def test_it_says_what_was_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

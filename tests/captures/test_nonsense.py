@@ -131,7 +131,7 @@ def test_cameras_in_the_centre_are_named() -> None:
     camera = Camera("a", np.array([[30.0, 0, 20], [0, 30, 20], [0, 0, 1]]), np.eye(3, 4), 40, 40)
     moved = replace(camera, name="b", w2c=np.eye(3, 4))
     with pytest.raises(UserError, match="absurdly near"):
-        check_sight([camera, moved], [[0], [0]], ["0"], None, "c")
+        check_sight([camera, moved], ["0"], None, "c")
 
 
 def mesh_file(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[MultifaceCapture], object]:

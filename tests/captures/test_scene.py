@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track
 
 
 def scene(folder: Path) -> Scene:
@@ -42,6 +44,34 @@ def test_round_trip_is_exact(tmp_path: Path) -> None:
     assert (back.splits, back.frame_ids, back.left_out) == (made.splits, made.frame_ids, made.left_out)
     assert np.array_equal(back.times, made.times)
     assert back.from_capture.scale == made.from_capture.scale
+
+
+def test_poses_come_back_exactly(tmp_path: Path) -> None:
+    track = Track.of([np.eye(3), np.diag([-1.0, -1, 1])], [[0, 0, 0], [0.1, 1 / 3, 0]])
+    write_scene(replace(scene(tmp_path), poses=track), tmp_path)
+    back = read_scene(tmp_path)
+    assert back.poses is not None
+    assert np.array_equal(back.poses.quaternions, track.quaternions)
+    assert np.array_equal(back.poses.translations, track.translations)
+
+
+@pytest.mark.parametrize("poses", [[], [{"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]}], "none", [{}, {}]])
+def test_poses_that_are_none_are_refused(tmp_path: Path, poses: object) -> None:
+    write_scene(scene(tmp_path), tmp_path)
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"poses": poses}))
+    with pytest.raises(UserError, match="garbled"):
+        read_scene(tmp_path)
+
+
+def test_views_of_a_turning_head_spread_over_the_frames(tmp_path: Path) -> None:
+    turned = replace(scene(tmp_path), poses=Track.of([np.eye(3)] * 2, [[0, 0, 0], [0.1, 0, 0]]))
+    assert [view.name for view in turned.views_of("train")] == ["a", "c"]
+    first, second = (view.w2c.tolist() for view in turned.views_of("train"))
+    assert first == turned.camera_in_head(0, 0).w2c.tolist()
+    assert second == turned.camera_in_head(2, 1).w2c.tolist()
+    assert len(turned.views_of("train", 2)) == 4
+    assert [view.name for view in scene(tmp_path).views_of("train", 2)] == ["a", "c"]
 
 
 def test_indices_of_a_split(tmp_path: Path) -> None:

@@ -25,13 +25,14 @@ def test_every_source_reads() -> None:
     assert {"actor", "multiface", "transforms"} <= set(SOURCES.names) == set(get_args(subject.SourceName))
     assert all(callable(SOURCES[name].read) for name in SOURCES.names)
     assert [name for name in SOURCES.names if is_generated(name)] == ["actor"]
+    assert [name for name in SOURCES.names if not hasattr(SOURCES[name], "recognise")] == ["actor"]
 
 
 def test_a_source_that_is_none_is_refused_with_the_names() -> None:
     with pytest.raises(KeyError):
         SOURCES["_actor"]
     with pytest.raises(ValidationError, match=r"'actor', .*'multiface'.* 'transforms'"):
-        Subject(source="colmap", path="x")
+        Subject(source="banana", path="x")
 
 
 def test_every_codec_is_what_its_file_says() -> None:

@@ -62,7 +62,7 @@ def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
 
 def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
     before = project.params
-    project.write_params(before.replace("compress: {}", "compress: {frame_rate_factor: 2}"))
+    project.write_params(before.replace("compress:\n", "compress:\n  frame_rate_factor: 2\n"))
     status, output = project.repro("evaluate@actor")
     assert status == 0, output
     assert stages_run(output) == ["configure", "compress@actor", "evaluate@actor"]
@@ -94,7 +94,12 @@ def test_a_killed_training_resumes(project: TinyProject) -> None:
 
 def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
     """The one whose training was killed."""
-    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames, one camera an image
+    assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames
+
+
+def test_what_its_export_loses_is_measured_where_cameras_move(project: TinyProject) -> None:
+    status, output = project.run("python", "-m", "facefolds_core", "waterfall", "data/stabilised", "--frames", "1")
+    assert status == 0, output
 
 
 def test_the_explicit_model_runs_to_the_end(project: TinyProject) -> None:

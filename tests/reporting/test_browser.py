@@ -116,7 +116,7 @@ def test_a_touch_moves_the_divider(open_report: Open) -> None:
 def test_pictures_are_chosen_by_list_buttons_and_heat_map(open_report: Open) -> None:
     page = open_report()
     choice = page.get_by_label("Held-out picture", exact=True)
-    page.get_by_role("slider").press("Home")
+    page.get_by_role("slider", name="Divide").press("Home")
     choice.select_option("1")
     assert page.locator(".view:visible").get_attribute("data-view") == "1"
     assert share_of_truth(page) == pytest.approx(0)  # the divider stays
@@ -142,3 +142,14 @@ def test_it_follows_light_and_dark(open_report: Open) -> None:
 def test_without_script_the_first_picture_is_shown(open_report: Open) -> None:
     page = open_report(java_script_enabled=False)
     assert page.locator(".view:visible").count() == 1
+
+
+def test_any_frame_of_the_film_is_shown_by_its_name(open_report: Open) -> None:
+    page = open_report(reduced_motion="reduce")  # it does not play by itself
+    film = page.locator("#film")
+    film.evaluate("v => v.readyState >= 2 || new Promise((done) => v.addEventListener('loadeddata', done))")
+    assert film.evaluate("v => v.paused")
+    page.get_by_role("slider", name="Frame").fill("2")
+    film.evaluate("v => !v.seeking || new Promise((done) => v.addEventListener('seeked', done))")
+    assert page.locator("#frame-name").inner_text() == "000002"
+    assert film.evaluate("v => Math.floor(v.currentTime * 30)") == 2

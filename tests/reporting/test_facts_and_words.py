@@ -13,9 +13,11 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, tables, words
-from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts
+from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts, read_images
+from facefolds_core.reporting.verdicts import verdicts
 from facefolds_core.scoring.record import AngleBin, Seen
-from tests.reporting.tiny import make_subject
+from facefolds_core.scoring.report import write_per_image
+from tests.reporting.tiny import FRAMES, make_subject, scores
 from tests.scenes import look_at_origin
 
 
@@ -109,8 +111,7 @@ METRICS = {
 def test_the_summary_tells_the_loss_of_the_export() -> None:
     assert words.quality_words(METRICS) == (
         "On 2 held-out pictures the asset reaches 24.50 dB PSNR and 0.900 SSIM of the subject. The model without its "
-        "view branch, of which the asset is made, reaches 24.75 dB: the export costs 0.25 dB. Over the whole frame, "
-        "the room with it, it is 11.00 dB."
+        "view branch, of which the asset is made, reaches 24.75 dB: the export costs 0.25 dB."
     )
 
 
@@ -119,7 +120,28 @@ def test_the_summary_without_masks_speaks_of_the_whole_frame() -> None:
     text = words.quality_words(metrics)
     assert "over the whole frame" in text
     assert "adds 0.25 dB" in text
-    assert "There are no masks" in text
+    assert "not known where the subject is" in text
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "word"), [(30.0, 30.04, "the same"), (30.0, 30.06, "better"), (30.0, 29.9, "worse")]
+)
+def test_a_reference_run_is_compared_as_the_eye_would(before: float, now: float, word: str) -> None:
+    (row,) = verdicts({"asset": {"psnr_subject": now, "psnr": 1.0}}, {"asset": {"psnr_subject": before, "psnr": 9.0}})
+    assert (row["name"], row["word"]) == ("PSNR of the subject, dB", word)
+
+
+def test_less_is_better_of_flicker_and_bytes() -> None:
+    now = {"asset": {"flicker": 0.02}, "cost": {"mesh_bytes": 50, "texture_bytes": 40}}
+    before = {"asset": {"flicker": 0.03}, "cost": {"mesh_bytes": 60, "texture_bytes": 40}}
+    assert [row["word"] for row in verdicts(now, before)] == ["better", "better"]
+    assert [row["word"] for row in verdicts(before, now)] == ["worse", "worse"]
+
+
+def test_cameras_for_validation_are_not_in_the_heat_map(tmp_path: Path) -> None:
+    checked = [replace(one, split="validate") for one in scores(True)]
+    write_per_image([*scores(True), *checked], tmp_path / "per_image.parquet")
+    assert len(read_images(tmp_path / "per_image.parquet")) == FRAMES
 
 
 def test_the_summary_names_the_layers_that_make_up_half() -> None:

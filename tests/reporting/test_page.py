@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from pathlib import Path
@@ -13,10 +14,12 @@ from typer.testing import CliRunner
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.report import command, evaluated_subjects
 from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
 from facefolds_core.files import read_json, write_json
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import build
 from facefolds_core.reporting.build import make_report
+from facefolds_core.reporting.index import make_index
 from facefolds_core.scoring.record import NAME
 from tests.assets import make_asset
 from tests.reporting.tiny import FRAMES, LAYERS, make_subject
@@ -42,7 +45,7 @@ def test_everything_is_in_the_file(subject: SubjectFolders) -> None:
     addresses = re.findall(r"""(?:src|href|srcset|action|poster)\s*=\s*["']?([^"'\s>]+)""", page)
     assert all(address.startswith(("data:", "#")) for address in addresses)
     assert not re.search(r"url\(|@import|https?://|<iframe|<object", page)
-    assert page.count("data:image/webp") == 2 * FRAMES + LAYERS
+    assert page.count("data:image/webp") == 2 * (FRAMES + 1) + LAYERS  # the worst once more, at the head
     assert page.count("data:image/png") == FRAMES
 
 
@@ -95,8 +98,40 @@ def test_with_scores_and_asset_alone_there_is_a_page(copy: SubjectFolders) -> No
 
 def test_without_masks_the_whole_frame_is_spoken_of(tmp_path: Path) -> None:
     page = page_of(make_subject(tmp_path / "bare", masks=False))
-    assert "There are no masks" in page
+    assert "not known where the subject is" in page
     assert "no layer met" not in page
+
+
+def test_what_is_not_well_stands_at_the_head(copy: SubjectFolders) -> None:
+    assert "not well" not in page_of(copy)
+    metrics = json.loads(copy.metrics.read_text())
+    metrics["warnings"] = [fact("front_is_guessed").to_json()]
+    write_json(copy.metrics, metrics)
+    page = page_of(copy)
+    assert "One thing is not well" in page and "name a camera that faces the" in page
+    assert page.index("not well") < page.index('class="tiles"')
+
+
+def test_the_film_of_every_held_out_camera_is_in_it(subject: SubjectFolders) -> None:
+    page = page_of(subject)
+    listed = json.loads(page.split('id="films-data">')[1].split("</script>")[0])
+    assert [(film["camera"], len(film["frames"])) for film in listed] == [("cam3", FRAMES)]
+    assert page.index("<video") < page.index('class="tiles"')
+
+
+def test_a_reference_run_gets_a_verdict(copy: SubjectFolders, tmp_path: Path) -> None:
+    reference = json.loads(copy.metrics.read_text())
+    reference["asset"]["psnr_subject"] += 1
+    write_json(tmp_path / "before.json", reference)
+    page = make_report(copy, tmp_path / "before.json").read_text()
+    assert "Against the reference run" in page and ">worse</td>" in page
+    assert "Against the reference run" not in page_of(copy)
+
+
+def test_the_index_lists_all_subjects(subject: SubjectFolders) -> None:
+    page_of(subject)
+    page = make_index(subject.root.parent, [subject.root]).read_text()
+    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page
 
 
 def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:

@@ -12,6 +12,7 @@ from facefolds_core.params import section_of
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.analysis import Sums, shape_of
+from facefolds_core.scoring.films import FilmFolder
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
 from facefolds_core.scoring.record import write_record
@@ -51,7 +52,12 @@ def write_seen(folders: SubjectFolders, masks: bool) -> None:
         sums.add_picture(scene.cameras[index], hits, textures, picture - truth, mask)
         both = found[frame, "model"], found[frame, "asset"]
         panels.append(Panel(scene.cameras[index].name, frame, truth, picture, picture, *both, mask))
-    write_record(folders.evaluation, panels, panels[0], sums.result(), shape_of(asset), asset)
+    rolls = FilmFolder(folders.evaluation, 30.0, 18)
+    with rolls.roll(scene.cameras[index].name) as roll:
+        assert roll is not None
+        for panel in panels:
+            roll.add(panel.frame, panel.truth, panel.shown)
+    write_record(folders.evaluation, panels, panels[0], sums.result(), shape_of(asset), asset, rolls.files)
 
 
 def make_subject(root: Path, masks: bool = True) -> SubjectFolders:

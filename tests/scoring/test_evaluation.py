@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 import torch
 
-from facefolds_core.asset import read_asset
+from facefolds_core.asset import Asset, read_asset
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.track import Track
 from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.evaluation import Evaluation, evaluate
 from facefolds_core.scoring.images import MASK_MARGIN, score_images, subject_box
@@ -20,8 +22,9 @@ from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.panels import ALL_METRICS, METRICS, SUBJECT_METRICS, VARIANTS
 from facefolds_core.scoring.perceptual import Perceptual, find_perceptual
 from tests.assets import make_asset
+from tests.geometry.test_track import about
 from tests.scenes import look_at_origin
-from tests.scoring.fakes import FRAMES, SIZE, flat_asset, flat_scene, half_mask, pictures, tiny_model
+from tests.scoring.fakes import FRAMES, SIZE, FlatAsset, flat_asset, flat_scene, half_mask, pictures, tiny_model
 
 NO_PERCEPTUAL = Perceptual(None, None, ())
 
@@ -35,6 +38,21 @@ def test_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
     found = [s.values for s in run(tmp_path).scores if s.variant == "asset"]
     assert [v["psnr"] for v in found] == [MAX_PSNR] * FRAMES
     np.testing.assert_allclose([v["ssim"] for v in found], 1)  # type: ignore[arg-type]
+
+
+def test_an_asset_stands_where_its_own_track_says(tmp_path: Path) -> None:
+    """What ships is scored: the scene's poses move the model, not the asset."""
+    scene = flat_scene(tmp_path)
+    track = Track.of([about((1, 1, 0), 20)] * FRAMES, [[0.1, 0.05, 0]] * FRAMES)
+    world = tuple(camera.transformed(track.at(0)) for camera in scene.cameras)
+    moved = replace(scene, cameras=world, poses=track)
+    asset = cast(Asset, FlatAsset(pictures(), track))
+    found = evaluate(moved, tiny_model(), asset, EvaluateParams(), NO_PERCEPTUAL)
+    still = evaluate(scene, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    psnrs = [s.values["psnr"] for s in found.scores]
+    assert psnrs == pytest.approx([s.values["psnr"] for s in still.scores], abs=1e-3)
+    without = evaluate(moved, tiny_model(), flat_asset(), EvaluateParams(), NO_PERCEPTUAL)
+    assert all(cast(float, s.values["psnr"]) < 20 for s in without.scores if s.variant == "asset")
 
 
 def test_every_image_is_scored_for_every_variant(tmp_path: Path) -> None:

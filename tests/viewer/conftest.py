@@ -107,6 +107,15 @@ class Player:
         return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255
 
 
+def page_of_yours(player: Player, body: str) -> None:
+    """Open a page with `body` and the module of the player, without any policy, from the player's own server."""
+    script = '<script type="module" src="facefolds-player.js"></script>'
+    head = '<!doctype html><meta name="viewport" content="width=device-width">'
+    html = f'{head}<link rel="icon" href="data:,">{script}<body style="margin:0">{body}</body>'
+    player.page.route("**/yours.html", lambda route: route.fulfill(body=html, content_type="text/html"))
+    player.page.goto(f"{player.address}yours.html")
+
+
 NewPlayer = Callable[..., Player]
 
 

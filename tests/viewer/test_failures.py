@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from tests.viewer.conftest import NewPlayer
 from tests.viewer.fixtures import change_manifest, file_entry
@@ -16,6 +23,17 @@ GONE = "net::ERR_"
 
 @pytest.fixture
 def asset(rich_copy: Path) -> Path:
+    return rich_copy
+
+
+@pytest.fixture
+def one_level(rich_copy: Path) -> Path:
+    """Nothing to fall back to."""
+
+    def change(value: dict) -> None:
+        value["levels"] = value["levels"][:1]
+
+    change_manifest(rich_copy, change)
     return rich_copy
 
 
@@ -111,16 +129,17 @@ def spoil_codec(asset: Path) -> str:
     [spoil_missing, spoil_short, spoil_changed, spoil_mesh, spoil_video, spoil_codec],
     ids=lambda f: f.__name__[6:],
 )
-def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, asset: Path, spoil: object) -> None:
-    said = spoil(asset)  # type: ignore[operator]
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, one_level: Path, spoil: object) -> None:
+    said = spoil(one_level)  # type: ignore[operator]
+    player = new_player({"asset": one_level}, allow=(NOT_FOUND,))
     player.open("asset", wait=False)
     text = player.message()
     assert said in text
     assert "Try again" in text
 
 
-def test_try_again_loads_again(new_player: NewPlayer, asset: Path, tmp_path: Path) -> None:
+def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path: Path) -> None:
+    asset = one_level
     (asset / "coarse.mp4").rename(tmp_path / "away")
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("asset", wait=False)
@@ -139,6 +158,81 @@ def test_a_damaged_finer_level_leaves_the_coarse_one_playing(new_player: NewPlay
     assert player.run("e.play(); return [e.level, e.playing]") == ["coarse", True]
 
 
+def test_a_damaged_coarse_level_gives_way_to_the_finer_one(new_player: NewPlayer, asset: Path) -> None:
+    (asset / "coarse_full_01.drc").unlink()
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("asset")
+    assert "coarse_full_01.drc is missing" in player.notice()
+    assert player.run("return e.level") == "full"
+
+
+def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlayer, asset: Path) -> None:
+    (asset / "full_01.drc").unlink()
+    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
+    player.open("asset", "level=full&frame=0")
+    assert player.run("return e.level") == "coarse"
+
+
+def test_an_asset_of_a_newer_format(new_player: NewPlayer, asset: Path) -> None:
+    path = asset / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 3}))
+    player = new_player({"asset": asset})
+    player.open("asset", wait=False)
+    assert "too old" in player.message()
+
+
+@contextmanager
+def plain_server(folder: Path) -> Iterator[str]:
+    """A static server that sends no headers of its own."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, format: str, *args: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder))) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/"
+        server.shutdown()
+        thread.join()
+
+
+def test_another_server_that_does_not_allow_it(
+    new_player: NewPlayer, asset: Path, player_folder: Path, tmp_path: Path
+) -> None:
+    """CORS, and a policy of the page, are told apart from a server that is gone."""
+    site = Path(shutil.copytree(player_folder, tmp_path / "site"))
+    player = new_player({"asset": asset}, allow=("CORS", GONE, "Content Security Policy", "Content-Security-Policy"))
+    with plain_server(asset) as other, plain_server(site) as mine:
+        (site / "yours.html").write_text(
+            '<!doctype html><link rel="icon" href="data:,"><script type="module" src="facefolds-player.js"></script>'
+            f'<facefolds-player src="{other}"></facefolds-player>'
+        )
+        player.page.goto(f"{mine}yours.html")
+        assert "(CORS)" in player.message()
+        player.page.goto(f"{player.address}?src={other}")  # its policy allows its own server only
+        assert "Content-Security-Policy" in player.message()
+
+
+def test_the_page_opened_as_a_file_says_what_to_do(browser: Browser, player_folder: Path) -> None:
+    page = browser.new_page()
+    page.goto((player_folder / "index.html").as_uri())
+    assert "facefolds export-html" in page.locator("#words").inner_text()
+    page.close()
+
+
+def test_it_goes_on_by_itself_when_the_connection_is_back(new_player: NewPlayer, asset: Path) -> None:
+    player = new_player({"asset": asset}, allow=(NOT_FOUND, GONE))
+    player.open("asset")
+    player.page.context.set_offline(True)
+    player.run("e.setAttribute('src', '/asset/?again')")
+    assert "cannot be reached" in player.message()
+    assert player.run("return e.shadowRoot.activeElement.dataset.do") == "again"
+    player.page.context.set_offline(False)
+    player.wait("e.ready")
+    assert not player.page.get_by_role("alert").is_visible()
+
+
 def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, asset: Path) -> None:
     """The MP4's coded pictures are garbage: the decoder gives up, the WebM of the same level is taken."""
     path = asset / "full.mp4"
@@ -154,12 +248,12 @@ def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, a
 
 
 def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Path) -> None:
-    player = new_player({"asset": asset}, allow=("THREE.WebGLRenderer: Context",))
+    player = new_player({"asset": asset}, allow=())
     player.open("asset")
     player.wait("e.level === 'full'")
     before = player.capture()
     player.run(
-        """const gl = e.shadowRoot.querySelector('canvas').getContext('webgl2');
+        """const { gl } = e.player.renderer.graphics;
         window.lose = gl.getExtension('WEBGL_lose_context'); lose.loseContext();"""
     )
     assert "graphics context was lost" in player.message()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import shutil
 import subprocess
 from pathlib import Path
@@ -80,7 +81,7 @@ def test_an_element_can_change_its_source_and_go(new_player: NewPlayer, rich: Pa
     player.open("asset")
     player.run("e.setAttribute('src', '/other/')")
     player.wait("e.ready && e.level === 'full'")
-    assert player.run("const p = e.player; e.remove(); return [e.player, p.closed]") == [None, True]
+    assert player.run("const p = e.player; e.remove(); await 0; return [e.player, p.closed]") == [None, True]
 
 
 def test_a_phone_shows_all_its_buttons(new_player: NewPlayer, rich: Path) -> None:
@@ -90,6 +91,16 @@ def test_a_phone_shows_all_its_buttons(new_player: NewPlayer, rich: Path) -> Non
     boxes = [button.bounding_box() for button in player.page.locator(".bar button:visible").all()]
     assert len(boxes) >= 8
     assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 360 for box in boxes)
+
+
+def test_little_script_before_the_first_picture(new_player: NewPlayer, rich: Path, player_folder: Path) -> None:
+    """All that is fetched until there is a picture, compressed as servers do."""
+    player = new_player({"asset": rich})
+    player.open("asset")
+    names = {urlsplit(url).path.lstrip("/") for url in player.requests if url.startswith(player.address)}
+    scripts = [name for name in names if name.endswith(".js")]
+    assert "draco/worker.js" in scripts
+    assert sum(len(gzip.compress((player_folder / name).read_bytes())) for name in scripts) < 120_000
 
 
 def test_the_modules_that_need_no_browser(project_root: Path, player_folder: Path) -> None:

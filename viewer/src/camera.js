@@ -1,12 +1,12 @@
-/** Cameras: the captures' K and w2c (OpenCV axes, docs/reference/conventions.md) to OpenGL's matrices, and the orbit's angles. */
-import { Matrix4, Vector3 } from "three";
+/** Cameras: the captures' K and w2c (OpenCV axes, docs/reference/conventions.md) to OpenGL's matrices, and the orbit. */
+import { fromRows, viewFrom } from "./matrices.js";
 
 /**
  * OpenGL's projection of a pinhole camera whose image is fitted into a canvas, whole and centred.
  * @param {{K: number[][], width: number, height: number}} camera pixel centres at (i + 0.5, j + 0.5)
  * @param {number} width of the canvas
  * @param {number} height of the canvas
- * @returns {Matrix4}
+ * @returns {import("./matrices.js").Matrix}
  */
 export function projectionOf({ K, width: w, height: h }, width, height, near, far) {
   const fit = fitted(w, h, width, height);
@@ -15,12 +15,12 @@ export function projectionOf({ K, width: w, height: h }, width, height, near, fa
   // Image pixels -> canvas pixels -> clip coordinates; the camera looks along -z, y is up.
   const a = (2 * s) / width;
   const b = (2 * s) / height;
-  return new Matrix4().set(
-    a * fx, -a * skew, 1 - a * cx - (2 * fit.x) / width, 0,
-    0, b * fy, b * cy + (2 * fit.y) / height - 1, 0,
-    0, 0, (near + far) / (near - far), (2 * near * far) / (near - far),
-    0, 0, -1, 0,
-  ); // prettier-ignore
+  return fromRows([
+    [a * fx, -a * skew, 1 - a * cx - (2 * fit.x) / width, 0],
+    [0, b * fy, b * cy + (2 * fit.y) / height - 1, 0],
+    [0, 0, (near + far) / (near - far), (2 * near * far) / (near - far)],
+    [0, 0, -1, 0],
+  ]);
 }
 
 /** Where an image of w x h lies in a canvas of W x H that shows it whole: {x, y, scale}. */
@@ -32,32 +32,31 @@ export function fitted(w, h, W, H) {
 /** OpenGL's view matrix of w2c (3 x 4 by rows, OpenCV axes). */
 export function viewOf(w2c) {
   const [x, y, z] = w2c;
-  return new Matrix4().set(...x, ...y.map((v) => -v), ...z.map((v) => -v), 0, 0, 0, 1);
+  return fromRows([x, y.map((v) => -v), z.map((v) => -v), [0, 0, 0, 1]]);
 }
 
 const DEGREES = 180 / Math.PI;
 
 /**
- * The orbit's state as numbers to share.
- * @param {Vector3} position
- * @param {Vector3} target
- * @returns {{azimuth: number, elevation: number, distance: number, target: number[]}} degrees; azimuth from +x to +y
+ * @typedef {{azimuth: number, elevation: number, distance: number, target: number[]}} Orbit degrees; azimuth from +x
+ *   (before the subject) to +y (its left)
  */
-export function orbitOf(position, target) {
-  const offset = position.clone().sub(target);
-  const distance = offset.length();
-  return {
-    azimuth: Math.atan2(offset.y, offset.x) * DEGREES,
-    elevation: Math.asin(Math.max(-1, Math.min(1, offset.z / distance))) * DEGREES,
-    distance,
-    target: target.toArray(),
-  };
+
+/** Axes of the camera of an orbit. @param {Orbit} orbit @returns {{right: number[], up: number[], back: number[]}} */
+export function axesOf({ azimuth, elevation }) {
+  const [a, e] = [azimuth / DEGREES, elevation / DEGREES];
+  const [ca, sa, ce, se] = [Math.cos(a), Math.sin(a), Math.cos(e), Math.sin(e)];
+  return { right: [-sa, ca, 0], up: [-se * ca, -se * sa, ce], back: [ce * ca, ce * sa, se] };
 }
 
-/** The inverse of `orbitOf`: the camera's position. */
-export function positionOf({ azimuth, elevation, distance, target }) {
-  const a = azimuth / DEGREES;
-  const e = elevation / DEGREES;
-  const direction = new Vector3(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
-  return direction.multiplyScalar(distance).add(new Vector3(...target));
+/** Where the camera of an orbit stands. @param {Orbit} orbit @returns {number[]} */
+export function positionOf(orbit) {
+  const { back } = axesOf(orbit);
+  return back.map((v, i) => orbit.target[i] + orbit.distance * v);
+}
+
+/** OpenGL's view matrix of an orbit. @param {Orbit} orbit */
+export function orbitView(orbit) {
+  const { right, up, back } = axesOf(orbit);
+  return viewFrom(right, up, back, positionOf(orbit));
 }

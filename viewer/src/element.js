@@ -1,52 +1,84 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
+import { isColour, painted } from "./colours.js";
 import { PlayerError } from "./errors.js";
+import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
-import { connectBar } from "./ui/bar.js";
-import { Comparison } from "./ui/compare.js";
-import { connectKeys } from "./ui/keys.js";
+import { Recovery } from "./recovery.js";
+import { KINDS } from "./shaders.js";
+import { asPng, linkTo } from "./sharing.js";
+import { connectControls } from "./ui/controls.js";
 import { Overlays } from "./ui/overlays.js";
-import { connectPanel } from "./ui/panel.js";
-import { TEMPLATE } from "./ui/template.js";
-import { encode } from "./viewstate.js";
+import { STYLE, TEMPLATE } from "./ui/template.js";
+import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
+const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "change", "error"];
 
 export class FacefoldsPlayer extends HTMLElement {
-  static observedAttributes = ["src", "background", "loop", "speed"];
+  static observedAttributes = ["src", "background", "loop", "speed", "level"];
 
   #player = null;
+  #given = null; // files that came without an address
   #state = {}; // what is to be applied when the first picture is there
-  #settings = { background: BACKGROUND, spread: 0, wireframe: false, effects: true };
+  #resume = false; // it played when it was taken out of the document
+  #settings = { background: BACKGROUND, ...PLAIN };
+  #ends = []; // what is to be called when the player goes
+  #recovery = new Recovery(
+    () => this.#player?.onScreen ?? true,
+    () => (this.ready ? this.#player.detail.resume() : this.#start()),
+  );
 
   constructor() {
     super();
-    this.attachShadow({ mode: "open" });
+    this.attachShadow({ mode: "open" }).adoptedStyleSheets = [STYLE];
   }
 
   connectedCallback() {
-    this.#start();
+    if (!this.#player) this.#begin();
   }
 
+  /** Moved by `moveBefore`: nothing changes. */
+  connectedMoveCallback() {}
+
+  /** Moving within the document takes it out and puts it in again: only what stays out is let go. */
   disconnectedCallback() {
-    this.#stop();
+    queueMicrotask(() => {
+      if (this.isConnected || !this.#player) return;
+      this.#state = this.state;
+      this.#resume = this.playing;
+      this.#stop();
+    });
   }
 
   attributeChangedCallback(name, before, now) {
     if (!this.isConnected || before === now) return;
-    if (name === "src") this.#start();
-    if (name === "background" && now) this.background = now;
+    if (name === "src") {
+      this.#given = null;
+      this.#begin();
+    }
+    if (name === "background") this.#paint(isColour(now) ? now : BACKGROUND);
     if (name === "loop") this.loop = now !== "false";
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
+    if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
   }
 
-  /** Loads the asset named by `src` (again). */
+  /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen. */
+  #begin() {
+    this.#stop();
+    if (this.getAttribute("loading") !== "lazy") return this.#start();
+    this.shadowRoot.innerHTML = TEMPLATE;
+    this.#paint(this.getAttribute("background") ?? BACKGROUND);
+    this.#ends.push(whenNear(this, () => this.#start()));
+  }
+
+  /** Loads the asset (again). */
   async #start() {
     this.#stop();
     this.shadowRoot.innerHTML = TEMPLATE;
     this.overlays = new Overlays(this);
     this.shadowRoot.querySelector('[data-do="again"]').addEventListener("click", () => this.#start());
-    if (!this.hasAttribute("src"))
+    if (!this.#given && !this.hasAttribute("src"))
       return this.overlays.fail(
         new PlayerError("No asset was named", {
           kind: "missing",
@@ -60,30 +92,28 @@ export class FacefoldsPlayer extends HTMLElement {
     }
     const player = this.#player;
     this.#connect(player);
-    const folder = new URL(this.getAttribute("src").replace(/\/?(manifest\.json)?$/, "/"), document.baseURI).href;
     try {
-      await player.load(folder, this.#state.level ?? this.getAttribute("level") ?? "auto");
+      await player.load(this.#files(), this.#state.level ?? this.getAttribute("level") ?? "auto");
       if (player === this.#player) this.overlays.loaded();
     } catch (error) {
       if (player === this.#player) this.#failed(error);
     }
   }
 
+  #files() {
+    if (this.#given) return new MemoryFiles(this.#given);
+    return new Files(new URL(this.getAttribute("src").replace(/\/?(manifest\.json)?$/, "/"), document.baseURI).href);
+  }
+
   #connect(player) {
     player.playback.loop = this.getAttribute("loop") !== "false";
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
-    this.#settings.background = this.getAttribute("background") ?? BACKGROUND;
-    const stage = this.shadowRoot.querySelector(".stage");
-    this.resizing = new ResizeObserver(() => {
-      player.resize(stage.clientWidth, stage.clientHeight, Math.min(2, devicePixelRatio));
-    });
-    this.resizing.observe(stage);
-    this.comparison = new Comparison(this);
-    connectBar(this);
-    connectPanel(this);
-    connectKeys(this);
+    const asked = this.getAttribute("background");
+    this.#paint(isColour(asked) ? asked : BACKGROUND);
+    this.#ends.push(watchSight(this, (seen) => player.setOnScreen(seen)));
     this.overlays.connect(player);
-    player.addEventListener("ready", () => this.#begin());
+    this.#ends.push(connectControls(this));
+    player.addEventListener("ready", () => this.#ready());
     player.addEventListener("error", ({ detail }) => this.#failed(detail));
     for (const name of FORWARDED) {
       player.addEventListener(name, ({ detail }) => this.dispatchEvent(new CustomEvent(name, { detail })));
@@ -91,25 +121,43 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   /** The first picture is there: what was asked for beforehand is set. */
-  #begin() {
+  #ready() {
     const state = this.#state;
     this.#state = {};
-    this.background = this.#settings.background;
+    this.#paint(this.background);
+    for (const name of Object.keys(PLAIN)) this.#player.set(name, this.#settings[name]);
     this.state = { ...state, level: undefined };
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const rests = state.frame !== undefined || state.photo !== undefined;
-    if (this.hasAttribute("autoplay") && !still && !rests) this.play();
+    const starts = this.hasAttribute("autoplay") && !still && !rests;
+    if (starts && !state.view && this.getAttribute("sway") !== "none") this.#player.view.startSway();
+    if (starts || this.#resume) this.play();
+    this.#resume = false;
   }
 
   #failed(error) {
     this.overlays.fail(error, this.#player?.level ? "notice" : "all");
     if (!this.#player) this.dispatchEvent(new CustomEvent("error", { detail: error }));
+    if (error.kind === "offline") this.#recovery.start(error.file);
   }
 
   #stop() {
-    this.resizing?.disconnect();
+    for (const end of this.#ends.splice(0)) end();
+    this.#recovery.stop();
     this.#player?.close();
     this.#player = null;
+  }
+
+  /** Plays an asset that is at hand. @param {Map<string, Blob>} files name -> content, manifest.json among them */
+  openFiles(files) {
+    this.#given = new Map(files);
+    this.#state = {};
+    if (this.isConnected) this.#start();
+  }
+
+  /** Whether the asset has an address that others could open. */
+  get shareable() {
+    return this.#given === null;
   }
 
   /** The engine behind the element, for programs that need more than the element offers; null before it is connected. */
@@ -163,14 +211,18 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#settings.background;
   }
 
-  /** @param {string} colour "#rrggbb" or "transparent" */
+  /** @param {string} colour any that CSS knows, `transparent` included */
   set background(colour) {
-    const hex = /^#([0-9a-f]{2})([0-9a-f]{2})([0-9a-f]{2})$/i.exec(colour);
-    if (!hex && colour !== "transparent")
-      throw new TypeError(`a background is "#rrggbb" or "transparent", not "${colour}"`);
+    if (!isColour(colour)) throw new TypeError(`a background is a colour of CSS, not "${colour}"`);
+    this.#paint(colour);
+  }
+
+  #paint(colour) {
+    const stage = this.shadowRoot.querySelector(".stage");
     this.#settings.background = colour;
-    this.shadowRoot.querySelector(".stage").style.background = hex ? colour : "none";
-    this.#player?.set("background", hex ? [...hex.slice(1).map((part) => parseInt(part, 16) / 255), 1] : [0, 0, 0, 0]);
+    if (!stage) return;
+    this.paint = painted(colour, stage);
+    this.#player?.set("background", this.paint);
   }
 
   get spread() {
@@ -197,6 +249,16 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#set("effects", Boolean(on));
   }
 
+  /** What is shown: "colour", "alpha", "depth" or "uv". */
+  get mode() {
+    return this.#settings.mode;
+  }
+
+  set mode(kind) {
+    if (!KINDS.includes(kind)) throw new TypeError(`a mode is one of ${KINDS.join(", ")}, not "${kind}"`);
+    this.#set("mode", kind);
+  }
+
   #set(name, value) {
     this.#settings[name] = value;
     this.#player?.set(name, value);
@@ -211,12 +273,13 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#player?.hide(visible.flatMap((on, i) => (on ? [] : [i])));
   }
 
+  /** Name of the level that is shown; set to "auto", it follows what the machine can do. */
   get level() {
     return this.#player?.level?.info.name ?? "";
   }
 
   set level(name) {
-    this.#player?.setLevel(name).catch((error) => this.#failed(error));
+    this.#player?.detail.choose(name).catch((error) => this.#failed(error));
   }
 
   /** Names of the levels that this machine can show, coarsest first. */
@@ -251,6 +314,18 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#player?.view.reset();
   }
 
+  /** All settings and the view as they were at first; goes on playing or resting. */
+  reset() {
+    const asked = this.getAttribute("background");
+    this.#paint(isColour(asked) ? asked : BACKGROUND);
+    Object.assign(this, PLAIN);
+    this.layers = this.layers.map(() => true);
+    this.loop = this.getAttribute("loop") !== "false";
+    this.speed = Number(this.getAttribute("speed")) || 1;
+    this.level = this.levels.includes(this.getAttribute("level")) ? this.getAttribute("level") : "auto";
+    this.resetView();
+  }
+
   /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera docs/reference/conventions.md; null: back to the orbit */
   setCamera(camera) {
     this.#player?.view.setExact(camera);
@@ -262,6 +337,11 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#player.capture(camera);
   }
 
+  /** @param {object} [camera] as for `setCamera` @returns {Promise<Blob>} the same as a PNG */
+  async screenshot(camera) {
+    return asPng(this.capture(camera));
+  }
+
   /** Shows held-out photo `index` beside the asset, from the photo's camera and frame; null: closes. */
   compare(index) {
     return index === null ? this.comparison?.close() : this.comparison?.open(index);
@@ -271,26 +351,25 @@ export class FacefoldsPlayer extends HTMLElement {
   get state() {
     const player = this.#player;
     if (!player?.level) return { ...this.#state };
-    const { background, spread, wireframe, effects } = this.#settings;
+    const { background, ...settings } = this.#settings;
     const hidden = this.layers.flatMap((on, i) => (on ? [] : [i]));
     return {
       ...(this.playing ? {} : { frame: this.frame }),
       ...(this.comparison.index === null ? { view: player.view.get() } : { photo: this.comparison.index }),
-      ...(this.level === this.levels.at(-1) ? {} : { level: this.level }),
+      ...(player.detail.auto ? {} : { level: this.level }),
       ...(background === BACKGROUND || background === "transparent" ? {} : { background }),
-      ...{ hidden, spread, wireframe, effects, speed: this.speed, loop: this.loop },
+      ...{ hidden, ...settings, speed: this.speed, loop: this.loop },
     };
   }
 
   set state(state) {
-    if (!this.#player?.level) {
+    if (!this.ready) {
       this.#state = { ...this.#state, ...state };
       return;
     }
-    const { frame, view, level, hidden, photo } = state;
-    for (const key of ["background", "spread", "wireframe", "effects", "speed", "loop"]) {
-      if (state[key] !== undefined) this[key] = state[key];
-    }
+    const { frame, view, level, hidden, photo, background } = state;
+    if (isColour(background)) this.#paint(background);
+    for (const key of [...Object.keys(PLAIN), "speed", "loop"]) if (state[key] !== undefined) this[key] = state[key];
     if (hidden) this.#player.hide(hidden);
     if (view) this.#player.view.set(view);
     if (level && level !== this.level && this.levels.includes(level)) this.level = level;
@@ -303,28 +382,6 @@ export class FacefoldsPlayer extends HTMLElement {
 
   /** @returns {string} address of the full-page player with this asset and this view */
   get link() {
-    const page = new URL("./index.html", import.meta.url);
-    page.searchParams.set("src", new URL(this.getAttribute("src"), document.baseURI).href.replace(page.origin, ""));
-    page.hash = encode(this.state);
-    return page.href;
-  }
-
-  async share() {
-    const { link } = this;
-    try {
-      await navigator.clipboard.writeText(link);
-      this.overlays.say("Link copied");
-    } catch {
-      this.overlays.say(link, 15000); // no permission: to be copied by hand
-    }
-  }
-
-  async toggleFullScreen() {
-    try {
-      if (document.fullscreenElement) await document.exitFullscreen();
-      else await this.requestFullscreen();
-    } catch {
-      this.overlays.say("This browser does not allow full screen here");
-    }
+    return linkTo(this);
   }
 }

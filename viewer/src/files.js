@@ -1,7 +1,13 @@
-/** Fetches an asset's files: counts bytes, and refuses a file that is missing, short or changed. */
+/** Gets an asset's files, from a server or from memory: counts bytes, and refuses a file that is missing, short or changed. */
 import { PlayerError } from "./errors.js";
 
 const AGAIN = "Copy or make the asset again.";
+
+/** Addresses that the page's own policy has refused: their fetches fail without a reason. */
+const forbidden = new Map();
+globalThis.document?.addEventListener("securitypolicyviolation", ({ blockedURI, effectiveDirective }) =>
+  forbidden.set(new URL(blockedURI, location.href).origin, effectiveDirective),
+);
 
 export class Files {
   /**
@@ -50,14 +56,9 @@ export class Files {
       }
     } catch (cause) {
       if (this.abort.signal.aborted) throw cause;
-      throw unreachable(this.address(entry.name), cause);
+      throw await unreachable(this.address(entry.name), cause, this.abort.signal);
     }
-    const found =
-      filled === data.length ? await changed(data.buffer, entry.sha256) : `${filled} bytes instead of ${data.length}`;
-    if (found) {
-      const file = this.address(entry.name);
-      throw new PlayerError(`The file ${entry.name} is damaged: ${found}`, { file, remedy: AGAIN });
-    }
+    await checked(data.buffer, filled, entry, this.address(entry.name));
     return data.buffer;
   }
 
@@ -73,26 +74,103 @@ export class Files {
       response = await fetch(file, { ...options, signal: this.abort.signal });
     } catch (cause) {
       if (this.abort.signal.aborted) throw cause;
-      throw unreachable(file, cause);
+      throw await unreachable(file, cause, this.abort.signal);
     }
-    if (!response.ok) {
-      throw new PlayerError(`The file ${name} is missing (the server says ${response.status})`, {
-        file,
-        kind: "missing",
-        remedy: name === "manifest.json" ? "Check the address: it must be the folder of an asset." : AGAIN,
-      });
-    }
+    if (!response.ok) throw missing(name, file, `the server says ${response.status}`);
     return response;
   }
 }
 
-function unreachable(file, cause) {
-  return new PlayerError("The server cannot be reached", {
+/** An asset whose files are at hand: dropped on the player, in an archive, or in the page itself. */
+export class MemoryFiles {
+  /**
+   * @param {Map<string, Blob>} given file's name -> content
+   * @param {() => void} onProgress
+   */
+  constructor(given, onProgress = () => {}) {
+    this.given = given;
+    this.loaded = 0;
+    this.onProgress = onProgress;
+  }
+
+  close() {}
+
+  address(name) {
+    return name;
+  }
+
+  async text(name) {
+    return new TextDecoder().decode(await this.#read(name));
+  }
+
+  async bytes(entry) {
+    const buffer = await this.#read(entry.name);
+    await checked(buffer, buffer.byteLength, entry, entry.name);
+    return buffer;
+  }
+
+  async #read(name) {
+    const blob = this.given.get(name);
+    if (!blob) throw missing(name, name, "it is not among the files given");
+    const buffer = await blob.arrayBuffer();
+    this.loaded += buffer.byteLength;
+    this.onProgress();
+    return buffer;
+  }
+}
+
+function missing(name, file, why) {
+  return new PlayerError(`The file ${name} is missing (${why})`, {
     file,
-    cause,
-    kind: "offline",
-    remedy: "Check that the server runs and the connection is up, then load again.",
+    kind: "missing",
+    remedy: name === "manifest.json" ? "Check the address: it must be the folder of an asset." : AGAIN,
   });
+}
+
+/** Why a fetch failed, as far as a page may know. @returns {Promise<PlayerError>} */
+async function unreachable(file, cause, signal) {
+  const { protocol, origin, host } = new URL(file);
+  if (protocol === "file:") {
+    return new PlayerError("A page that was opened as a file may not read other files", {
+      ...{ file, cause, kind: "file" },
+      remedy:
+        "Serve the folder (`facefolds view ASSET`), or make one file that plays by itself: `facefolds export-html ASSET --out face.html`.",
+    });
+  }
+  await new Promise((resolve) => setTimeout(resolve)); // the browser's word about its policy comes after the failure
+  const directive = forbidden.get(origin);
+  if (directive) {
+    return new PlayerError("This page's Content-Security-Policy does not let the player read the asset", {
+      ...{ file, cause, kind: "csp" },
+      remedy: `Allow ${origin} in the page's ${directive}.`,
+    });
+  }
+  if (origin !== location.origin && (await answers(file, signal))) {
+    return new PlayerError(`The server ${host} does not let this page read the asset (CORS)`, {
+      ...{ file, cause, kind: "cors" },
+      remedy: "Let it send the header Access-Control-Allow-Origin, or put the asset beside the page.",
+    });
+  }
+  return new PlayerError("The server cannot be reached", {
+    ...{ file, cause, kind: "offline" },
+    remedy: "Check that the server runs and the connection is up. The player goes on by itself when they are back.",
+  });
+}
+
+/** Whether there is an answer that the page may not read. */
+async function answers(file, signal) {
+  try {
+    await fetch(file, { mode: "no-cors", method: "HEAD", signal });
+    return true;
+  } catch {
+    return false;
+  }
+}
+
+/** @throws {PlayerError} if the content is not what the manifest says */
+async function checked(buffer, filled, { name, bytes, sha256 }, file) {
+  const found = filled === bytes ? await changed(buffer, sha256) : `${filled} bytes instead of ${bytes}`;
+  if (found) throw new PlayerError(`The file ${name} is damaged: ${found}`, { file, remedy: AGAIN });
 }
 
 /** What is wrong with the content; "" if nothing, or where it cannot be known (pages without HTTPS have no SubtleCrypto). */

@@ -1,12 +1,10 @@
 /** Loads one level of detail: its meshes, its view effects and the video with its first picture. */
-import * as THREE from "three";
 import { PlayerError } from "./errors.js";
 import { decodeMesh } from "./meshes.js";
-import { openVideo } from "./video/open.js";
 
 /**
- * @typedef {{info: import("./manifest.js").Level, geometries: THREE.BufferGeometry[], texture: THREE.VideoFrameTexture,
- *   effects: THREE.Texture | null, reflection: THREE.Texture | null, source: import("./video/open.js").FrameSource,
+ * @typedef {{info: import("./manifest.js").Level, geometries: import("./meshes.js").Geometry[],
+ *   effects: ImageBitmap | null, reflection: ImageBitmap | null, source: import("./video/open.js").FrameSource,
  *   video: import("./manifest.js").VideoEntry, dispose: () => void}} LoadedLevel
  * @param {import("./manifest.js").Level} info
  * @param {import("./files.js").Files} files
@@ -21,25 +19,15 @@ export async function loadLevel(info, files, onVideoError, refused) {
       return decodeMesh(buffer, layer, files.address(layer.mesh.name));
     })),
     info.effects ? loadPicture(info.effects.file, files) : null,
-    openVideo(info, files, onVideoError, refused),
+    import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused)),
     info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
-  const texture = new THREE.VideoFrameTexture();
-  texture.colorSpace = THREE.NoColorSpace;
-  texture.flipY = false; // rows run down, as in the format
-  texture.generateMipmaps = false;
-  texture.minFilter = texture.magFilter = THREE.LinearFilter;
-  texture.setFrame(opened.first);
   const dispose = () => {
-    for (const geometry of geometries) geometry.dispose();
-    for (const one of [effects, reflection]) {
-      one?.dispose();
-      one?.image.close?.();
-    }
-    texture.dispose();
+    effects?.close();
+    reflection?.close();
     opened.source.close();
   };
-  return { info, geometries, texture, effects, reflection, source: opened.source, video: opened.video, dispose };
+  return { info, geometries, effects, reflection, source: opened.source, video: opened.video, dispose };
 }
 
 /** Like Promise.all, but a video opened in vain is closed. */
@@ -53,9 +41,8 @@ async function allOrNothing(work) {
 
 async function loadPicture(entry, files) {
   const blob = new Blob([await files.bytes(entry)], { type: "image/png" });
-  let image;
   try {
-    image = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    return await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   } catch (cause) {
     const file = files.address(entry.name);
     throw new PlayerError(`The picture ${entry.name} is damaged`, {
@@ -64,23 +51,13 @@ async function loadPicture(entry, files) {
       remedy: "Copy or make the asset again.",
     });
   }
-  const texture = new THREE.Texture(image);
-  texture.colorSpace = THREE.NoColorSpace;
-  texture.flipY = false;
-  texture.generateMipmaps = false;
-  texture.minFilter = texture.magFilter = THREE.LinearFilter;
-  texture.needsUpdate = true;
-  return texture;
 }
 
 /** Bytes that a level keeps on the GPU: vertex data as uploaded (uint32 or uint16 indices) and RGBA textures. */
 export function gpuBytes(level) {
-  let bytes = 0;
-  for (const geometry of level.geometries) {
-    for (const attribute of [geometry.index, ...Object.values(geometry.attributes)])
-      bytes += attribute.array.byteLength;
-  }
-  bytes += 4 * level.info.texture.width * level.info.texture.height;
-  for (const one of [level.effects, level.reflection]) if (one) bytes += 4 * one.image.width * one.image.height;
+  let bytes = 4 * level.info.texture.width * level.info.texture.height;
+  for (const { index, position, uv } of level.geometries)
+    bytes += index.byteLength + position.byteLength + uv.byteLength;
+  for (const image of [level.effects, level.reflection]) if (image) bytes += 4 * image.width * image.height;
   return bytes;
 }

@@ -18,7 +18,7 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry | null,
- *   poster: FileEntry | null, photos: Photo[]}} Manifest
+ *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null}} Manifest
  */
 
 /**
@@ -42,11 +42,17 @@ export function parseManifest(text, file) {
     });
   }
   if (value.version !== VERSION) {
-    throw new PlayerError(`The asset has format version ${value.version}; this player reads version ${VERSION}`, {
-      file,
-      kind: "unsupported",
-      remedy: "Make the asset again with the facefolds that this player came with.",
-    });
+    const newer = Number(value.version) > VERSION;
+    throw new PlayerError(
+      `The asset has format version ${value.version}; this player reads version ${VERSION}${newer ? " and is too old for it" : ""}`,
+      {
+        file,
+        kind: "unsupported",
+        remedy: newer
+          ? "Put the player of the facefolds that made the asset on this page."
+          : "Make the asset again with the facefolds that this player came with.",
+      },
+    );
   }
   try {
     return readManifest(value);
@@ -75,6 +81,7 @@ function readManifest(value) {
     audio: value.audio ? readFile(value.audio, value.audio.file, "audio") : null,
     poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
     photos: (value.photos ?? []).map(readPhoto),
+    view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
   };
 }
 
@@ -179,6 +186,12 @@ function count(value, place) {
 function rectangle(value, place) {
   check(Array.isArray(value) && value.length === 4 && value.every(Number.isFinite), `${place} is not a rectangle`);
   return value;
+}
+
+function range(view, key) {
+  const [low, high] = list(view[key], `view.${key}`);
+  check(Number.isFinite(low) && Number.isFinite(high) && low <= high, `view.${key} is no range`);
+  return [low, high];
 }
 
 function check(condition, message) {

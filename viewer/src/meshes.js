@@ -1,44 +1,42 @@
-/** Decodes the layers' meshes with three's Draco decoder, in workers. */
-import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
+/** A layer's mesh, decoded and held against what the manifest says of it. */
+import { decode } from "./draco/decoder.js";
 import { PlayerError } from "./errors.js";
 
-let decoder = null;
-
-/** One decoder for all players of a page; its files lie beside the module, in draco/. */
-function theDecoder() {
-  if (!decoder) {
-    const base = new URL("./draco/", import.meta.url);
-    const urls = { js: new URL("draco_wasm_wrapper.js", base).href, wasm: new URL("draco_decoder.wasm", base).href };
-    decoder = new DRACOLoader().setDecoderPath(urls).setWorkerLimit(2);
-  }
-  return decoder;
-}
-
-export function preloadDecoder() {
-  theDecoder().preload();
-}
-
 /**
+ * @typedef {{index: Uint16Array | Uint32Array, position: Float32Array, uv: Float32Array,
+ *   box: {low: number[], high: number[]}}} Geometry
  * @param {ArrayBuffer} buffer handed over: not to be used afterwards
  * @param {import("./manifest.js").LayerEntry} layer what it must hold
  * @param {string} file its address, for messages
- * @returns {Promise<import("three").BufferGeometry>} with index, position and uv
+ * @returns {Promise<Geometry>}
  */
 export async function decodeMesh(buffer, layer, file) {
   if (new TextDecoder().decode(buffer.slice(0, 5)) !== "DRACO") throw damaged(layer, file, "it is not a Draco mesh");
-  let geometry;
+  let found;
   try {
-    geometry = await new Promise((resolve, reject) => theDecoder().parse(buffer, resolve, reject));
+    found = await decode(buffer);
   } catch (cause) {
+    if (cause instanceof PlayerError) throw cause;
     throw damaged(layer, file, "its Draco data cannot be decoded", cause);
   }
-  const { position, uv } = geometry.attributes;
-  if (!geometry.index || !position || !uv) throw damaged(layer, file, "it lacks triangles or texture coordinates");
-  if (position.count !== layer.vertices || geometry.index.count !== 3 * layer.triangles) {
-    const found = `${position.count} vertices and ${geometry.index.count / 3} triangles`;
-    throw damaged(layer, file, `${found} instead of ${layer.vertices} and ${layer.triangles}`);
+  const { index, position, uv } = found;
+  const [vertices, triangles] = [position.length / 3, index.length / 3];
+  if (vertices !== layer.vertices || triangles !== layer.triangles) {
+    const wanted = `${layer.vertices} and ${layer.triangles}`;
+    throw damaged(layer, file, `${vertices} vertices and ${triangles} triangles instead of ${wanted}`);
   }
-  return geometry;
+  return { index: vertices <= 65536 ? Uint16Array.from(index) : index, position, uv, box: boxOf(position) };
+}
+
+function boxOf(position) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < position.length; ++i) {
+    const k = i % 3;
+    if (position[i] < low[k]) low[k] = position[i];
+    if (position[i] > high[k]) high[k] = position[i];
+  }
+  return { low, high };
 }
 
 function damaged(layer, file, found, cause) {

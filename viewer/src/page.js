@@ -1,11 +1,14 @@
 /** The full page: index.html?src=FOLDER#VIEW. The address follows the view, so that it can be copied at any time. */
 import "./index.js";
+import { acceptDrops } from "./ui/drop.js";
 import { decode, encode } from "./viewstate.js";
 
 const PAUSE = 400; // ms without a change before the address is brought up to date
 
 const player = document.querySelector("facefolds-player");
 const given = new URLSearchParams(location.search);
+if (parent === window) player.setAttribute("gestures", "all"); // in a frame the page around it scrolls
+acceptDrops(player);
 player.state = decode(location.hash);
 player.setAttribute("src", given.get("src") ?? "asset/");
 if (given.has("controls")) player.setAttribute("controls", given.get("controls"));
@@ -14,7 +17,7 @@ let timer = 0;
 function note() {
   clearTimeout(timer);
   timer = setTimeout(() => {
-    if (player.ready) history.replaceState(null, "", `#${encode(player.state)}`);
+    if (player.ready && player.shareable) history.replaceState(null, "", `#${encode(player.state)}`);
   }, PAUSE);
 }
 for (const name of ["pause", "change", "level", "play"]) player.addEventListener(name, note);

@@ -3,11 +3,11 @@
  *
  * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "change" (any setting), "error".
  */
+import { startDecoder, weight } from "./draco/decoder.js";
 import { PlayerError } from "./errors.js";
-import { Files } from "./files.js";
-import { gpuBytes, loadLevel } from "./levels.js";
+import { LevelChoice } from "./levelchoice.js";
+import { gpuBytes } from "./levels.js";
 import { parseManifest } from "./manifest.js";
-import { preloadDecoder } from "./meshes.js";
 import { Playback } from "./playback.js";
 import { LayerRenderer } from "./renderer.js";
 import { Sound } from "./sound.js";
@@ -15,6 +15,13 @@ import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
 const RATE_OVER = 1000; // ms that the frames a second are counted over
+const SETTERS = {
+  spread: "setSpread",
+  wireframe: "setWireframe",
+  effects: "setEffects",
+  background: "setBackground",
+  mode: "setKind",
+};
 
 export class Player extends EventTarget {
   /** @param {HTMLCanvasElement} canvas */
@@ -22,8 +29,9 @@ export class Player extends EventTarget {
     super();
     this.canvas = canvas;
     this.renderer = new LayerRenderer(canvas);
-    this.view = new View(canvas, () => (this.stale = true));
+    this.view = new View(canvas, () => this.invalidate());
     this.playback = new Playback({ frames: 1, fps: 1 });
+    this.detail = new LevelChoice(this);
     this.manifest = null;
     this.files = null;
     this.level = null;
@@ -31,94 +39,64 @@ export class Player extends EventTarget {
     this.shown = -1; // the frame in the texture
     this.stale = false; // the canvas needs drawing
     this.lost = false; // the graphics context
+    this.onScreen = true;
+    this.immersed = false; // a headset draws
     this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
-    this.refused = new Set(); // videos that broke down
     this.size = [0, 0];
+    this.busy = 0; // s that the last picture took of the page's thread
+    this.request = 0; // of an animation frame; 0: none, nothing moves
     this.#watchContext();
-    this.request = requestAnimationFrame((now) => this.#tick(now));
   }
 
   /**
-   * @param {string} folder address of the asset's folder
+   * @param {import("./files.js").Files | import("./files.js").MemoryFiles} files of the asset
    * @param {string} [want] name of a level, or "auto": the finest that this machine can take
    */
-  async load(folder, want = "auto") {
-    this.files = new Files(folder, () => this.#say("progress"));
-    preloadDecoder();
-    const text = await this.files.text("manifest.json");
-    this.manifest = parseManifest(text, this.files.address("manifest.json"));
-    this.#say("progress");
-    const { levels, audio } = this.manifest;
-    const fitting = levels.filter(
-      ({ texture }) => Math.max(texture.width, texture.height) <= this.renderer.maxTextureSize,
-    );
-    if (!fitting.length) {
-      throw new PlayerError(
-        `The textures are larger than this machine's ${this.renderer.maxTextureSize} pixels a side`,
-        {
-          kind: "unsupported",
-          remedy: "Export the asset with a coarser level of detail.",
-        },
-      );
-    }
-    this.choices = fitting.map(({ name }) => name);
-    const { frames, fps } = fitting.at(-1).texture;
+  async load(files, want = "auto") {
+    this.files = files;
+    files.onProgress = () => this.say("progress");
+    const text = await files.text("manifest.json");
+    this.manifest = parseManifest(text, files.address("manifest.json"));
+    this.say("progress");
+    startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
+    this.view.setFilmed(this.manifest.view);
+    const { frames, fps } = this.manifest.levels.at(-1).texture;
     Object.assign(this.playback, { frames, fps });
-    const goal = this.choices.includes(want) ? want : this.choices.at(-1);
-    await this.setLevel(this.choices.length > 1 && want !== goal ? this.choices[0] : goal);
-    if (audio) this.#loadSound(audio);
-    if (this.level.info.name !== goal) await this.setLevel(goal);
+    await this.detail.load(want, () => this.manifest.audio && this.#loadSound(this.manifest.audio));
   }
 
   async #loadSound(entry) {
     try {
       this.sound = new Sound(await this.files.bytes(entry));
-      this.#say("change");
+      this.say("change");
     } catch (error) {
-      this.#fail(error);
+      this.fail(error);
     }
   }
 
-  /** Loads level `name` and swaps it in with the frame that is due. Resolves when it is drawn. */
-  async setLevel(name) {
-    const info = this.manifest.levels.find((level) => level.name === name);
-    if (!info) throw new RangeError(`no level ${name}`);
-    this.wantedLevel = name;
-    let level = null;
-    level = await loadLevel(info, this.files, (error) => this.#videoFailed(level, error), this.refused);
-    if (this.closed || this.wantedLevel !== name) return level.dispose();
-    let picture;
-    let frame;
-    do {
-      frame = this.playback.frame;
-      picture = await level.source.get(frame);
-    } while (frame !== this.playback.frame && !this.playback.playing);
+  /** Names of the levels that this machine can show, coarsest first. */
+  get choices() {
+    return this.detail.choices;
+  }
+
+  /** Shows a level that has been loaded, with the frame that is due. @param {import("./levels.js").LoadedLevel} level */
+  swap(level, frame, picture) {
     const old = this.level;
     this.level = level;
     this.renderer.setLevel(level);
     this.#showLayers();
     this.#show(frame, picture);
     if (!old) {
-      this.view.setHome(this.renderer.bounds());
-      this.view.reset();
+      this.home = this.renderer.bounds();
+      this.view.setHome(this.home);
     }
-    this.#draw();
+    this.draw();
     old?.dispose();
-    if (!old) this.#say("ready");
-    this.#say("level");
-  }
-
-  /** A decoder broke down: the level's next video takes over, or the failure is said. */
-  async #videoFailed(level, error) {
-    if (this.closed || !level || level !== this.level) return;
-    this.refused.add(level.video.name);
-    try {
-      await this.setLevel(level.info.name);
-    } catch (failure) {
-      this.#fail(failure.kind === "codec" ? failure : error);
-    }
+    if (!old) this.say("ready");
+    this.say("level");
+    this.wake();
   }
 
   get playing() {
@@ -129,14 +107,17 @@ export class Player extends EventTarget {
     if (this.playback.playing || this.playback.frames < 2) return;
     if (!this.playback.loop && this.playback.frame === this.playback.frames - 1) this.seek(0);
     this.playback.playing = true;
-    this.#say("play");
+    this.detail.restart();
+    this.say("play");
+    this.wake();
   }
 
   pause() {
     if (!this.playback.playing) return;
     this.playback.playing = false;
+    this.#still();
     if (this.shown >= 0 && this.level) this.seek(this.shown);
-    this.#say("pause");
+    this.say("pause");
   }
 
   /** Shows frame `k`, exactly. @returns {Promise<boolean>} true when drawn, false if another wish came before */
@@ -150,10 +131,10 @@ export class Player extends EventTarget {
       const picture = await source.get(frame);
       if (source !== this.level?.source || (frame !== this.playback.frame && !this.playing)) return false;
       this.#show(frame, picture);
-      this.#draw();
+      this.draw();
       return true;
     } catch (error) {
-      if (error.name !== "AbortError") this.#fail(error);
+      if (error.name !== "AbortError") this.fail(error);
       return false;
     }
   }
@@ -176,26 +157,42 @@ export class Player extends EventTarget {
     this.renderer.setVisible(this.visible);
   }
 
-  /** @param {"spread" | "wireframe" | "effects" | "background"} name */
+  /** @param {"spread" | "wireframe" | "effects" | "background" | "mode"} name */
   set(name, value) {
-    const setters = {
-      spread: "setSpread",
-      wireframe: "setWireframe",
-      effects: "setEffects",
-      background: "setBackground",
-    };
-    this.renderer[setters[name]](value);
+    this.renderer[SETTERS[name]](value);
+    if (name === "spread" && this.view.free !== value > 0) this.view.setFree(value > 0);
     this.#changed();
   }
 
-  resize(width, height, ratio) {
-    const w = Math.max(1, Math.round(width * ratio));
-    const h = Math.max(1, Math.round(height * ratio));
-    if (w === this.size[0] && h === this.size[1]) return;
+  /** @param {number} inset CSS pixels at the lower edge that controls cover */
+  resize(width, height, ratio, inset = 0) {
+    const [w, h] = [width, height].map((side) => Math.max(1, Math.round(side * ratio)));
+    const below = Math.round(inset * ratio);
+    if (w === this.size[0] && h === this.size[1] && below === this.view.inset) return;
+    if (w !== this.size[0] || h !== this.size[1]) this.renderer.resize(w, h);
     this.size = [w, h];
-    this.renderer.three.setSize(w, h, false);
-    this.view.resize(w, h);
-    if (this.level) this.#draw(); // at once: setting the size has emptied the canvas
+    this.view.resize(w, h, below);
+    if (this.home) this.view.setHome(this.home);
+    if (this.level) this.draw(); // at once: setting the size has emptied the canvas
+  }
+
+  /** Off the screen nothing is drawn, decoded or fetched. */
+  setOnScreen(on) {
+    if (on === this.onScreen) return;
+    this.onScreen = on;
+    if (!on) this.#still();
+    this.detail.restart();
+    this.say(on ? "shown" : "hidden");
+    this.wake();
+  }
+
+  /** What would go on by itself rests. */
+  #still() {
+    this.sound?.follow(false, this.playback);
+    if (this.level?.source.playsItself) this.level.source.run(false, this.playback.speed, this.playback.loop);
+    if (this.onScreen) return;
+    cancelAnimationFrame(this.request);
+    this.request = 0;
   }
 
   /**
@@ -207,7 +204,6 @@ export class Player extends EventTarget {
     if (!this.level) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
     const [width, height] = camera ? [camera.width, camera.height] : this.size;
     const { projection, view } = this.view.matrices(width, height, this.renderer.bounds(), camera);
-    this.stale = true;
     return this.renderer.capture(projection, view, width, height);
   }
 
@@ -218,8 +214,8 @@ export class Player extends EventTarget {
       fps: this.drawn.length > 1 ? ((this.drawn.length - 1) * 1000) / (this.drawn.at(-1) - this.drawn[0]) : 0,
       layers: info?.layers.length ?? 0,
       triangles: info?.layers.reduce((sum, layer, i) => sum + (this.visible[i] ? layer.triangles : 0), 0) ?? 0,
-      bytesLoaded: this.files?.loaded ?? 0,
-      gpuBytes: this.level ? gpuBytes(this.level) + 12 * width * height : 0, // canvas: two of colour, one of depth
+      bytesLoaded: (this.files?.loaded ?? 0) + weight.loaded,
+      gpuBytes: this.level ? gpuBytes(this.level) + 12 * width * height : 0, // canvases: two of colour, one of depth
       level: info?.name ?? "",
       texture: info ? [info.texture.width, info.texture.height] : [0, 0],
       canvas: [width, height],
@@ -231,24 +227,57 @@ export class Player extends EventTarget {
   close() {
     this.closed = true;
     cancelAnimationFrame(this.request);
+    this.listening.abort();
     this.files?.close();
     this.sound?.close();
     this.level?.dispose();
     this.view.dispose();
     this.renderer.dispose();
+    this.say("closed");
+  }
+
+  /** The canvas needs drawing. */
+  invalidate() {
+    this.stale = true;
+    this.wake();
+  }
+
+  /** Asks for an animation frame, if anything moves and anybody sees it. */
+  wake() {
+    if (this.request || this.closed || this.lost || !this.level || !this.onScreen || this.immersed) return;
+    if (!this.playing && !this.stale) return;
+    this.request = requestAnimationFrame((now) => this.#tick(now));
   }
 
   #tick(now) {
-    this.request = requestAnimationFrame((next) => this.#tick(next));
-    const seconds = Math.min(LONGEST_STEP, (now - (this.before ?? now)) / 1000);
-    this.before = now;
-    if (!this.level || this.lost) return;
-    if (this.level.source.playsItself) this.#follow();
-    else if (this.playing) this.#advance(seconds);
-    this.sound?.follow(this.playing, this.playback);
-    this.view.update();
-    if (this.stale) this.#draw();
+    this.request = 0;
+    if (this.lost) return;
+    const began = performance.now();
+    const seconds = this.before ? Math.min(LONGEST_STEP, (now - this.before) / 1000) : 1 / 60;
+    this.moveOn(seconds);
+    const moving = this.view.update(seconds);
+    if (this.stale || moving || this.view.swaying) this.draw();
     while (this.drawn.length && now - this.drawn[0] > RATE_OVER) this.drawn.shift();
+    this.stale ||= moving;
+    this.busy = (performance.now() - began) / 1000;
+    this.wake();
+    this.before = this.request ? now : 0;
+  }
+
+  /** Lets time pass: shows the frame that is due. */
+  moveOn(seconds) {
+    if (this.level.source.playsItself) this.#follow();
+    else if (this.playing) this.#advance(Math.min(LONGEST_STEP, seconds));
+    this.sound?.follow(this.playing, this.playback);
+  }
+
+  /** While a headset asks for the pictures, the page's own rest. */
+  setImmersed(on) {
+    this.immersed = on;
+    cancelAnimationFrame(this.request);
+    this.request = 0;
+    if (!on) this.invalidate();
+    this.say("change");
   }
 
   #advance(seconds) {
@@ -258,7 +287,8 @@ export class Player extends EventTarget {
     const ended = playback.advance(seconds, there);
     source.want(playback.frame, seconds * playback.fps * playback.speed);
     this.#showIfThere(playback.frame);
-    if (ended) this.#say("pause");
+    this.detail.measure(seconds, there);
+    if (ended) this.say("pause");
   }
 
   /** A video element keeps its own time; the clock goes by it. */
@@ -271,7 +301,7 @@ export class Player extends EventTarget {
     this.#showIfThere(source.shown);
     if (ended && !playback.loop) {
       playback.playing = false;
-      this.#say("pause");
+      this.say("pause");
     }
   }
 
@@ -282,52 +312,57 @@ export class Player extends EventTarget {
 
   /** Colour and alpha are parts of one picture: they cannot come from two frames. */
   #show(frame, picture) {
-    this.level.texture.setFrame(picture);
-    this.renderer.three.initTexture(this.level.texture);
+    this.renderer.setFrame(picture);
     this.shown = frame;
     this.stale = true;
-    this.#say("frame");
+    this.say("frame");
   }
 
-  #draw() {
+  draw() {
     if (this.lost || !this.size[0]) return;
     const { projection, view } = this.view.matrices(...this.size, this.renderer.bounds());
-    this.renderer.draw(projection, view);
+    this.renderer.draw(projection, view, this.view.strength);
     this.stale = false;
     this.drawn.push(performance.now());
-    this.#say("draw");
+    this.say("draw");
   }
 
   #watchContext() {
-    this.canvas.addEventListener("webglcontextlost", (event) => {
-      event.preventDefault();
+    this.listening = new AbortController();
+    const { signal } = this.listening;
+    const { graphics } = this.renderer;
+    this.lost = graphics.lost;
+    const lost = () => {
       this.lost = true;
-      this.#fail(
+      this.fail(
         new PlayerError("The graphics context was lost", {
           kind: "lost",
           remedy: "The player goes on by itself when the machine gives it back. If it does not, load the page again.",
         }),
       );
-    });
-    this.canvas.addEventListener("webglcontextrestored", async () => {
+    };
+    const restored = async () => {
       this.lost = false;
       this.renderer.restore();
       if (this.level && !(await this.seek(this.playback.frame))) return;
-      this.#say("restored");
-    });
+      this.say("restored");
+      this.wake();
+    };
+    graphics.addEventListener("lost", lost, { signal });
+    graphics.addEventListener("restored", restored, { signal });
   }
 
   #changed() {
-    this.stale = true;
-    this.#say("change");
+    this.invalidate();
+    this.say("change");
   }
 
-  #fail(error) {
+  fail(error) {
     if (this.closed) return;
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   }
 
-  #say(name) {
+  say(name) {
     this.dispatchEvent(new Event(name));
   }
 }

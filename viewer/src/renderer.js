@@ -5,157 +5,238 @@
  * hidden by another layer, and its own folds count once: a pass to depth alone, then colour where the depth is equal.
  * Stored values are blended as they are: no colour management, no tone mapping, no sRGB textures.
  */
-import * as THREE from "three";
-import { PlayerError } from "./errors.js";
-import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
-
-THREE.ColorManagement.enabled = false;
+import { Graphics } from "./gl/graphics.js";
+import { Upload } from "./gl/upload.js";
+import { eyeOf } from "./matrices.js";
+import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
 
 export class LayerRenderer {
-  /** @param {HTMLCanvasElement} canvas @throws {PlayerError} if there is no WebGL 2 */
+  /** @param {HTMLCanvasElement} canvas that is looked at @throws {PlayerError} if there is no WebGL 2 */
   constructor(canvas) {
-    const attributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false };
-    const context = canvas.getContext("webgl2", { ...attributes, powerPreference: "high-performance" });
-    if (!context) {
-      throw new PlayerError("This browser offers no WebGL 2", {
-        kind: "webgl",
-        remedy: "Switch on hardware acceleration in the browser's settings, update the browser, or use another one.",
-      });
-    }
-    this.three = new THREE.WebGLRenderer({ canvas, context, ...attributes });
-    this.three.outputColorSpace = THREE.LinearSRGBColorSpace;
-    this.three.toneMapping = THREE.NoToneMapping;
-    this.three.autoClear = true;
-    this.scene = new THREE.Scene();
-    this.scene.matrixWorldAutoUpdate = false;
-    this.scene.onAfterRender = () => this.three.getContext().depthRange(0, 1);
+    this.graphics = Graphics.acquire();
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
     this.level = null;
-    this.layers = [];
+    this.upload = null;
+    this.visible = [];
     this.effectsOn = true;
     this.wireframe = false;
     this.spread = 0;
-    this.setBackground([0, 0, 0, 1]);
+    this.kind = "colour";
+    this.background = [0, 0, 0, 1];
   }
 
   get maxTextureSize() {
-    return this.three.capabilities.maxTextureSize;
+    return this.graphics.maxTextureSize;
   }
 
-  /** @param {number[]} rgba in [0, 1]; alpha 0 lets the page shine through */
-  setBackground([r, g, b, a]) {
-    this.background = [r, g, b, a];
-    this.three.setClearColor(new THREE.Color(r, g, b), a);
+  /** @param {number[]} rgba in [0, 1], straight; alpha 0 lets the page shine through */
+  setBackground(rgba) {
+    this.background = rgba;
   }
 
-  /** After a lost context came back: three uploads all again by itself, but forgets the background. */
-  restore() {
-    this.setBackground(this.background);
-  }
-
-  /**
-   * Shows another level from the next picture on; the textures of the old one are set free by the level's owner.
-   * @param {import("./levels.js").LoadedLevel} level
-   */
+  /** Shows another level from the next picture on. @param {import("./levels.js").LoadedLevel} level */
   setLevel(level) {
-    this.scene.clear();
-    for (const layer of this.layers) for (const mesh of layer.meshes) mesh.material.dispose();
+    this.upload?.dispose();
     this.level = level;
-    const count = level.info.layers.length;
-    this.layers = level.info.layers.map((info, i) => this.#makeLayer(level, info, i, count));
-    this.#place();
+    this.upload = new Upload(this.graphics.gl, level);
   }
 
-  #makeLayer(level, info, index, count) {
-    const [cx, cy] = level.info.texture.colourRect;
-    const [ax, ay] = level.info.texture.alphaRect;
-    const [x, y, w, h] = info.rect;
-    const shared = { shift: { value: new THREE.Vector3() }, eye: { value: new THREE.Vector3() } };
-    const colour = {
-      ...shared,
-      picture: { value: level.texture },
-      colourRect: { value: new THREE.Vector4(cx + x, cy + y, w, h) },
-      alphaOffset: { value: new THREE.Vector2(ax - cx, ay - cy) },
-    };
-    if (level.effects) {
-      const [ex, ey, ew, eh] = info.effectsRect;
-      colour.effects = { value: level.effects };
-      colour.planes = {
-        value: level.info.effects.planes.map(([px, py]) => new THREE.Vector4(px + ex, py + ey, ew, eh)),
-      };
-      colour.effectsScale = { value: level.info.effects.scale };
-    }
-    if (level.reflection) Object.assign(colour, reflectionUniforms(level, info, shared.eye));
-    const slice = [(index + 0.05) / count, (index + 0.95) / count];
-    const pass = (uniforms, fragmentShader, options, order) => {
-      const material = new THREE.ShaderMaterial({
-        ...{ glslVersion: THREE.GLSL3, vertexShader: VERTEX, fragmentShader, uniforms },
-        ...{ side: THREE.DoubleSide, transparent: true, forceSinglePass: true, toneMapped: false, ...options },
-      });
-      const mesh = new THREE.Mesh(level.geometries[index], material);
-      mesh.frustumCulled = false;
-      mesh.renderOrder = 3 * (count - index) + order;
-      mesh.onBeforeRender = () => this.three.getContext().depthRange(...slice);
-      this.scene.add(mesh);
-      return mesh;
-    };
-    const depth = { depthFunc: THREE.LessDepth, depthWrite: true, colorWrite: false, blending: THREE.NoBlending };
-    const equal = { depthFunc: THREE.EqualDepth, depthWrite: false, blending: THREE.NormalBlending };
-    const defines = { ...(level.effects && { EFFECTS: 1 }), ...(level.reflection && { REFLECTION: 1 }) };
-    const meshes = [pass(shared, DEPTH_FRAGMENT, depth, 0), pass(colour, COLOUR_FRAGMENT, { ...equal, defines }, 1)];
-    const wire = { ...shared, wire: { value: wireColour(index, count) } };
-    const lines = { depthTest: false, depthWrite: false, wireframe: true };
-    meshes.push(pass(wire, WIRE_FRAGMENT, lines, 2));
-    return { meshes, shared, colour, visible: true };
+  /** @param {VideoFrame | HTMLVideoElement} image */
+  setFrame(image) {
+    this.upload.show(image);
   }
 
-  /** @param {boolean[]} visible one a layer, outermost first */
+  /** After a lost context came back. The frame has to be given again. */
+  restore() {
+    if (this.level) this.upload = new Upload(this.graphics.gl, this.level);
+  }
+
   setVisible(visible) {
-    this.layers.forEach((layer, i) => (layer.visible = visible[i] ?? true));
-    this.#place();
+    this.visible = visible;
   }
 
   /** @param {number} spread 0: as they are; 1: fully pulled apart, along the subject's forward axis */
   setSpread(spread) {
     this.spread = spread;
-    this.#place();
   }
 
   setWireframe(on) {
     this.wireframe = on;
-    this.#place();
   }
 
   setEffects(on) {
     this.effectsOn = on;
-    this.#place();
   }
 
-  #place() {
-    const middle = (this.layers.length - 1) / 2;
-    const step = this.spread * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1));
-    this.layers.forEach((layer, i) => {
-      layer.shared.shift.value.set(step * (middle - i), 0, 0);
-      layer.meshes.forEach((mesh, pass) => (mesh.visible = layer.visible && (pass < 2 || this.wireframe)));
-      if (layer.colour.effectsScale)
-        layer.colour.effectsScale.value = this.effectsOn ? this.level.info.effects.scale : 0;
-      if (layer.colour.reflectionScales)
-        layer.colour.reflectionScales.value.fromArray(this.effectsOn ? this.level.info.reflection.scales : [0, 0, 0]);
-    });
+  /** @param {string} kind one of KINDS */
+  setKind(kind) {
+    this.kind = kind;
   }
 
-  /** Draws to the canvas. @param {THREE.Matrix4} projection @param {THREE.Matrix4} view world to camera, OpenGL's axes */
-  draw(projection, view) {
-    const camera = new THREE.Camera();
-    camera.matrixWorldAutoUpdate = false;
-    camera.projectionMatrix.copy(projection);
-    camera.projectionMatrixInverse.copy(projection).invert();
-    camera.matrixWorldInverse.copy(view);
-    camera.matrixWorld.copy(view).invert();
-    const eye = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
-    for (const { shared } of this.layers) shared.eye.value.copy(eye).sub(shared.shift.value);
-    this.three.render(this.scene, camera);
+  resize(width, height) {
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.graphics.claim(this, [width, height]);
+  }
+
+  #shift(index) {
+    const middle = (this.level.geometries.length - 1) / 2;
+    return this.spread * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
+  }
+
+  /**
+   * Draws to the canvas.
+   * @param {import("./matrices.js").Matrix} projection
+   * @param {import("./matrices.js").Matrix} view world to camera, OpenGL's axes
+   * @param {number} [strength] below 1 the picture fades into the background
+   */
+  draw(projection, view, strength = 1) {
+    const { width, height } = this.canvas;
+    this.render(projection, view, [0, 0, width, height], null);
+    const { context, graphics } = this;
+    context.globalCompositeOperation = "copy";
+    context.globalAlpha = 1;
+    if (strength < 1) {
+      context.fillStyle = cssOf(this.#ground());
+      context.fillRect(0, 0, width, height);
+      context.globalCompositeOperation = "source-over";
+      context.globalAlpha = strength;
+    }
+    const top = graphics.canvas.height - height; // WebGL counts rows from below
+    context.drawImage(graphics.canvas, 0, top, width, height, 0, 0, width, height);
+  }
+
+  /** Opacity is shown white on black. */
+  #ground() {
+    return this.kind === "alpha" ? [0, 0, 0, 1] : this.background;
+  }
+
+  /**
+   * Draws into a part of a framebuffer. @param {number[]} rect x, y, width, height
+   * @param {WebGLFramebuffer | null} target null: the graphics' own canvas
+   */
+  render(projection, view, rect, target) {
+    const { gl } = this.graphics;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    gl.viewport(...rect);
+    gl.scissor(...rect);
+    gl.enable(gl.SCISSOR_TEST);
+    const [r, g, b, a] = this.#ground();
+    gl.clearColor(a * r, a * g, a * b, a);
+    gl.colorMask(true, true, true, true);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.CULL_FACE);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    const passes = this.#passes(projection, view);
+    const count = this.level.geometries.length;
+    for (let index = count - 1; index >= 0; --index) {
+      if (!this.visible[index]) continue;
+      gl.depthRange((index + 0.05) / count, (index + 0.95) / count);
+      for (const pass of passes) pass(index, this.upload.layers[index]);
+    }
+    gl.depthRange(0, 1);
+    gl.bindVertexArray(null);
+  }
+
+  /** What is done for each layer: the uniforms that all share are set. */
+  #passes(projection, view) {
+    const { graphics, level, upload } = this;
+    const { gl } = graphics;
+    const eye = eyeOf(view);
+    const prepared = (fragment) => {
+      const { program, at } = graphics.program(VERTEX, fragment);
+      gl.useProgram(program);
+      gl.uniformMatrix4fv(at.projection, false, projection);
+      gl.uniformMatrix4fv(at.view, false, view);
+      return { program, at };
+    };
+    const depth = prepared(DEPTH_FRAGMENT);
+    const colour = this.#colourProgram(prepared, eye);
+    const wire = this.wireframe ? prepared(WIRE_FRAGMENT) : null;
+    const begin = ({ program, at }, index) => {
+      gl.useProgram(program);
+      gl.uniform3f(at.shift, this.#shift(index), 0, 0);
+    };
+    const toDepth = (index, layer) => {
+      begin(depth, index);
+      gl.enable(gl.DEPTH_TEST);
+      gl.depthFunc(gl.LESS);
+      gl.depthMask(true);
+      gl.colorMask(false, false, false, false);
+      gl.disable(gl.BLEND);
+      upload.drawTriangles(layer);
+    };
+    const toColour = (index, layer) => {
+      begin(colour, index);
+      this.#setLayer(colour.at, level.info, index);
+      gl.uniform3f(colour.at.eye, eye[0] - this.#shift(index), eye[1], eye[2]);
+      gl.depthFunc(gl.EQUAL);
+      gl.depthMask(false);
+      gl.colorMask(true, true, true, true);
+      gl.enable(gl.BLEND);
+      upload.drawTriangles(layer);
+    };
+    const toLines = (index, layer) => {
+      begin(wire, index);
+      gl.uniform4f(wire.at.wire, ...wireColour(index, level.geometries.length));
+      gl.disable(gl.DEPTH_TEST);
+      upload.drawLines(layer);
+    };
+    return wire ? [toDepth, toColour, toLines] : [toDepth, toColour];
+  }
+
+  #colourProgram(prepared, eye) {
+    const { level, upload } = this;
+    const { gl } = this.graphics;
+    const head = "#version 300 es\n";
+    const defines = (upload.effects ? "#define EFFECTS 1\n" : "") + (upload.reflection ? "#define REFLECTION 1\n" : "");
+    const colour = prepared(COLOUR_FRAGMENT.replace(head, head + defines));
+    const { at } = colour;
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, upload.effects);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, upload.picture);
+    gl.uniform1i(at.picture, 0);
+    gl.uniform1i(at.kind, KINDS.indexOf(this.kind));
+    const { centre, radius } = this.bounds();
+    const away = Math.hypot(...centre.map((v, i) => v - eye[i]));
+    gl.uniform2f(at.range, away - radius, away + radius);
+    if (upload.effects) {
+      gl.uniform1i(at.effects, 1);
+      gl.uniform1f(at.effectsScale, this.effectsOn ? level.info.effects.scale : 0);
+    }
+    if (upload.reflection) {
+      const { environment, gloss, offset, normals, scales } = level.info.reflection;
+      gl.uniform1i(at.reflection, 2);
+      gl.uniform4fv(at.environmentRect, environment);
+      gl.uniform4fv(at.glossRect, gloss);
+      gl.uniform4fv(at.offsetRect, offset);
+      gl.uniform4fv(at.normalsRect, normals);
+      gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
+    }
+    return colour;
+  }
+
+  #setLayer(at, info, index) {
+    const { gl } = this.graphics;
+    const [cx, cy] = info.texture.colourRect;
+    const [ax, ay] = info.texture.alphaRect;
+    const [x, y, w, h] = info.layers[index].rect;
+    gl.uniform4f(at.colourRect, cx + x, cy + y, w, h);
+    gl.uniform2f(at.alphaOffset, ax - cx, ay - cy);
+    if (info.reflection) gl.uniform4fv(at.toMaps, toWindow(info.layers[index].window, info.reflection.window));
+    if (!this.upload.effects) return;
+    const [ex, ey, ew, eh] = info.layers[index].effectsRect;
+    gl.uniform4fv(
+      at.planes,
+      info.effects.planes.flatMap(([px, py]) => [px + ex, py + ey, ew, eh]),
+    );
   }
 
   /**
@@ -163,15 +244,26 @@ export class LayerRenderer {
    * @returns {ImageData} top row first; premultiplied where the background is transparent
    */
   capture(projection, view, width, height) {
-    const target = new THREE.WebGLRenderTarget(width, height, { depthBuffer: true, colorSpace: THREE.NoColorSpace });
+    const { gl } = this.graphics;
+    const target = gl.createFramebuffer();
+    const [colour, depth] = [gl.createRenderbuffer(), gl.createRenderbuffer()];
     const data = new Uint8ClampedArray(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+    for (const [buffer, format, place] of [
+      [colour, gl.RGBA8, gl.COLOR_ATTACHMENT0],
+      [depth, gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
+    ]) {
+      gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+      gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffer);
+    }
     try {
-      this.three.setRenderTarget(target);
-      this.draw(projection, view);
-      this.three.readRenderTargetPixels(target, 0, 0, width, height, data);
+      this.render(projection, view, [0, 0, width, height], target);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     } finally {
-      this.three.setRenderTarget(null);
-      target.dispose();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      gl.deleteFramebuffer(target);
+      for (const buffer of [colour, depth]) gl.deleteRenderbuffer(buffer);
     }
     const row = 4 * width;
     const upright = new Uint8ClampedArray(data.length);
@@ -179,51 +271,43 @@ export class LayerRenderer {
     return new ImageData(upright, width, height);
   }
 
-  /** Sphere around the layers as they stand. @returns {THREE.Sphere} */
+  /** Box and sphere around the layers as they stand. @returns {{centre: number[], radius: number, low: number[], high: number[]}} */
   bounds() {
-    const box = new THREE.Box3();
-    this.layers.forEach((layer, i) => {
-      if (!layer.visible) return;
-      const geometry = this.level.geometries[i];
-      geometry.boundingBox ?? geometry.computeBoundingBox();
-      box.union(geometry.boundingBox.clone().translate(layer.shared.shift.value));
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    this.level?.geometries.forEach(({ box }, i) => {
+      if (!this.visible[i]) return;
+      for (const k of [0, 1, 2]) {
+        const shift = k === 0 ? this.#shift(i) : 0;
+        low[k] = Math.min(low[k], box.low[k] + shift);
+        high[k] = Math.max(high[k], box.high[k] + shift);
+      }
     });
-    return box.isEmpty() ? new THREE.Sphere(new THREE.Vector3(), 1) : box.getBoundingSphere(new THREE.Sphere());
+    if (!Number.isFinite(low[0])) return { centre: [0, 0, 0], radius: 1, low: [-1, -1, -1], high: [1, 1, 1] };
+    const centre = low.map((v, k) => (v + high[k]) / 2);
+    return { centre, radius: Math.hypot(...low.map((v, k) => (high[k] - v) / 2)), low, high };
   }
 
   dispose() {
-    this.scene.clear();
-    this.three.dispose();
+    this.upload?.dispose();
+    this.graphics.release(this);
   }
 }
 
-/** What the shader needs of a level's reflection, for one of its layers. */
-function reflectionUniforms(level, layer, eye) {
-  const { environment, gloss, offset, normals, window, scales } = level.info.reflection;
-  const [u0, u1, v0, v1] = layer.window;
-  const [mu0, mu1, mv0, mv1] = window;
-  const rect = (values) => ({ value: new THREE.Vector4(...values) });
-  return {
-    reflection: { value: level.reflection },
-    ...{
-      environmentRect: rect(environment),
-      glossRect: rect(gloss),
-      offsetRect: rect(offset),
-      normalsRect: rect(normals),
-    },
-    reflectionScales: { value: new THREE.Vector3(...scales) },
-    toMaps: rect([
-      (v1 - v0) / (mv1 - mv0),
-      (u1 - u0) / (mu1 - mu0),
-      (v0 - mv0) / (mv1 - mv0),
-      (mu1 - u1) / (mu1 - mu0),
-    ]),
-    viewer: eye,
-  };
+const cssOf = ([r, g, b, a]) => `rgb(${255 * r} ${255 * g} ${255 * b} / ${a})`;
+
+/** (s, t) over one window of (u, v) -> that over another: times the first two, plus the last two. @returns {number[]} */
+function toWindow([u0, u1, v0, v1], [wu0, wu1, wv0, wv1]) {
+  const [height, width] = [wu1 - wu0, wv1 - wv0];
+  return [(v1 - v0) / width, (u1 - u0) / height, (v0 - wv0) / width, (wu1 - u1) / height];
 }
 
-/** From warm (outermost) to cold (innermost). */
+/** From warm (outermost) to cold (innermost). @returns {number[]} RGBA */
 function wireColour(index, count) {
-  const colour = new THREE.Color().setHSL(0.08 + (0.5 * index) / Math.max(1, count - 1), 0.85, 0.62);
-  return new THREE.Vector4(colour.r, colour.g, colour.b, 0.35);
+  const hue = 0.08 + (0.5 * index) / Math.max(1, count - 1);
+  const channel = (n) => {
+    const k = (n + 12 * hue) % 12;
+    return 0.62 - 0.85 * 0.38 * Math.max(-1, Math.min(k - 3, 9 - k, 1)); // HSL: saturation 0.85, lightness 0.62
+  };
+  return [channel(0), channel(8), channel(4), 0.35];
 }

@@ -1,32 +1,43 @@
 /** What a layer's pixel is: docs/reference/asset-format.md, "A player in seven steps". Stored values in, stored values out. */
 
 /** Shared by all passes of a layer, so that their depths are equal bit for bit. */
-export const VERTEX = /* glsl */ `
+export const VERTEX = `#version 300 es
+precision highp float;
 invariant gl_Position;
+uniform mat4 projection;
+uniform mat4 view;
 uniform vec3 shift; // of the layer, when the layers are pulled apart
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 uv;
 out vec2 st;
 out vec3 point;
 void main() {
   st = uv;
   point = position;
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position + shift, 1.0);
+  gl_Position = projection * (view * vec4(position + shift, 1.0));
 }`;
 
-export const DEPTH_FRAGMENT = /* glsl */ `
+export const DEPTH_FRAGMENT = `#version 300 es
+precision highp float;
 out vec4 nothing;
 void main() { nothing = vec4(0.0); }`;
 
-export const COLOUR_FRAGMENT = /* glsl */ `
+/** What may be shown in place of the picture, by the value of `kind`. */
+export const KINDS = ["colour", "alpha", "depth", "uv"];
+
+export const COLOUR_FRAGMENT = `#version 300 es
 precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
 uniform vec4 colourRect; // x, y, w, h of this layer's colour in the picture, pixels
 uniform vec2 alphaOffset; // from its colour to its alpha
+uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
+uniform int kind; // of KINDS
+uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
 #ifdef EFFECTS
 uniform sampler2D effects;
 uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
 uniform float effectsScale; // 0: off
-uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 #endif
 #ifdef REFLECTION
 uniform sampler2D reflection;
@@ -36,7 +47,6 @@ uniform vec4 offsetRect;
 uniform vec4 normalsRect;
 uniform vec3 reflectionScales; // of environment, gloss, offset; all 0: off
 uniform vec4 toMaps; // (s, t) of this layer -> that of the maps: times xy, plus zw
-uniform vec3 viewer; // as eye
 #endif
 in vec2 st;
 in vec3 point;
@@ -55,7 +65,7 @@ vec4 look(sampler2D image, vec4 rect, vec2 offset) {
 vec3 reflected() {
   vec2 at = st * toMaps.xy + toMaps.zw;
   vec3 normal = normalize(lookAt(reflection, normalsRect, at).rgb * 2.0 - 1.0);
-  vec3 along = normalize(point - viewer);
+  vec3 along = normalize(point - eye);
   vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   vec3 light = lookAt(reflection, environmentRect, place).rgb * reflectionScales.x;
@@ -79,10 +89,13 @@ void main() {
 #ifdef REFLECTION
   colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif
+  if (kind == 1) colour = vec3(1.0);
+  if (kind == 2) colour = vec3(1.0 - clamp((distance(eye, point) - range.x) / (range.y - range.x), 0.0, 1.0));
+  if (kind == 3) colour = vec3(st, 0.35);
   result = vec4(colour, alpha);
 }`;
 
-export const WIRE_FRAGMENT = /* glsl */ `
+export const WIRE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec4 wire;
 out vec4 result;

@@ -1,67 +1,211 @@
 /** The eye: an orbit by mouse, touch and keys, or for a while an exact camera of a capture. */
-import { PerspectiveCamera, Vector3 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { orbitOf, positionOf, projectionOf, viewOf } from "./camera.js";
+import { axesOf, orbitView, projectionOf, viewOf } from "./camera.js";
+import { connectGestures } from "./gestures.js";
+import { bounded, clamp, resisted, strength, unwound } from "./limits.js";
+import { transformed } from "./matrices.js";
 
 const FIELD_OF_VIEW = 30; // degrees, of the shorter side
-const HOME_DISTANCE = 1; // the subject is at the origin, the capture's cameras about 1 unit from it
+const HALF = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
+const FILLED = 0.92; // of the free part of the canvas, by what there is
+const EASE = 0.07; // s in which most of a movement is done
+const DISTANCES = [0.2, 20];
+const SWAY = { degrees: 5, seconds: 9 };
 
 export class View {
-  /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange */
+  /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange a picture is due */
   constructor(surface, onChange) {
-    this.camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.01, 100);
-    this.camera.up.set(0, 0, 1);
-    this.camera.position.set(2, 0, 0);
-    this.controls = new OrbitControls(this.camera, surface);
-    Object.assign(this.controls, { enableDamping: true, dampingFactor: 0.12, rotateSpeed: 0.7, zoomSpeed: 0.8 });
-    Object.assign(this.controls, { minDistance: 0.2, maxDistance: 20, zoomToCursor: true });
-    this.controls.addEventListener("change", onChange);
+    this.surface = surface;
     this.onChange = onChange;
+    this.now = { azimuth: 0, elevation: 0, distance: 2, target: [0, 0, 0] };
+    this.goal = { ...this.now };
+    this.pushed = null; // azimuth and elevation that the pointer asks for, limits or not
     this.exact = null;
     this.home = null;
+    this.atHome = true; // nobody has moved it: it is fitted again when the canvas changes
+    this.range = bounded(null);
+    this.filmed = null; // of the manifest
+    this.free = false; // limits are off: the layers are pulled apart
+    this.inset = 0; // part of the height that the controls take, from below
+    this.size = [1, 1];
+    this.swaying = 0; // s since it began; 0: still
+    this.eases = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.gestures = connectGestures(surface, this);
   }
 
-  /** Eases a movement out. Call once a picture. */
-  update() {
-    if (!this.exact) this.controls.update();
+  /** @param {import("./limits.js").Range | null} range degrees that were filmed */
+  setFilmed(range) {
+    this.filmed = range;
+    this.setFree(this.free);
   }
 
-  /** The first view: the subject from the front; nearer if all there is is small. @param {import("three").Sphere} bounds */
-  setHome(bounds) {
-    const fitting = bounds.radius / Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
-    const distance = HOME_DISTANCE * Math.sqrt(Math.max(0.5, Math.min(1, this.camera.aspect))); // heads are upright
-    const home = { azimuth: 0, elevation: 0, distance, target: [0, 0, 0] };
-    this.home = fitting < distance ? { ...home, distance: fitting, target: bounds.center.toArray() } : home;
+  /** Limits off, or on again. */
+  setFree(free) {
+    this.free = free;
+    this.range = bounded(free ? null : this.filmed);
+    if (!free) this.#aim(this.goal);
+    this.onChange();
+  }
+
+  /** Moves on by `seconds`. @returns {boolean} whether it goes on moving */
+  update(seconds) {
+    if (this.exact) return false;
+    const part = this.eases ? 1 - Math.exp(-seconds / EASE) : 1;
+    const { now, goal } = this;
+    const keys = ["azimuth", "elevation", "distance"];
+    const moving =
+      keys.some((key) => Math.abs(goal[key] - now[key]) > 1e-4 * Math.max(1, Math.abs(goal[key]))) ||
+      goal.target.some((v, i) => Math.abs(v - now.target[i]) > 1e-5);
+    if (moving) {
+      for (const key of keys) now[key] += part * (goal[key] - now[key]);
+      now.target = now.target.map((v, i) => v + part * (goal.target[i] - v));
+    } else this.now = { ...goal, target: [...goal.target] };
+    if (this.swaying) this.swaying += seconds;
+    return moving;
+  }
+
+  /** A slow turn to and fro, until somebody touches the view. */
+  startSway() {
+    if (this.eases) this.swaying = 1e-6;
+  }
+
+  #stopSway() {
+    if (!this.swaying) return;
+    const offset = this.#sway();
+    this.swaying = 0;
+    this.now.azimuth += offset;
+    this.goal.azimuth += offset;
+  }
+
+  #sway() {
+    const t = (2 * Math.PI * this.swaying) / SWAY.seconds;
+    const slow = Math.min(1, this.swaying / 2); // it begins gently
+    return this.swaying ? slow * SWAY.degrees * Math.sin(t) : 0;
+  }
+
+  /** The first view: all that there is, from the front. @param {{low: number[], high: number[], centre: number[]}} box */
+  setHome({ low, high, centre }) {
+    const away = this.distanceFor(high[1] - low[1], high[2] - low[2]);
+    const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
+    this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
+    if (this.atHome && !this.exact) this.reset();
+  }
+
+  /** From how far something of that width and height fills the free part of the canvas. */
+  distanceFor(across, tall) {
+    const [width, height] = this.#room();
+    return (Math.min(width, height) * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
   }
 
   reset() {
-    if (this.home) this.set(this.home);
+    if (!this.home) return;
+    this.set(this.home);
+    this.atHome = true;
   }
 
   get() {
-    return orbitOf(this.camera.position, this.controls.target);
+    return { ...this.now, azimuth: unwound(this.now.azimuth, [-Infinity, Infinity]), target: [...this.now.target] };
   }
 
   set(orbit) {
     this.setExact(null);
-    this.controls.target.fromArray(orbit.target);
-    this.camera.position.copy(positionOf(orbit));
-    this.controls.update();
+    this.touched();
+    this.#aim(orbit);
+    this.now = { ...this.goal, target: [...this.goal.target] };
     this.onChange();
+  }
+
+  /** Moves there gently. @param {Partial<import("./camera.js").Orbit>} orbit */
+  glide(orbit) {
+    this.touched();
+    this.#aim({ ...this.goal, ...orbit });
+    this.onChange();
+  }
+
+  #aim(orbit) {
+    const azimuth = clamp(unwound(orbit.azimuth, this.range.azimuth), this.range.azimuth);
+    const elevation = clamp(orbit.elevation, this.range.elevation);
+    const distance = clamp(orbit.distance, DISTANCES);
+    this.goal = { azimuth, elevation, distance, target: [...orbit.target] };
+    if (Math.abs(azimuth - this.now.azimuth) > 180)
+      this.now.azimuth = unwound(this.now.azimuth, [azimuth - 180, azimuth + 180]);
+  }
+
+  /** Somebody has moved the view: it stays as it is from now on. */
+  touched() {
+    this.#stopSway();
+    this.atHome = false;
   }
 
   /** Moves by angles in degrees and a factor of the distance (keyboard). */
   move(azimuth, elevation, factor = 1) {
-    const now = this.get();
-    const up = Math.max(-89, Math.min(89, now.elevation + elevation));
-    this.set({ ...now, azimuth: now.azimuth + azimuth, elevation: up, distance: now.distance * factor });
+    this.touched();
+    const { goal } = this;
+    this.set({
+      ...goal,
+      azimuth: goal.azimuth + azimuth,
+      elevation: goal.elevation + elevation,
+      distance: goal.distance * factor,
+    });
+  }
+
+  /** The pointer turns: by parts of the canvas' height. */
+  turn(dx, dy) {
+    this.touched();
+    this.pushed ??= { azimuth: this.goal.azimuth, elevation: this.goal.elevation };
+    this.pushed.azimuth -= 250 * dx;
+    this.pushed.elevation += 250 * dy;
+    this.goal.azimuth = resisted(this.pushed.azimuth, this.range.azimuth);
+    this.goal.elevation = clamp(resisted(this.pushed.elevation, this.range.elevation), [-89, 89]);
+    this.onChange();
+  }
+
+  /** The pointer is lifted: back to what was filmed. */
+  rest() {
+    this.pushed = null;
+    this.#aim(this.goal);
+    this.onChange();
+  }
+
+  /** Moves what is looked at along the picture, by CSS pixels. */
+  pan(dx, dy) {
+    this.touched();
+    const unit = this.#unit();
+    const { right, up } = axesOf(this.goal);
+    this.goal.target = this.goal.target.map((v, i) => v - unit * dx * right[i] + unit * dy * up[i]);
+    this.onChange();
+  }
+
+  /** Nearer or further, towards a place of the picture. @param {number} x, y CSS pixels from its middle, y down */
+  zoom(factor, x = 0, y = 0) {
+    this.touched();
+    const before = this.#unit();
+    this.goal.distance = clamp(this.goal.distance * factor, DISTANCES);
+    const change = before - this.#unit();
+    const { right, up } = axesOf(this.goal);
+    this.goal.target = this.goal.target.map((v, i) => v + change * (x * right[i] - y * up[i]));
+    this.onChange();
+  }
+
+  /** Units of the scene in a CSS pixel at the target. */
+  #unit() {
+    const scale = this.surface.clientHeight / this.size[1] || 1;
+    return (2 * HALF * this.goal.distance) / (Math.min(...this.#room()) * scale);
+  }
+
+  /** Pixels that the controls leave. */
+  #room() {
+    return [this.size[0], Math.max(0.3 * this.size[1], this.size[1] - this.inset)];
   }
 
   /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera null: back to the orbit */
   setExact(camera) {
     this.exact = camera;
-    this.controls.enabled = camera === null;
     this.onChange();
+  }
+
+  /** How strong the picture is: less where nothing was filmed. */
+  get strength() {
+    return this.exact ? 1 : strength({ ...this.now, azimuth: this.now.azimuth + this.#sway() }, this.range);
   }
 
   /**
@@ -69,36 +213,26 @@ export class View {
    * @param {typeof this.exact} [camera] instead of the view's own
    */
   matrices(width, height, bounds, camera = this.exact) {
-    const view = camera ? viewOf(camera.w2c) : this.#orbitView();
-    const depth = -bounds.center.clone().applyMatrix4(view).z;
+    const orbit = { ...this.now, azimuth: this.now.azimuth + this.#sway() };
+    const view = camera ? viewOf(camera.w2c) : orbitView(orbit);
+    const depth = -transformed(view, bounds.centre)[2];
     const far = Math.max(0.1, depth + 1.05 * bounds.radius);
     const near = Math.max(0.005, far / 500, depth - 1.05 * bounds.radius);
     if (camera) return { view, projection: projectionOf(camera, width, height, near, far) };
-    const half = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
-    const focal = Math.min(width, height) / (2 * half);
-    const K = [[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]]; // prettier-ignore
+    const [w, h] = this.#room();
+    const scale = Math.min(width / this.size[0], height / this.size[1]);
+    const focal = (Math.min(w, h) * scale) / (2 * HALF);
+    const K = [[focal, 0, width / 2], [0, focal, (height - (this.size[1] - h) * scale) / 2], [0, 0, 1]]; // prettier-ignore
     return { view, projection: projectionOf({ K, width, height }, width, height, near, far) };
   }
 
-  #orbitView() {
-    this.camera.updateMatrixWorld();
-    return this.camera.matrixWorldInverse.clone();
-  }
-
-  /** The pointer's zoom and pan need the camera's own projection. */
-  resize(width, height) {
-    const aspect = width / height;
-    const half = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
-    this.camera.aspect = aspect;
-    this.camera.fov = (360 / Math.PI) * Math.atan(aspect < 1 ? half / aspect : half);
-    this.camera.updateProjectionMatrix();
-  }
-
-  get eye() {
-    return new Vector3().copy(this.camera.position);
+  /** @param {number} inset pixels of the height that the controls take, from below */
+  resize(width, height, inset) {
+    this.size = [width, height];
+    this.inset = inset;
   }
 
   dispose() {
-    this.controls.dispose();
+    this.gestures.dispose();
   }
 }

@@ -3,8 +3,10 @@
 /**
  * @typedef {{frame?: number, view?: {azimuth: number, elevation: number, distance: number, target: number[]},
  *   level?: string, background?: string, hidden?: number[], spread?: number, wireframe?: boolean, effects?: boolean,
- *   speed?: number, loop?: boolean, photo?: number}} ViewState layers and photos by index; defaults may be left out
+ *   mode?: string, speed?: number, loop?: boolean, photo?: number}} ViewState layers and photos by index; defaults may be left out
  */
+
+const MODES = ["colour", "alpha", "depth", "uv"];
 
 /** @param {ViewState} state @returns {string} such as "view=12.5,4,2.1,0,0,0&frame=7" */
 export function encode(state) {
@@ -16,10 +18,11 @@ export function encode(state) {
   }
   if (state.frame !== undefined) add("frame", state.frame);
   if (state.level) add("level", state.level);
-  if (state.background) add("background", state.background.replace("#", ""));
+  if (state.background) add("background", encodeURIComponent(state.background.replace(/^#/, "")));
   if (state.hidden?.length) add("hidden", state.hidden.join(","));
   if (state.spread) add("spread", +state.spread.toFixed(3));
   if (state.wireframe) add("wireframe", 1);
+  if (state.mode && state.mode !== "colour") add("mode", state.mode);
   if (state.effects === false) add("effects", 0);
   if (state.speed !== undefined && state.speed !== 1) add("speed", state.speed);
   if (state.loop === false) add("loop", 0);
@@ -45,7 +48,11 @@ export function decode(text) {
   one("speed", (s) => s > 0 && s <= 8);
   one("photo", (i) => Number.isInteger(i) && i >= 0);
   if (/^[a-z0-9_-]+$/.test(given.get("level") ?? "")) state.level = given.get("level");
-  if (/^[0-9a-f]{6}$/i.test(given.get("background") ?? "")) state.background = `#${given.get("background")}`;
+  const background = given.get("background") ?? "";
+  if (/^([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})$/i.test(background)) state.background = `#${background}`;
+  else if (/^([a-z]{3,24}|(rgb|hsl|hwb|lab|lch|oklab|oklch|color)a?\([a-z0-9 ,./%-]{3,50}\))$/i.test(background))
+    state.background = background; // a name, or rgb(...)
+  if (MODES.includes(given.get("mode"))) state.mode = given.get("mode");
   if (given.has("hidden")) state.hidden = numbers("hidden").filter((i) => Number.isInteger(i) && i >= 0);
   for (const key of ["wireframe", "effects", "loop"]) if (given.has(key)) state[key] = given.get(key) !== "0";
   return state;

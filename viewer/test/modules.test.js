@@ -1,11 +1,17 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Matrix4, Vector3, Vector4 } from "three";
-import { fitted, orbitOf, positionOf, projectionOf, viewOf } from "../src/camera.js";
+import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/camera.js";
+import { eyeOf } from "../src/matrices.js";
+import { Adaptation } from "../src/adapt.js";
+import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
 import { Playback } from "../src/playback.js";
+import { droppedAsset } from "../src/ui/drop.js";
 import { decode, encode } from "../src/viewstate.js";
 
+/** three's own arithmetic, to hold ours against. */
+const matrix = (numbers) => new Matrix4().fromArray(numbers);
 const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-9, `${a} is not ${b}`);
 
 test("a point lands on the pixel that K and w2c say", () => {
@@ -17,7 +23,9 @@ test("a point lands on the pixel that K and w2c say", () => {
   const pixel = [(300 * x + 4 * y) / z + 110, (290 * y) / z + 70];
   const [W, H] = [800, 400];
   const fit = fitted(200, 150, W, H);
-  const clip = new Vector4(...p, 1).applyMatrix4(viewOf(w2c)).applyMatrix4(projectionOf(camera, W, H, 0.1, 10));
+  const clip = new Vector4(...p, 1)
+    .applyMatrix4(matrix(viewOf(w2c)))
+    .applyMatrix4(matrix(projectionOf(camera, W, H, 0.1, 10)));
   near(((clip.x / clip.w + 1) / 2) * W, fit.x + fit.scale * pixel[0]);
   near(((1 - clip.y / clip.w) / 2) * H, fit.y + fit.scale * pixel[1]);
   near(clip.w, z);
@@ -30,33 +38,45 @@ test("near and far planes go to the ends of the depth range", () => {
     [-4, 1],
   ]) {
     // prettier-ignore
-    const clip = new Vector4(0, 0, z, 1).applyMatrix4(projection);
+    const clip = new Vector4(0, 0, z, 1).applyMatrix4(matrix(projection));
     near(clip.z / clip.w, depth);
   }
 });
 
 test("a view matrix is a rotation and a shift", () => {
   const view = viewOf([[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 1]]); // prettier-ignore
-  near(view.determinant(), 1);
-  const eye = new Vector3().setFromMatrixPosition(new Matrix4().copy(view).invert());
+  near(matrix(view).determinant(), 1);
+  const eye = new Vector3().setFromMatrixPosition(matrix(view).invert());
   near(eye.distanceTo(new Vector3(1, 0, 0)), 0);
+  near(eye.distanceTo(new Vector3(...eyeOf(view))), 0);
 });
 
-test("orbit and position are inverse to each other", () => {
+test("an orbit's view looks at its target, upright", () => {
   const orbit = { azimuth: 33, elevation: -12, distance: 1.7, target: [0.1, 0.2, -0.3] };
-  const again = orbitOf(positionOf(orbit), new Vector3(...orbit.target));
-  for (const key of ["azimuth", "elevation", "distance"]) near(again[key], orbit[key]);
+  const [position, target] = [new Vector3(...positionOf(orbit)), new Vector3(...orbit.target)];
+  const expected = new Matrix4()
+    .lookAt(position, target, new Vector3(0, 0, 1))
+    .setPosition(position)
+    .invert();
+  expected.elements.forEach((value, i) => near(value, orbitView(orbit)[i]));
+  near(position.distanceTo(target), 1.7);
+  near((Math.atan2(position.y - 0.2, position.x - 0.1) * 180) / Math.PI, 33);
 });
 
 test("a view survives its way through the address", () => {
   const view = { azimuth: 12.5, elevation: -3, distance: 0.9, target: [0, 0.01, 0] };
   const state = { frame: 7, view, level: "full", background: "#102030", hidden: [0, 3], spread: 0.25, speed: 0.5 };
-  const flags = { wireframe: true, effects: false, loop: false };
+  const flags = { wireframe: true, effects: false, loop: false, mode: "depth" };
   assert.deepEqual(decode(`#${encode({ ...state, ...flags })}`), { ...state, ...flags });
 });
 
+test("any colour survives its way through the address", () => {
+  for (const background of ["#fff", "#10203080", "rebeccapurple", "rgb(10 20 30 / 50%)"])
+    assert.equal(decode(`#${encode({ background })}`).background, background);
+});
+
 test("nonsense in the address is left out", () => {
-  assert.deepEqual(decode("#view=1,2&frame=x&speed=0&background=red&level=A/B&spread=7&photo=-1"), {});
+  assert.deepEqual(decode("#view=1,2&frame=x&speed=0&background=url(x)&mode=x&level=A/B&spread=7&photo=-1"), {});
   assert.deepEqual(decode(""), {});
 });
 
@@ -135,7 +155,8 @@ test("a manifest that is wrong is refused, naming the place", () => {
     [(m) => (m.levels[0].layers[0].texture_rect = [1, 2]), /levels\[0\]\.layers\[0\]\.texture_rect/],
     [(m) => (m.levels[0].texture.fps = 0), /texture\.fps is 0/],
     [(m) => (m.levels[0].layers[0].mesh = "../secret"), /names no plain file/],
-    [(m) => (m.version = 3), /format version 3/],
+    [(m) => (m.version = 3), /format version 3.*too old/],
+    [(m) => (m.view = { azimuth: [10, -10], elevation: [0, 0] }), /view\.azimuth/],
     [(m) => (m.format = "gltf"), /not a facefolds asset/],
     [(m) => delete m.levels[0].texture, /texture is missing/],
   ];
@@ -144,4 +165,59 @@ test("a manifest that is wrong is refused, naming the place", () => {
     spoil(value);
     assert.throws(() => parseManifest(JSON.stringify(value), "x"), said);
   }
+});
+
+test("movements beyond what was filmed meet resistance, and fade", () => {
+  const range = bounded({ azimuth: [-40, 60], elevation: [-10, 20] });
+  assert.equal(resisted(50, range.azimuth), 50);
+  const [little, far] = [resisted(75, range.azimuth), resisted(500, range.azimuth)];
+  assert.ok(little > 64 && little < 75 && far > little && far < 90);
+  assert.equal(strength({ azimuth: 60, elevation: 0 }, range), 1);
+  assert.ok(strength({ azimuth: far, elevation: 0 }, range) < 0.1);
+  assert.equal(strength({ azimuth: 170, elevation: 60 }, bounded(null)), 1);
+  assert.equal(bounded({ azimuth: [-170, 175], elevation: [0, 0] }).azimuth[1], Infinity); // filmed all round
+  assert.equal(unwound(350, range.azimuth), -10);
+});
+
+/** What is said while pictures come every `seconds` and take `work`, for `total` seconds. */
+const played = (adaptation, total, seconds, work, budget = 1 / 30) => {
+  const said = [];
+  for (let time = 0; time < total; time += seconds) {
+    const move = adaptation.note(seconds, work, budget);
+    if (move) said.push(move);
+  }
+  return said;
+};
+
+test("a level that is too much is left, and tried again after a longer wait", () => {
+  const adaptation = new Adaptation();
+  assert.deepEqual(played(adaptation, 30, 1 / 30, 1 / 30), []); // just in time: it stays
+  assert.deepEqual(played(adaptation, 30, 1 / 60, 0.004).slice(0, 1), [1]); // plenty of time
+  const { wait } = adaptation;
+  adaptation.restart();
+  assert.equal(played(adaptation, 8, 0.1, 0.1)[0], -1); // late
+  assert.ok(adaptation.wait >= 2 * wait);
+  adaptation.restart();
+  assert.deepEqual(played(adaptation, wait, 1 / 60, 0.004), []); // not so soon again
+});
+
+/** What a browser gives for a folder that is dropped; its reader gives a few entries at a time. */
+const folderEntry = (path, children) => ({
+  fullPath: path,
+  createReader() {
+    const left = [...children];
+    return { readEntries: (resolve) => resolve(left.splice(0, 2)) };
+  },
+});
+const fileEntry = (path) => ({ fullPath: path, isFile: true, file: (resolve) => resolve(new Blob([path])) });
+
+test("a folder that is dropped is read whole; files of folders inside it are none of the asset's", async () => {
+  const inner = folderEntry("/a/old", [fileEntry("/a/old/manifest.json"), fileEntry("/a/old/x.drc")]);
+  const names = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"];
+  const entry = folderEntry("/a", [inner, ...names.map((name) => fileEntry(`/a/${name}`))]);
+  const found = await droppedAsset({ items: [{ webkitGetAsEntry: () => entry }], files: [] });
+  assert.deepEqual([...found.keys()].sort(), [...names].sort());
+  assert.equal(await found.get("manifest.json").text(), "/a/manifest.json");
+  const empty = { items: [{ webkitGetAsEntry: () => folderEntry("/b", []) }], files: [] };
+  await assert.rejects(droppedAsset(empty), /no manifest\.json/);
 });

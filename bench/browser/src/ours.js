@@ -24,7 +24,7 @@ element.addEventListener("level", () => {
     await player.seek(k % player.playback.frames); // decodes, uploads and draws
   };
   draw(0);
-  offer(player.renderer.three.getContext(), { draw, play }, seen);
+  offer(player.renderer.graphics.gl, { draw, play }, seen);
 });
 const poster = setInterval(() => {
   const image = element.shadowRoot?.querySelector(".poster");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,11 @@ Progress = Callable[[], None]
 def frame_times(params: CaptureParams) -> NDArray[np.float64]:
     """(frames,) seconds within the performance: one full cycle, so that the clip loops (of 12 frames: k / 30)."""
     return np.arange(params.frames) / params.frames * PERIOD
+
+
+def options_of(params: CaptureParams) -> ActorOptions:
+    """What the parameters say of the actor."""
+    return ActorOptions(head_motion=math.radians(params.head_motion))
 
 
 def frame_name(position: int) -> str:
@@ -84,10 +90,10 @@ def write_capture(
         folder: replaced if it exists.
         params: cameras, frames, size, seed.
         progress: called after each of the cameras x frames pictures.
-        options: see `ActorOptions`.
+        options: see `ActorOptions`; by default as `params` have it.
         rig: other cameras than those of `make_rig`.
     """
-    options = options or ActorOptions()
+    options = options or options_of(params)
     rig = rig or make_rig(params)
     with atomic_folder(folder) as temporary:
         (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.capture import frame_name, frame_times
+from facefolds_core.captures.actor.capture import frame_name, frame_times, options_of
 from facefolds_core.captures.actor.render import render
 from facefolds_core.captures.actor.rig import camera_at, new_views
 from facefolds_core.captures.scene import Scene
@@ -42,6 +42,6 @@ def film_fresh_views(scene: Scene, params: CaptureParams, count: int) -> Iterato
     for i, (azimuth, elevation) in enumerate(new_views(count)):
         frame = i % scene.num_frames
         camera = camera_at(f"fresh{i:03d}", azimuth, elevation, scene.width, scene.height)
-        picture = render(camera, times[scene.frame_ids[frame]], seed=params.seed)
+        picture = render(camera, times[scene.frame_ids[frame]], options_of(params), params.seed)
         moved = camera.transformed(scene.from_capture)
         yield FreshView(moved, azimuth, elevation, frame, picture.rgb, picture.opacity.astype(np.float64))

@@ -5,12 +5,19 @@ A module has
     def read(root: Path, subject: Subject, params: CaptureParams) -> Capture
 
 which reads everything but the pixels, or raises `UserError`. `params` are the embedded actor's. A module that says
-`GENERATED = True` reads what the stage `capture` has made; all others read the folder or file that `path` names.
+`GENERATED = True` reads what the stage `capture` has made; all others read the folder or file that `path` names, and
+have
+
+    def recognise(root: Path) -> Recognised | None
+
+which says, from names of files alone, whether `root` is of this layout (`facefolds doctor`, and who names a wrong
+source). The first line of a module's docstring names the layout.
 """
 
 from __future__ import annotations
 
 from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.looking import check_layout
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.paths import SubjectFolders, check_capture_place
 from facefolds_core.registry import SOURCES
@@ -27,6 +34,10 @@ def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParam
     Raises:
         UserError: if its place is none that may be read, or what is there is damaged.
     """
-    place = folders.capture if is_generated(subject.source) else check_capture_place(subject.path, folders)
+    if is_generated(subject.source):
+        place = folders.capture
+    else:
+        place = check_capture_place(subject.path, folders)
+        check_layout(subject.source, place)
     capture: Capture = SOURCES[subject.source].read(place, subject, params)
     return capture

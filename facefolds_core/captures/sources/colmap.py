@@ -33,7 +33,9 @@ Photos = dict[str, dict[str, Picture]]
 def recognise(root: Path) -> Recognised | None:
     """A folder with a sparse model, below it or in it."""
     folder = model_folder(root)
-    return None if folder is None else Recognised(f"a COLMAP model, in {folder.name}", root)
+    if folder is None:
+        return None
+    return Recognised("a COLMAP model" if folder == root else f"a COLMAP model, in {folder.relative_to(root)}", root)
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:

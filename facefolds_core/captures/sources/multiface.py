@@ -22,16 +22,28 @@ from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import check_folder, is_there, read_text
+from facefolds_core.reading import check_folder, is_folder, is_there, read_text
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
 """OpenCV's calibration, from which Multiface's KRT comes, puts the centre of the first pixel at 0."""
+
+
+def recognise(root: Path) -> Recognised | None:
+    """A folder with KRT, or with so much beside it that KRT is what is missing."""
+    rest = is_folder(root / "images") and (is_folder(root / "tracked_mesh") or is_there(root / "frame_list.txt"))
+    if not rest and not is_there(root / "KRT"):
+        return None
+    segments = [path.name for path in _inside(root / "images") if path.is_dir()] if is_folder(root / "images") else []
+    if len(segments) < 2:
+        return Recognised("a Multiface subject", root)
+    return Recognised(f"a Multiface subject, segments {shorten(segments)}", root, {"segment": segments[0]})
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:

@@ -26,6 +26,7 @@ from facefolds_core.captures.gathering import Calibration
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files import read_json
@@ -72,6 +73,19 @@ class Entry:
 def _number(entry: Entry, key: str) -> float:
     limit = LATEST if key == "time" else HUGE
     return json_number(entry.values[key], entry.file, f"{entry.place}, {key}", limit)
+
+
+def recognise(root: Path) -> Recognised | None:
+    """A folder with transforms.json, or such a file; where only transforms_train.json is there, that."""
+    if is_regular(root):
+        return Recognised("nerfstudio's or instant-ngp's cameras", root) if root.suffix == ".json" else None
+    if is_there(root / "transforms.json"):
+        return Recognised("a capture of nerfstudio or instant-ngp", root)
+    parts = sorted(path for path in root.glob("transforms*.json") if is_regular(path)) if is_folder(root) else []
+    if not parts:
+        return None
+    chosen = next((path for path in parts if "train" in path.name), parts[0])
+    return Recognised(f"a capture of nerfstudio or instant-ngp in {len(parts)} parts", chosen)
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:

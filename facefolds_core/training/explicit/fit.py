@@ -66,7 +66,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         volume: of the scene's middle frame, without what floats beside the subject.
     """
     start, geometry = params.start, params.geometry
-    cameras = [scene.cameras[i] for i in scene.indices("train")]
+    cameras = [scene.camera_in_head(i, volume.frame) for i in scene.indices("train")]
     centre, losses = choose_centre(volume, visible_points(volume, cameras), start)
     surface, notes = _trusted_surface(scene, volume, centre, params)
     vertices = None if surface is None else surface[0].astype(np.float64)

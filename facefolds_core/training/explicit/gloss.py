@@ -22,7 +22,7 @@ from facefolds_core.training.explicit.reflection import (
     surface_normals,
 )
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Images, Views
+from facefolds_core.training.explicit.views import Images, Rays, StillRays, Views
 
 
 class GlossFit:
@@ -33,13 +33,13 @@ class GlossFit:
         on: whether there is one.
     """
 
-    def __init__(self, window: Window, params: ReflectionParams) -> None:
+    def __init__(self, window: Window, params: ReflectionParams, turns: bool) -> None:
         self.window, self.params = window, params
-        self.on = params.enabled
+        self.on = params.enabled and not turns
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, views: Views, images: Images, middle: torch.Tensor) -> None:
+    def follow(self, state: TextureState, source: Rays, images: Images, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
@@ -48,7 +48,7 @@ class GlossFit:
         self._normals = surface_normals(radii, self.window, blank.gloss.shape[:2], self.params.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, normals=self._normals)
-            self._shine(state, self._look(state, views, images))
+            self._shine(state, self._look(state, source, images))
 
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
@@ -56,19 +56,19 @@ class GlossFit:
         begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
         return self.on and begun and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, number: int, rounds: int, state: TextureState, views: Views, images: Images) -> Fact | None:
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, images: Images) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
         if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
             return None
-        found = self.decide(state, views, images)
+        found = self.decide(state, source, images)
         if self.on and self.params.begin == "end":
-            self.fit(state, views, images)
+            self.fit(state, source, images)
         return found
 
-    def fit(self, state: TextureState, views: Views, images: Images) -> None:
+    def fit(self, state: TextureState, source: Rays, images: Images) -> None:
         """Fit to what the textures leave over now."""
-        seen = self._look(state, views, images)
+        seen = self._look(state, source, images)
         used = self._used(seen)
         first = self.maps is None
         assert self._normals is not None
@@ -78,11 +78,11 @@ class GlossFit:
         self.maps = centred(fit_maps(used, start, rounds, self.params), used, self.params)
         self._shine(state, seen)
 
-    def decide(self, state: TextureState, views: Views, images: Images) -> Fact:
+    def decide(self, state: TextureState, source: Rays, images: Images) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
         assert self._normals is not None
         start = replace(Maps.blank(self.window, self.params), normals=self._normals)
-        gain = gain_on_cameras(self._used(self._look(state, views, images)), start, self.params)
+        gain = gain_on_cameras(self._used(self._look(state, source, images)), start, self.params)
         self.on = gain >= self.params.min_gain
         if not self.on:
             self.maps, state.shine = None, np.zeros((0, 3), np.float32)
@@ -92,7 +92,8 @@ class GlossFit:
         """What the model gets."""
         return None if self.maps is None else self.maps.model()
 
-    def _look(self, state: TextureState, views: Views, images: Images) -> Seen:
+    def _look(self, state: TextureState, source: Rays, images: Images) -> Seen:
+        views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
         frames = sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.frames)})
         for frame in frames:
@@ -108,3 +109,9 @@ class GlossFit:
     def _shine(self, state: TextureState, seen: Seen) -> None:
         assert self.maps is not None
         state.shine = self.maps.added(seen.st, seen.directions)
+
+
+def _views(source: Rays) -> Views:
+    """The rays of a head that stands still, the same in all frames."""
+    assert isinstance(source, StillRays)  # a head that turns has no reflection yet
+    return source.views

@@ -31,7 +31,7 @@ from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Level, plan
 from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
-from facefolds_core.training.explicit.views import Images, Views, check_images, trace_views
+from facefolds_core.training.explicit.views import Images, Rays, check_images, rays_of
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import check_space, patiently
@@ -101,14 +101,14 @@ class _Trainer:
         self.geometry = 0.0
         x, y, z = (float(v) for v in fit.centre)
         self.centre = (x, y, z)
-        self.views: Views | None = None
+        self.views: Rays | None = None
         self.stride = 0
         self.state: TextureState | None = None
         self.iteration = self.rays = 0
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        self.gloss = GlossFit(fit.window, params.reflection)
+        self.gloss = GlossFit(fit.window, params.reflection, cameras.scene.poses is not None)
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
@@ -151,7 +151,9 @@ class _Trainer:
         self.geometry = level.geometry
         new_rays = moved or self.stride != level.stride
         if new_rays:
-            self.views = trace_views(self.scene, self.manifolds(), level.stride)
+            finest = level.texels if level.stride > 1 else self.fit.texels
+            share = self.params.textures.rays_per_texel * finest[0] * finest[1]
+            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving)
             self.stride = level.stride
         assert self.views is not None
         if self.state is None:
@@ -191,16 +193,16 @@ class _Trainer:
     def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
         """All iterations of a level; False if it diverges."""
         assert self.state is not None and self.views is not None
-        count, stride = len(self.views.pixel), self._stride()
+        stride = self._stride()
         coarse = number < len(self.params.geometry.rounds)
         weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
         best, recent = float("inf"), float("nan")
         for i in range(level.iterations):
             frame = int(self.random.integers(self.scene.num_frames))
-            rays = np.arange(int(self.random.integers(stride)), count, stride)
+            views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             rates = self._rates(i / level.iterations if level.last else 0.0)
             error = self.state.step(
-                self.views,
+                views,
                 rays,
                 self.images.frame(frame),
                 frame,
@@ -235,7 +237,7 @@ class _Trainer:
         """Steps look at every so-manieth ray."""
         assert self.state is not None and self.views is not None
         texels = self.state.shape[0] * self.state.shape[1]
-        return max(1, int(len(self.views.pixel) / (self.params.textures.rays_per_texel * texels)))
+        return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         to = self.params.textures

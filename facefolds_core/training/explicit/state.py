@@ -14,7 +14,7 @@ from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
-from facefolds_core.training.explicit.views import Views
+from facefolds_core.training.explicit.views import Rays, Views
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
@@ -239,13 +239,13 @@ class TextureState:
         background, least = self.background.cpu().numpy(), self.params.textures.min_light
         look(views.codes, views.camera, views.pixel, images, background, texture, seen, least)
 
-    def contributions(self, views: Views, passes: int) -> Tensor:
+    def contributions(self, source: Rays, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
         (h, w), frames, least = self.shape, len(self.steps), self.params.textures.min_light
         n = self.layers.shape[2]
         peak = torch.zeros(n, h, w)
         for i in range(max(passes, frames)):
-            rays = np.arange(i % passes, len(views.pixel), passes)
+            views, rays = source.part(i % frames, i % passes, passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
             if self.device.type == "cpu":
                 shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), least)

@@ -1,8 +1,9 @@
-"""The training views as rays with stored crossings."""
+"""The training views as rays with stored crossings: of a still head once, of a turning one in each frame."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -12,6 +13,9 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
+from facefolds_core.params import MovingParams
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -55,13 +59,17 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
         along.append(directions[hit].astype(np.float32))
     views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels), np.concatenate(along))
     if len(views.pixel) == 0:
-        raise UserError(
-            "no pixel of any training camera sees the subject",
-            file=scene.folder / "scene.json",
-            expected="cameras that look at the origin",
-            remedy="check the capture's calibration, and `front` or the head poses",
-        )
+        raise _nothing_seen(scene)
     return views
+
+
+def _nothing_seen(scene: Scene) -> UserError:
+    return UserError(
+        "no pixel of any training camera sees the subject",
+        file=scene.folder / "scene.json",
+        expected="cameras that look at the origin",
+        remedy="check the capture's calibration, and `front` or the head poses",
+    )
 
 
 def check_images(scene: Scene) -> None:
@@ -79,9 +87,111 @@ def check_images(scene: Scene) -> None:
                     file=store.path,
                     place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
                     expected="every frame of every camera: the explicit model learns one background each",
-                    remedy="for a stabilised scene, whose cameras move, set `train: {preset: quick}`; else run "
-                    "`dvc repro` to make the normalised scene again",
+                    remedy="run `dvc repro` to make the normalised scene again",
                 )
+
+
+class Rays(Protocol):
+    """The rays of all training cameras in any frame.
+
+    Attributes:
+        count: of them that cross at least one layer, in a frame.
+    """
+
+    @property
+    def count(self) -> int: ...
+
+    def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
+        """One of `parts` shares of the rays of a frame: views, and which of their rays."""
+        ...
+
+
+@dataclass(frozen=True)
+class StillRays:
+    """Of a head that stands still: the same in all frames."""
+
+    views: Views
+
+    @property
+    def count(self) -> int:
+        return len(self.views.pixel)
+
+    def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
+        return self.views, np.arange(phase, self.count, parts)
+
+
+class MovingRays:
+    """Of a head that turns: the cameras stand elsewhere in its own frame in each frame, so that each has crossings of
+    its own. They are traced in shares when they are asked for, and kept while there is room.
+
+    Args:
+        scene: with poses.
+        manifolds: the layers; later changes of them are not seen.
+        stride: of the pixels that there are, as in `trace_views`.
+        share: rays of a share: as many as a step at the finest resolution of these layers takes.
+        params: how many shares a frame has in use, and how much is kept.
+    """
+
+    def __init__(
+        self, scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams
+    ) -> None:
+        self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
+        self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
+        self._kept: dict[tuple[int, int], Views] = {}
+        self._room = params.cache_megabytes << 20
+        frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, params.sample_frames)})
+        found = [len(self._traced(k, 0, params.sample).pixel) for k in frames]
+        self.count = params.sample * sum(found) // len(found)
+        if self.count == 0:
+            raise _nothing_seen(scene)
+        self.shares = max(1, int(self.count / share))
+        self._used = min(self.shares, params.shares)
+
+    def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
+        """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""
+        turn, rest = phase % self._used, phase // self._used
+        number = (frame * self._used + turn) % self.shares
+        views = self._kept.get((frame, number))
+        if views is None:
+            views = self._traced(frame, number, self.shares)
+            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel, views.directions))
+            if size <= self._room:
+                self._kept[frame, number] = views
+                self._room -= size
+        finer = max(1, round(parts / self.shares))
+        return views, np.arange(rest % finer, len(views.pixel), finer)
+
+    def _traced(self, frame: int, phase: int, parts: int) -> Views:
+        """Every `parts`-th of the pixels that there are, from number `phase` on."""
+        size, stride = self._scene.height * self._scene.width, self._stride
+        chosen = [np.arange(c * 7 % stride + stride * phase, size, stride * parts) for c in range(len(self._cameras))]
+        rays = [self._rays(camera, frame, pixels) for camera, pixels in zip(self._cameras, chosen, strict=True)]
+        offsets, directions = (np.concatenate(arrays) for arrays in zip(*rays, strict=True))
+        distance = self._trace(offsets, directions)
+        hit = np.flatnonzero((distance > 0).any(1))
+        codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window)
+        camera = np.repeat(np.arange(len(chosen), dtype=np.int32), [len(pixels) for pixels in chosen])
+        pixels = np.concatenate(chosen)[hit].astype(np.int32)
+        return Views(codes, camera[hit], pixels, directions[hit].astype(np.float32))
+
+    def _rays(self, camera: int, frame: int, pixels: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Origins minus c and directions (R, 3) through pixels (R,)."""
+        seen = self._scene.camera_in_head(camera, frame)
+        places = np.stack([pixels % seen.width + 0.5, pixels // seen.width + 0.5], -1)
+        origins, directions = seen.rays(places)
+        return origins - self._centre, directions
+
+
+def rays_of(scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams) -> Rays:
+    """The rays of a scene's training cameras; for `share` see `MovingRays`.
+
+    Raises:
+        UserError: if no ray of any camera crosses a layer.
+    """
+    if scene.poses is None:
+        return StillRays(trace_views(scene, manifolds, stride))
+    return MovingRays(scene, manifolds, stride, share, params)
 
 
 class Images:

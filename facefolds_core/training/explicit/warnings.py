@@ -16,6 +16,8 @@ def warnings_of(scene: Scene, fit: Fit, params: WarningParams) -> tuple[Fact, ..
     lost = fit.losses[float(fit.centre[0])]
     if lost > params.max_lost:
         found.append(fact("surface_without_a_place", share=lost, x=float(fit.centre[0])))
-    if any(line.kind == "front_guessed" or "no `front` camera" in str(line) for line in scene.left_out):
+    if any(
+        line.kind in ("front_found", "front_guessed") or "no `front` camera" in str(line) for line in scene.left_out
+    ):
         found.append(fact("front_is_guessed"))
     return tuple(found)

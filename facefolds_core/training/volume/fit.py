@@ -105,7 +105,7 @@ def bounding_box(cameras: list[Camera], params: VolumeParams) -> tuple[NDArray[n
 
 
 class VolumeFit:
-    """A fit to the middle frame, level by level.
+    """A fit to the middle frame (of a head that turns, to the one nearest its mean pose), level by level.
 
     Args:
         scene, params: of the training.
@@ -121,8 +121,8 @@ class VolumeFit:
     def __init__(self, scene: Scene, params: ExplicitParams, outer: bool) -> None:
         indices = scene.indices("train")
         self.params, self.outer = params, outer
-        self.cameras = [scene.cameras[i] for i in indices]
-        self.frame = scene.num_frames // 2
+        self.frame = scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
+        self.cameras = [scene.camera_in_head(i, self.frame) for i in indices]
         store = scene.open_frames()
         self.images = [store.image(i, self.frame) for i in indices]
         self.lower, self.upper = bounding_box(self.cameras, params.volume)

@@ -15,9 +15,9 @@ window.show = async (file, cameras, background) => {
   renderer.setClearColor(new THREE.Color(background), 1);
   const pictures = cameras.map((given) => {
     const camera = new THREE.Camera();
-    camera.projectionMatrix.copy(projectionOf(given, given.width, given.height, 0.01, 10));
+    camera.projectionMatrix.fromArray(projectionOf(given, given.width, given.height, 0.01, 10));
     camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
-    const place = viewOf(given.w2c).invert().premultiply(TO_Y_UP);
+    const place = new THREE.Matrix4().fromArray(viewOf(given.w2c)).invert().premultiply(TO_Y_UP);
     place.decompose(camera.position, camera.quaternion, camera.scale);
     renderer.render(scene, camera);
     return renderer.domElement.toDataURL("image/png").split(",")[1];

@@ -1,4 +1,5 @@
 /** The bar below: play, step, scrub, speed, loop, sound, compare, settings, share, full screen. */
+import { save, toClipboard } from "../sharing.js";
 import { ICONS } from "./template.js";
 
 /** @param {import("../element.js").FacefoldsPlayer} element */
@@ -25,10 +26,14 @@ export function connectBar(element) {
       settings.setAttribute("aria-expanded", String(!panel.hidden));
       (panel.hidden ? settings : panel.querySelector("button")).focus();
     },
-    share: () => element.share(),
-    full: () => element.toggleFullScreen(),
+    share: () => share(element),
+    full: () => toggleFullScreen(element),
     close: () => element.compare(null),
-    reset: () => element.resetView(),
+    reset: () => element.reset(),
+    picture: () => savePicture(element),
+    embed: () => element.openEmbed(),
+    dismiss: () => dismiss(element),
+    vr: () => toggleVr(element, find('[data-do="vr"]')),
   };
   element.actions = actions;
   root.querySelector(".stage").addEventListener("click", (event) => {
@@ -56,7 +61,7 @@ export function connectBar(element) {
     scrubber.value = Math.max(0, frame);
     scrubber.style.setProperty("--p", `${frames > 1 ? (100 * Math.max(0, frame)) / (frames - 1) : 0}%`);
     scrubber.setAttribute("aria-valuetext", `frame ${frame + 1} of ${frames}`);
-    find("output").textContent = frame < 0 ? "" : `${frame + 1} / ${frames}`;
+    find(".count").textContent = frame < 0 ? "" : `${frame + 1} / ${frames}`;
   };
   const showState = () => {
     const name = element.playing ? "Pause" : "Play";
@@ -73,12 +78,58 @@ export function connectBar(element) {
       control.disabled = still;
   };
   player.addEventListener("frame", showFrame);
+  for (const name of ["share", "embed"]) root.querySelector(`[data-do="${name}"]`).hidden = !element.shareable;
   player.addEventListener("ready", () => {
+    if (navigator.xr)
+      import("../xr.js").then(async ({ offersVr }) => (find('[data-do="vr"]').hidden = !(await offersVr())));
     compare.hidden = player.manifest.photos.length === 0;
     showFrame();
   });
   for (const name of ["play", "pause", "change", "ready"]) player.addEventListener(name, showState);
   showState();
+}
+
+async function toggleVr(element, button) {
+  const { player } = element;
+  if (player.immersed) return player.immersion.end();
+  if (!element.ready) return;
+  const { Immersion } = await import("../xr.js");
+  player.immersion = new Immersion(player, () => button.setAttribute("aria-pressed", "false"));
+  try {
+    await player.immersion.start();
+    button.setAttribute("aria-pressed", "true");
+  } catch (error) {
+    element.overlays.say(`The headset cannot be used: ${error.message}`, 8000);
+  }
+}
+
+async function share(element) {
+  const { link } = element;
+  // Without permission: to be copied by hand.
+  if (await toClipboard(link)) element.overlays.say("Link copied");
+  else element.overlays.say(link, 15000);
+}
+
+async function toggleFullScreen(element) {
+  try {
+    if (document.fullscreenElement) await document.exitFullscreen();
+    else await element.requestFullscreen();
+  } catch {
+    element.overlays.say("This browser does not allow full screen here");
+  }
+}
+
+async function savePicture(element) {
+  if (!element.ready) return;
+  const name = (element.player.manifest.subject || "facefolds").replace(/[^\w-]+/g, "_");
+  save(await element.screenshot(), `${name}-${element.frame + 1}.png`);
+}
+
+/** Escape: closes what lies over the picture, the last first. */
+function dismiss(element) {
+  const panel = element.shadowRoot.querySelector(".panel");
+  if (!panel.hidden) element.actions.settings();
+  else element.compare(null);
 }
 
 function toggleSound(player) {

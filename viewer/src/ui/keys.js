@@ -1,5 +1,7 @@
 /** Keys, while the player (or anything in it that does not need the key itself) has the focus. */
 
+import { pullApart } from "./panel.js";
+
 const TURN = 5; // degrees
 const ZOOM = 1.1;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
@@ -19,10 +21,10 @@ export function connectKeys(element) {
     " ": act("play"), k: act("play"), ArrowLeft: act("back"), ArrowRight: act("next"), ",": act("back"), ".": act("next"),
     Home: () => element.seek(0), End: () => element.seek(element.frames - 1), "<": faster(-1), ">": faster(1), l: act("loop"),
     "+": zoom(1 / ZOOM), "=": zoom(1 / ZOOM), "-": zoom(ZOOM), 0: act("reset"), w: flip("wireframe"), e: flip("effects"),
-    p: () => (element.spread = element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
+    p: () => pullApart(element, element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
     c: () => player.manifest?.photos.length && element.actions.compare(),
     s: () => element.overlays.showStatistics(!element.overlays.statistics),
-    Escape: () => element.compare(null),
+    Escape: act("dismiss"), i: act("picture"),
   }; // prettier-ignore
   const shifted = {
     ArrowLeft: turn(-TURN, 0),
@@ -32,6 +34,7 @@ export function connectKeys(element) {
   };
   root.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || !element.ready) return;
+    if (event.target.closest("dialog")) return; // it knows Escape by itself
     if (needsKeys(event.target, event.key)) return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const digit = /^[1-9]$/.test(key) && Number(key) <= element.layers.length;
@@ -45,7 +48,7 @@ export function connectKeys(element) {
 
 /** Controls that use the key themselves. */
 function needsKeys(target, key) {
-  if (target.matches("select, input[type=color]")) return key !== "Escape";
+  if (target.matches("select, textarea, input[type=color]")) return key !== "Escape";
   if (target.matches("input[type=range]"))
     return key.startsWith("Arrow") || ["Home", "End", "PageUp", "PageDown"].includes(key);
   if (target.matches("button, input, summary")) return key === " " || key === "Enter";

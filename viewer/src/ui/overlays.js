@@ -1,4 +1,5 @@
 /** What lies over the picture and is not a control: poster, progress, statistics, messages. */
+import { weight } from "../draco/decoder.js";
 import { PlayerError } from "../errors.js";
 
 const mebibytes = (bytes) => `${(bytes / 2 ** 20).toFixed(bytes < 2 ** 20 * 10 ? 2 : 1)} MiB`;
@@ -36,13 +37,14 @@ export class Overlays {
     const { manifest } = player;
     if (!manifest) return;
     if (manifest.poster && !player.level && !this.posterAsked) this.#showPoster(manifest.poster);
-    const wanted = manifest.levels.find(({ name }) => name === (player.wantedLevel ?? player.choices?.[0]));
+    const wanted = manifest.levels.find(({ name }) => name === (player.detail.wanted ?? player.choices[0]));
     if (!wanted) return;
     if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
-    const part = Math.min(1, (player.files.loaded - this.loadedBefore) / wanted.bytes);
+    const [decoder, all] = player.level ? [0, 0] : [weight.loaded, weight.total]; // before the first picture it comes too
+    const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.bytes + all));
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
-    this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded)}`;
+    this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded + decoder)}`;
     if (player.level && player.level.info !== wanted) {
       this.find(".pill").hidden = false;
       this.find(".pill").textContent = `Loading detail, ${Math.round(100 * part)} %`;
@@ -120,6 +122,9 @@ export class Overlays {
     this.find(".message p").textContent = remedy;
     this.find(".message .file").textContent = error.file ?? "";
     this.find(".message").hidden = false;
+    // Nobody else's focus is taken away.
+    if ([document.body, this.element].includes(document.activeElement))
+      this.find(".message button").focus({ preventScroll: true });
   }
 
   #hideMessage() {

@@ -1,4 +1,7 @@
-/** The settings: detail, background, layers, pull apart, wireframe, view effects, statistics. */
+/** The settings: detail, what is shown, background, layers, pull apart, wireframe, view effects, statistics. */
+import { hexOf } from "../colours.js";
+
+const ASIDE = 55; // degrees: from where layers that are pulled apart are seen
 
 /** @param {import("../element.js").FacefoldsPlayer} element */
 export function connectPanel(element) {
@@ -6,8 +9,10 @@ export function connectPanel(element) {
   const { player } = element;
   const input = (name) => panel.querySelector(`[name="${name}"]`);
 
-  input("level").addEventListener("change", (event) => (element.level = event.target.value));
-  input("spread").addEventListener("input", (event) => (element.spread = Number(event.target.value)));
+  for (const swatch of panel.querySelectorAll("[data-colour]")) swatch.style.setProperty("--c", swatch.dataset.colour);
+  for (const name of ["level", "mode"])
+    input(name).addEventListener("change", (event) => (element[name] = event.target.value));
+  input("spread").addEventListener("input", (event) => pullApart(element, Number(event.target.value)));
   for (const name of ["wireframe", "effects"]) {
     input(name).addEventListener("change", (event) => (element[name] = event.target.checked));
   }
@@ -25,7 +30,8 @@ export function connectPanel(element) {
 
   const showLevel = () => {
     const { levels } = element;
-    input("level").replaceChildren(...levels.map((name) => new Option(name, name, false, name === element.level)));
+    const names = [...levels].reverse().map((name) => new Option(name, name));
+    input("level").replaceChildren(new Option(`auto (${element.level})`, "auto"), ...names);
     input("level").disabled = levels.length < 2;
     input("effects").closest(".row").hidden = !(player.level.info.effects || player.level.info.reflection);
     const one = (name, layer) => `<button type="button" data-layer="${layer}" class="${layer}">${name}</button>`;
@@ -36,6 +42,8 @@ export function connectPanel(element) {
   const showState = () => {
     if (!player.level) return;
     const { layers, background } = element;
+    input("level").value = player.detail.auto ? "auto" : element.level;
+    input("mode").value = element.mode;
     panel.querySelectorAll("[data-layer]").forEach((chip) => {
       const all = chip.dataset.layer === "all";
       chip.setAttribute("aria-pressed", String(all ? layers.every(Boolean) : layers[Number(chip.dataset.layer)]));
@@ -44,7 +52,7 @@ export function connectPanel(element) {
     panel.querySelectorAll("[data-colour]").forEach((swatch) => {
       swatch.setAttribute("aria-pressed", String(swatch.dataset.colour === background));
     });
-    if (background !== "transparent") input("background").value = background;
+    input("background").value = hexOf(element.paint);
     input("spread").value = element.spread;
     input("spread").style.setProperty("--p", `${100 * element.spread}%`);
     input("wireframe").checked = element.wireframe;
@@ -53,4 +61,21 @@ export function connectPanel(element) {
   };
   player.addEventListener("level", showLevel);
   for (const name of ["ready", "change"]) player.addEventListener(name, showState);
+}
+
+/** Pulls the layers apart, turns aside and fits them, so that all are seen; goes back at the end. */
+export function pullApart(element, amount) {
+  const { view, renderer } = element.player;
+  if (!element.spread && amount) element.together = view.get();
+  element.spread = amount;
+  if (amount) {
+    const { low, high, centre } = renderer.bounds();
+    const [depth, width, tall] = high.map((value, i) => value - low[i]);
+    const angle = (ASIDE * Math.PI) / 180;
+    const away = view.distanceFor(depth * Math.sin(angle) + width * Math.cos(angle), tall);
+    view.glide({ azimuth: ASIDE, distance: away + (depth / 2) * Math.cos(angle), target: centre });
+  } else if (element.together) {
+    view.glide(element.together);
+    element.together = null;
+  }
 }

@@ -1,6 +1,10 @@
 /** The player's markup, in its shadow root. Every control has a name; every picture is decoration or has a text. */
 import style from "./style.css";
 
+/** One sheet for all players; a page's Content-Security-Policy has nothing against it. */
+export const STYLE = new CSSStyleSheet();
+STYLE.replaceSync(style);
+
 const icon = (path) => `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${path}"/></svg>`;
 
 export const ICONS = {
@@ -16,11 +20,17 @@ export const ICONS = {
   share: icon("M17 15.500a3 3 0 0 0-2.200 1L9 13.100a3.200 3.200 0 0 0 0-2.200l5.800-3.400a3 3 0 1 0-.8-2 3 3 0 0 0 .1.800L8.300 9.700a3 3 0 1 0 0 4.600l5.800 3.400a3 3 0 1 0 2.900-2.200z"),
   full: icon("M4 4h6v2H6v4H4zm10 0h6v6h-2V6h-4zM4 14h2v4h4v2H4zm14 0h2v6h-6v-2h4z"),
   close: icon("M18.300 4.300 12 10.600 5.700 4.300 4.300 5.700l6.300 6.300-6.300 6.300 1.400 1.400 6.300-6.300 6.300 6.300 1.400-1.400-6.300-6.300 6.300-6.300z"),
+  picture: icon("M9 4h6l1.500 2H20a1.500 1.500 0 0 1 1.500 1.500v10A1.500 1.500 0 0 1 20 19H4a1.500 1.500 0 0 1-1.500-1.500v-10A1.500 1.500 0 0 1 4 6h3.500zm3 4.500a4 4 0 1 0 0 8 4 4 0 0 0 0-8zm0 2a2 2 0 1 1 0 4 2 2 0 0 1 0-4z"),
+  vr: icon("M4 7h16a2 2 0 0 1 2 2v6a2 2 0 0 1-2 2h-4.200l-2-2.700a2.200 2.200 0 0 0-3.600 0l-2 2.700H4a2 2 0 0 1-2-2V9a2 2 0 0 1 2-2zm3.500 2.500a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z"),
+  embed: icon("M8.300 6.700 9.700 8.100 5.800 12l3.900 3.900-1.400 1.400L3 12zm7.400 0L21 12l-5.300 5.300-1.400-1.400L18.200 12l-3.900-3.900z"),
   reset: icon("M12 5V1.500L6.500 6 12 10.500V7a5.500 5.500 0 1 1-5.300 7H4.600A7.500 7.500 0 1 0 12 5z"),
 }; // prettier-ignore
 
 const button = (name, label, key = "", extra = "") =>
   `<button type="button" data-do="${name}" aria-label="${label}" title="${label}${key && ` (${key})`}" ${extra}>${ICONS[name] ?? ""}</button>`;
+
+/** A button with its name written out. */
+const worded = (name, label, key) => button(name, label, key).replace("</button>", `<span>${label}</span></button>`);
 
 const toggle = (name, label, checked = false) =>
   `<label class="row"><span>${label}</span><input type="checkbox" role="switch" name="${name}" ${checked ? "checked" : ""}></label>`;
@@ -28,9 +38,10 @@ const toggle = (name, label, checked = false) =>
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
 const SWATCHES = { "#16181d": "Dark", "#000000": "Black", "#7f7f7f": "Grey", "#ffffff": "White", "#2f5d46": "Green" };
 
-export const TEMPLATE = `<style>${style}</style>
-<div class="stage">
-  <canvas tabindex="0" role="img" aria-label="Three-dimensional picture. Drag to turn, wheel or pinch to zoom, right button or two fingers to move."></canvas>
+const MODES = { colour: "Picture", alpha: "Opacity", depth: "Depth", uv: "Texture coordinates" };
+
+export const TEMPLATE = `<div class="stage">
+  <canvas tabindex="0" role="img" aria-label="Three-dimensional picture. Drag to turn, wheel (with Ctrl) or pinch to zoom, right button or two fingers to move."></canvas>
   <img class="poster" alt="" hidden>
   <div class="compare" hidden>
     <div class="frame"><img alt="Photo of a camera that was held out">
@@ -44,29 +55,39 @@ export const TEMPLATE = `<style>${style}</style>
   <aside class="panel" aria-label="Settings" hidden>
     <div class="row head"><b>Settings</b>${button("settings", "Close the settings").replace(ICONS.settings, ICONS.close)}</div>
     <label class="row"><span>Detail</span><select name="level"></select></label>
+    <label class="row"><span>Show</span><select name="mode">${Object.entries(MODES)
+      .map(([mode, name]) => `<option value="${mode}">${name}</option>`)
+      .join("")}</select></label>
     <fieldset class="swatches"><legend>Background</legend><div>${Object.entries(SWATCHES)
-      .map(([colour, name]) => `<button type="button" data-colour="${colour}" aria-label="${name}" title="${name}" style="--c:${colour}"></button>`)
+      .map(([colour, name]) => `<button type="button" data-colour="${colour}" aria-label="${name}" title="${name}"></button>`)
       .join("")}<input type="color" name="background" aria-label="Other background colour" title="Other colour"></div></fieldset>
     <fieldset class="layers"><legend>Layers <small>outermost first</small></legend><div></div></fieldset>
     <label class="row"><span>Pull apart</span><input type="range" name="spread" min="0" max="1" step="0.01" value="0"></label>
     ${toggle("wireframe", "Wireframe")}${toggle("effects", "View effects", true)}${toggle("stats", "Statistics")}
-    <div class="row">${button("reset", "Reset the view", "0").replace("</button>", "<span>Reset the view</span></button>")}</div>
+    <div class="row deeds">${worded("picture", "Save picture", "I")}${worded("embed", "Embed")}${worded("reset", "Reset", "0")}</div>
     <details><summary>Keys</summary><dl class="keys">
       <dt>Space</dt><dd>play, pause</dd><dt>← →</dt><dd>step</dd><dt>Home End</dt><dd>first, last frame</dd>
-      <dt>&lt; &gt;</dt><dd>slower, faster</dd><dt>L</dt><dd>loop</dd><dt>Shift + arrows</dt><dd>turn</dd><dt>+ −</dt><dd>zoom</dd><dt>0</dt><dd>reset the view</dd>
+      <dt>&lt; &gt;</dt><dd>slower, faster</dd><dt>L</dt><dd>loop</dd><dt>Shift + arrows</dt><dd>turn</dd><dt>+ −</dt><dd>zoom</dd><dt>0</dt><dd>reset</dd>
       <dt>W</dt><dd>wireframe</dd><dt>E</dt><dd>view effects</dd><dt>P</dt><dd>pull apart</dd><dt>1 … 9</dt><dd>layer on, off</dd><dt>C</dt><dd>compare</dd>
-      <dt>M</dt><dd>sound</dd><dt>S</dt><dd>statistics</dd><dt>F</dt><dd>full screen</dd></dl></details>
+      <dt>M</dt><dd>sound</dd><dt>S</dt><dd>statistics</dd><dt>F</dt><dd>full screen</dd><dt>I</dt><dd>save the picture</dd><dt>Esc</dt><dd>close</dd></dl></details>
   </aside>
   <div class="toast" role="status" aria-live="polite" hidden></div>
   <div class="bar" role="group" aria-label="Playback">
     <div class="buttons">${button("play", "Play", "Space")}${button("back", "Previous frame", "←")}${button("next", "Next frame", "→")}</div>
-    <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><output></output>
+    <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><span class="count" aria-hidden="true"></span>
       <select name="speed" aria-label="Speed" title="Speed">${SPEEDS.map((speed) => `<option value="${speed}" ${speed === 1 ? "selected" : ""}>${speed}×</option>`).join("")}</select></div>
     <div class="buttons">
       ${button("loop", "Loop", "L", 'aria-pressed="true"')}${button("sound", "Sound", "M", 'aria-pressed="false" hidden')}
       ${button("compare", "Compare with a photo", "C", "hidden")}${button("settings", "Settings", "", 'aria-expanded="false"')}
-      ${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
+      ${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
     </div>
   </div>
   <div class="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>
+  <div class="drop" aria-hidden="true">Drop the asset's folder or a ZIP of it</div>
+  <dialog aria-label="Embed"><form method="dialog">
+    <div class="row head"><b>Put it on a page of yours</b>${button("", "Close").replace("<button", "<button data-close").replace("></button>", `>${ICONS.close}</button>`)}</div>
+    ${[["frame", "As a frame, with this view"], ["element", "As an element"]]
+      .map(([name, label]) => `<label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button>`)
+      .join("")}
+  </form></dialog>
 </div>`; // prettier-ignore

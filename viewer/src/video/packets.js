@@ -1,5 +1,5 @@
 /** Takes a video file apart into its coded pictures, numbered in the order in which they are shown. */
-import { ALL_FORMATS, BufferSource, EncodedPacketSink, Input } from "mediabunny";
+import { BufferSource, EncodedPacketSink, Input, MP4, WEBM } from "mediabunny";
 
 /**
  * @typedef {{frame: number, key: boolean, data: Uint8Array}} Packet in decoding order
@@ -7,7 +7,7 @@ import { ALL_FORMATS, BufferSource, EncodedPacketSink, Input } from "mediabunny"
  * @returns {Promise<{config: VideoDecoderConfig, packets: Packet[]}>}
  */
 export async function takeApart(buffer) {
-  const input = new Input({ source: new BufferSource(buffer), formats: ALL_FORMATS });
+  const input = new Input({ source: new BufferSource(buffer), formats: [MP4, WEBM] });
   try {
     const track = await input.getPrimaryVideoTrack();
     const config = await track?.getDecoderConfig();

@@ -1,0 +1,115 @@
+"""How a capture's head moves as a whole, and whether that is so much that its model is made in the head's own frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.capture import Capture, Tracking
+from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track, mean_rotation, rigid_motion
+from facefolds_core.params import NormalizeParams
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeadMotion:
+    """Attributes:
+    track: the head's own frame -> world in each frame in use, normalised; None where the head is taken to stand still.
+    facts: what is to be said of it.
+    """
+
+    track: Track | None
+    facts: tuple[Fact, ...]
+
+
+def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity, params: NormalizeParams) -> HeadMotion:
+    """The track that `normalize.stabilize` asks for.
+
+    Args:
+        frames: indices in the capture of those in use.
+        similarity: capture -> normalised coordinates.
+
+    Raises:
+        UserError: if it is asked for, and the capture has nothing to know it from.
+    """
+    tracking = capture.tracking
+    if tracking is None:
+        if params.stabilize is True:
+            raise UserError(
+                "there are no head poses to stabilise by",
+                file=capture.root,
+                expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
+                remedy="set `stabilize: false` in `normalize` for this subject",
+            )
+        return HeadMotion(None, ())
+    rotations, translations, source = _poses(tracking, frames)
+    vertices = similarity.apply(tracking.world_vertices()[list(frames)])
+    track = _own_frame(rotations, translations, vertices, similarity)
+    size = float(np.ptp(vertices, axis=1).max(1).mean())
+    found = {"degrees": float(track.degrees().max()), "shift": _shift(track, vertices) / max(size, 1e-12)}
+    much = found["degrees"] > params.motion.degrees or found["shift"] > params.motion.shift
+    if params.stabilize is False or len(frames) < 2:
+        return HeadMotion(None, (fact("head_turns_unheeded", **found),) if much else ())
+    if params.stabilize is True or much:
+        return HeadMotion(track, (fact("head_turns", **found, source=source),))
+    return HeadMotion(None, ())
+
+
+def in_head(vertices: Array, track: Track | None) -> Array:
+    """Vertices (K, V, 3) of the world in the head's own frame."""
+    if track is None:
+        return vertices
+    return np.stack([track.at(k).inverse().apply(points) for k, points in enumerate(vertices)])
+
+
+def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str]:
+    """Rotations (K, 3, 3), translations (K, 3) of something that moves with the head -> world, and where from.
+
+    Poses that are all alike say nothing: then the meshes are laid over their mean shape.
+    """
+    poses = tracking.poses[list(frames)]
+    if np.abs(poses - poses[0]).max() > 1e-9 * max(1.0, float(np.abs(poses).max())):
+        return poses[:, :, :3], poses[:, :, 3], "the capture's poses"
+    vertices = tracking.world_vertices()[list(frames)]
+    shape, motions = vertices[0], []
+    for _ in range(3):
+        motions = [rigid_motion(shape, points) for points in vertices]
+        shape = np.mean([(points - t) @ R for points, (R, t) in zip(vertices, motions, strict=True)], 0)
+    return np.array([R for R, _ in motions]), np.array([t for _, t in motions]), "laid over the tracked meshes"
+
+
+def _own_frame(rotations: Array, translations: Array, vertices: Array, similarity: Similarity) -> Track:
+    """The motion against the mean pose: its rotation is the mean, and it has the head's middle where it is on average.
+
+    Args:
+        vertices: (K, V, 3) normalised, in the world.
+    """
+    poses = [
+        similarity.after(Similarity(1.0, R, t)).after(similarity.inverse())
+        for R, t in zip(rotations, translations, strict=True)
+    ]
+    R = np.array([pose.rotation for pose in poses])
+    middle = (vertices.min(1) + vertices.max(1)).mean(0) / 2
+    there = np.mean([pose.inverse().apply(box) for pose, box in zip(poses, _middles(vertices), strict=True)], 0)
+    mean = mean_rotation(R)
+    still = Similarity(1.0, mean, middle - mean @ there)
+    against = [pose.after(still.inverse()) for pose in poses]
+    return Track.of([one.rotation for one in against], [one.translation for one in against])
+
+
+def _middles(vertices: Array) -> Array:
+    """(K, 3) of the bounding boxes."""
+    return np.asarray((vertices.min(1) + vertices.max(1)) / 2)
+
+
+def _shift(track: Track, vertices: Array) -> float:
+    """How far the head's middle goes from where it is on average, units."""
+    middle = _middles(vertices).mean(0)
+    return max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track)))

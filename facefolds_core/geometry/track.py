@@ -1,0 +1,139 @@
+"""Where a head stands in each frame: a rigid motion head -> world a frame, and between frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+
+Array = NDArray[np.float64]
+
+UNIT = 1e-6
+"""How far from 1 the length of a quaternion may be in a file."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """K rigid motions X_world = R X_head + t, normalised units.
+
+    Attributes:
+        quaternions: (K, 4) w, x, y, z of R, of unit length; neighbours are less than half a turn apart (q or -q).
+        translations: (K, 3) t.
+    """
+
+    quaternions: Array
+    translations: Array
+
+    @classmethod
+    def of(cls, rotations: ArrayLike, translations: ArrayLike) -> Track:
+        """From rotations (K, 3, 3) and translations (K, 3)."""
+        quaternions = np.array([quaternion(R) for R in np.asarray(rotations, float)])
+        for k in range(1, len(quaternions)):
+            if quaternions[k] @ quaternions[k - 1] < 0:
+                quaternions[k] *= -1
+        return cls(quaternions, np.array(translations, float).reshape(-1, 3))
+
+    def __len__(self) -> int:
+        return len(self.quaternions)
+
+    def at(self, time: float) -> Similarity:
+        """Head -> world at a time in units of frames: on the shortest arc between frames, held beyond the ends."""
+        time = min(max(time, 0.0), len(self) - 1.0)
+        first = min(int(time), len(self) - 1)
+        second, share = min(first + 1, len(self) - 1), time - first
+        q = slerp(self.quaternions[first], self.quaternions[second], share)
+        t = (1 - share) * self.translations[first] + share * self.translations[second]
+        return Similarity(1.0, rotation(q), t)
+
+    def camera(self, camera: Camera, time: float) -> Camera:
+        """A camera of the world as it stands in the head's frame at a time."""
+        return camera.transformed(self.at(time).inverse())
+
+    def degrees(self) -> Array:
+        """(K,) of the turn in each frame."""
+        cosine = np.clip(np.abs(self.quaternions[:, 0]), 0, 1)
+        return np.asarray(np.degrees(2 * np.arccos(cosine)))
+
+    def nearest(self) -> int:
+        """The frame that stands nearest to the head's own frame: the least sum of turn (radians) and shift (units)."""
+        return int((np.radians(self.degrees()) + np.linalg.norm(self.translations, axis=1)).argmin())
+
+    def resampled(self, factor: int) -> Track:
+        """At `factor` times the rate; after the last frame nothing is known, it is held."""
+        poses = [self.at(k / factor) for k in range(factor * len(self))]
+        return Track.of([pose.rotation for pose in poses], [pose.translation for pose in poses])
+
+    def problems(self, frames: int) -> list[str]:
+        """What is wrong with a track of so many frames, in words."""
+        if self.quaternions.shape != (frames, 4) or self.translations.shape != (frames, 3):
+            return [f"{self.quaternions.shape} quaternions and {self.translations.shape} translations, {frames} frames"]
+        if not (np.isfinite(self.quaternions).all() and np.isfinite(self.translations).all()):
+            return ["numbers that are not finite"]
+        off = np.abs(np.linalg.norm(self.quaternions, axis=1) - 1)
+        return [f"quaternion {int(off.argmax())} is not of unit length"] if off.max() > UNIT else []
+
+
+def quaternion(R: Array) -> Array:
+    """(4,) w, x, y, z with w >= 0 of a rotation (3, 3): the largest eigenvector of Bar-Itzhack's matrix (2000)."""
+    (a, b, c), (d, e, f), (g, h, i) = np.asarray(R, float)
+    symmetric = np.array(
+        [
+            [a + e + i, h - f, c - g, d - b],
+            [h - f, a - e - i, b + d, c + g],
+            [c - g, b + d, e - a - i, f + h],
+            [d - b, c + g, f + h, i - a - e],
+        ]
+    )
+    q: Array = np.linalg.eigh(symmetric)[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def rotation(q: Array) -> Array:
+    """(3, 3) of a unit quaternion w, x, y, z."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def slerp(first: Array, second: Array, share: float) -> Array:
+    """Along the shorter arc between unit quaternions (Shoemake 1985)."""
+    cosine = float(first @ second)
+    if cosine < 0:
+        second, cosine = -second, -cosine
+    angle = np.arccos(min(cosine, 1.0))
+    if angle < 1e-8:
+        return first
+    mixed: Array = (np.sin((1 - share) * angle) * first + np.sin(share * angle) * second) / np.sin(angle)
+    return mixed / np.linalg.norm(mixed)
+
+
+def mean_rotation(rotations: Sequence[Array] | Array) -> Array:
+    """(3, 3) the rotation nearest to the mean of rotations (K, 3, 3) (chordal mean; Hartley et al. 2013)."""
+    u, _, vt = np.linalg.svd(np.mean(np.asarray(rotations), 0))
+    return np.asarray(u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt)
+
+
+def rigid_motion(source: Array, target: Array, rounds: int = 10) -> tuple[Array, Array]:
+    """R, t with target = R source + t for points (V, 3), robustly (Procrustes; Cauchy's weights at twice the median
+    residual): what moves by itself, as a jaw, counts little."""
+    weights = np.ones(len(source))
+    R, t = np.eye(3), np.zeros(3)
+    for _ in range(rounds):
+        a = np.average(source, axis=0, weights=weights)
+        b = np.average(target, axis=0, weights=weights)
+        u, _, vt = np.linalg.svd((target - b).T @ (weights[:, None] * (source - a)))
+        R = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+        t = b - R @ a
+        off = np.linalg.norm(source @ R.T + t - target, axis=1)
+        weights = 1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2)
+    return R, t

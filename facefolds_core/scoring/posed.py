@@ -1,0 +1,64 @@
+"""What a camera sees of a model and of its asset, whether the head stands still or turns."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import torch
+
+from facefolds_core.asset import Asset
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.model import RadianceManifolds
+from facefolds_core.rendering import AssetCaster
+from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.reflection import reflected_colours
+from facefolds_core.scoring.model_view import ModelView
+
+
+class PosedView:
+    """One camera: looked through once for a head that stands still, else in each frame anew.
+
+    The model stands where the scene's poses say; the asset where its own track does: what ships is scored.
+
+    Args:
+        camera: in the world.
+        step: frames of the asset a frame of the scene.
+
+    Attributes:
+        seen_by: the camera in the frame of the asset's meshes.
+        hits: there.
+        model: the model's view.
+        glossy: what the reflection adds, or None.
+        added: what view effects add, or None.
+    """
+
+    def __init__(
+        self, scene: Scene, model: RadianceManifolds, asset: Asset, caster: AssetCaster, camera: Camera, step: int
+    ) -> None:
+        self._poses, self._model, self._asset, self._caster = scene.poses, model, asset, caster
+        self._camera, self._step = camera, step
+        self._maps, self._reflection = asset.effects(), asset.full.reflection()
+        self._turn_model(0)
+        self._turn_asset(0)
+
+    def turn(self, frame: int) -> None:
+        """To a frame of the scene."""
+        if self._poses is not None:
+            self._turn_model(frame)
+        if self._asset.track is not None:
+            self._turn_asset(frame)
+
+    def _turn_model(self, frame: int) -> None:
+        camera = self._camera if self._poses is None else self._poses.camera(self._camera, frame)
+        # Without gradients layers are crossed by compiled code: in each frame anew torch's own would take minutes.
+        with nullcontext() if self._poses is None else torch.no_grad():
+            self.model = ModelView(self._model, camera)
+
+    def _turn_asset(self, frame: int) -> None:
+        self.seen_by = self._asset.camera_in_head(self._camera, frame * self._step)
+        self.hits = self._caster.cast(self.seen_by)
+        windows = self._asset.full.windows
+        maps = self._reflection
+        self.glossy = None if maps is None else reflected_colours(self.hits, self.seen_by, windows, maps)
+        self.added = None if self._maps is None else added_colours(self.hits, to_eye(self.seen_by), self._maps)

@@ -1,0 +1,60 @@
+"""The range of directions that was filmed, as the manifest has it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from facefolds_core.asset.filmed import filmed_view
+from facefolds_core.asset.manifest import SCHEMA_PATH, FilmedView, parse_manifest
+from facefolds_core.errors import UserError
+from tests.assets import make_asset
+from tests.scenes import look_at_origin
+from tests.viewer.fixtures import change_manifest
+
+
+def cameras(*directions: tuple[float, float]) -> list:
+    return [look_at_origin(f"c{i}", azimuth, elevation, 64) for i, (azimuth, elevation) in enumerate(directions)]
+
+
+def test_the_range_holds_all_cameras() -> None:
+    found = filmed_view(cameras((-50, 0), (30, -12), (70, 25)))
+    assert found is not None
+    assert np.allclose([found.azimuth, found.elevation], [(-50, 70), (-12, 25)], atol=0.01)
+
+
+def test_an_arc_behind_the_subject_goes_through_the_back() -> None:
+    found = filmed_view(cameras((150, 0), (-150, 0), (179, 0)))
+    assert found is not None
+    low, high = found.azimuth
+    assert high - low == pytest.approx(60, abs=0.02)
+    assert (low + 360) % 360 == pytest.approx(150, abs=0.01)
+
+
+def test_cameras_all_round_leave_the_widest_gap_out() -> None:
+    found = filmed_view(cameras(*((20 + 30 * k, 0) for k in range(11))))  # none at 350
+    assert found is not None
+    assert found.azimuth[1] - found.azimuth[0] == pytest.approx(300, abs=0.02)
+
+
+def test_no_cameras_no_range() -> None:
+    assert filmed_view([]) is None
+
+
+def test_the_key_is_optional_and_checked(tmp_path: Path) -> None:
+    folder = tmp_path / "asset"
+    make_asset(folder, frames=1)
+    schema = jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text()))
+    path = folder / "manifest.json"
+    assert "view" not in json.loads(path.read_text())
+    change_manifest(folder, lambda value: value.update(view={"azimuth": [-40, 60.5], "elevation": [0, 10]}))
+    schema.validate(json.loads(path.read_text()))
+    assert parse_manifest(path).view == FilmedView(azimuth=(-40, 60.5), elevation=(0, 10))
+    for bad in ({"azimuth": [10, -10], "elevation": [0, 0]}, {"azimuth": [0, 1]}, None):
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"view": bad}))
+        with pytest.raises(UserError, match="view"):
+            parse_manifest(path)

@@ -1,0 +1,59 @@
+"""`facefolds scores`: the words at the end of a run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from click.testing import Result
+from typer.testing import CliRunner
+
+from facefolds_core.cli.scores import command
+from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
+from facefolds_core.scoring.report import metrics_json
+
+COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "view_effects_bytes": 0}
+
+
+def call(*arguments: str) -> Result:
+    app = typer.Typer()
+    app.command()(command)
+    return CliRunner().invoke(app, arguments)
+
+
+def write(data: Path, name: str) -> None:
+    scores = [
+        ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 9.0, "psnr_subject": 30.0}) for v in VARIANTS
+    ]
+    folder = data / name
+    folder.mkdir(parents=True)
+    (folder / "metrics.json").write_text(json.dumps(metrics_json(name, scores, COST)))
+
+
+def test_every_subject_has_its_lines(tmp_path: Path) -> None:
+    for name in ("anna", "ben"):
+        write(tmp_path, name)
+    done = call("--data", str(tmp_path))
+    assert done.exit_code == 0
+    for name in ("anna", "ben"):
+        assert f"{name}: {tmp_path / name / 'asset'}, 0.50 MB, 30.00 dB of the subject" in done.output
+
+
+def test_one_may_be_named(tmp_path: Path) -> None:
+    for name in ("anna", "ben"):
+        write(tmp_path, name)
+    assert "ben:" not in call(str(tmp_path / "anna")).output
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", "{"])
+def test_garbled_scores_are_an_error_with_a_remedy(tmp_path: Path, text: str) -> None:
+    (tmp_path / "anna").mkdir()
+    (tmp_path / "anna" / "metrics.json").write_text(text)
+    done = call("--data", str(tmp_path))
+    assert done.exit_code == 1 and "metrics.json" in done.output and "dvc repro" in done.output
+
+
+def test_nothing_made_yet_is_said(tmp_path: Path) -> None:
+    assert "no subject has been evaluated yet" in call("--data", str(tmp_path)).output

@@ -1,0 +1,42 @@
+"""Films of held-out cameras: every frame comes back, truth left and asset right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from facefolds_core.scoring.films import FilmFolder
+
+
+def decoded(path: Path) -> list[np.ndarray]:
+    with av.open(str(path)) as container:
+        return [frame.to_ndarray(format="rgb24") / 255 for frame in container.decode(video=0)]
+
+
+@pytest.mark.parametrize("size", [(32, 24), (33, 25)])
+def test_every_frame_comes_back_side_by_side(tmp_path: Path, size: tuple[int, int]) -> None:
+    height, width = size
+    greys = [0.2, 0.5, 0.8]
+    folder = FilmFolder(tmp_path, 30.0, 10)
+    with folder.roll("a/b") as roll:
+        assert roll is not None
+        for k, grey in enumerate(greys):
+            roll.add(f"{k:03d}", np.full((height, width, 3), grey), np.full((height, width, 3), 1 - grey))
+    (film,) = folder.files
+    assert (film.camera, film.frames, film.fps) == ("a/b", ("000", "001", "002"), 30)
+    pictures = decoded(tmp_path / film.file)
+    assert len(pictures) == 3
+    for picture, grey in zip(pictures, greys, strict=True):
+        assert picture.shape[1] == 2 * width
+        np.testing.assert_allclose(picture[: height - 2, 2 : width - 4].mean(), grey, atol=0.02)
+        np.testing.assert_allclose(picture[: height - 2, width + 4 : -4].mean(), 1 - grey, atol=0.02)
+
+
+def test_a_still_scene_has_none(tmp_path: Path) -> None:
+    folder = FilmFolder(tmp_path, 0.0, 18)
+    with folder.roll("a") as roll:
+        assert roll is None
+    assert (folder.files, list(tmp_path.iterdir())) == ([], [])

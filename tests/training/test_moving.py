@@ -1,0 +1,110 @@
+"""Training rays of a head that turns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.track import Track
+from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.params import MovingParams
+from facefolds_core.training.explicit.views import MovingRays, trace_views
+from facefolds_core.training.rays import RaySampler
+from tests.geometry.test_track import about
+from tests.scenes import CENTRE, make_scene
+
+STILL = Track.of([np.eye(3)] * 2, np.zeros((2, 3)))
+TURNED = Track.of([np.eye(3), about((0, 0, 1), 15)], [[0, 0, 0], [0.02, 0.01, 0]])
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return make_scene(tmp_path_factory.mktemp("moving") / "scene", size=24)
+
+
+def layers() -> RadialManifolds:
+    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
+    return RadialManifolds((float(CENTRE[0]), 0.0, 0.0), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
+
+
+def rays(scene: Scene, stride: int = 1, share: float = 400.0, **params: int) -> MovingRays:
+    return MovingRays(scene, layers(), stride, share, MovingParams(**{"shares": 1000, "sample": 1, **params}))
+
+
+def seen(found: MovingRays, frame: int, parts: int) -> dict[tuple[int, int], tuple[int, ...]]:
+    """(camera, pixel) -> codes, of all parts of a frame; none twice."""
+    rows = {}
+    for phase in range(parts):
+        views, which = found.part(frame, phase, parts)
+        for ray in which:
+            key = (int(views.camera[ray]), int(views.pixel[ray]))
+            assert key not in rows
+            rows[key] = tuple(views.codes[ray].ravel().tolist())
+    return rows
+
+
+@pytest.mark.parametrize("stride", [1, 5])
+def test_in_a_head_that_stands_still_all_shares_are_the_still_rays(scene: Scene, stride: int) -> None:
+    found = rays(replace(scene, poses=STILL), stride)
+    still = trace_views(scene, layers(), stride)
+    expected = {
+        (int(c), int(p)): tuple(codes.ravel().tolist())
+        for c, p, codes in zip(still.camera, still.pixel, still.codes, strict=True)
+    }
+    assert seen(found, 1, found.shares) == expected
+    assert found.count == pytest.approx(len(expected), rel=0.01)
+
+
+def test_finer_parts_are_the_same_rays(scene: Scene) -> None:
+    found = rays(replace(scene, poses=TURNED))
+    assert seen(found, 1, 3 * found.shares) == seen(found, 1, found.shares)
+
+
+def test_each_frame_has_the_rays_of_its_own_cameras(scene: Scene) -> None:
+    turned = replace(scene, poses=TURNED)
+    found = rays(turned)
+    first = scene.indices("train")[0]
+    moved = replace(scene, cameras=tuple(turned.camera_in_head(i, 1) for i in range(len(scene.cameras))))
+    expected = trace_views(moved, layers(), 1)
+    own = expected.camera == 0
+    assert first == 0
+    rows = {pixel: codes for (camera, pixel), codes in seen(found, 1, found.shares).items() if camera == 0}
+    assert rows == {
+        int(p): tuple(codes.ravel().tolist()) for p, codes in zip(expected.pixel[own], expected.codes[own], strict=True)
+    }
+
+
+def test_what_does_not_fit_is_traced_anew_and_is_the_same(scene: Scene) -> None:
+    turned = replace(scene, poses=TURNED)
+    kept, anew = rays(turned), rays(turned, cache_megabytes=0)
+    assert kept.part(1, 0, kept.shares)[0] is kept.part(1, 0, kept.shares)[0]
+    assert anew.part(1, 0, anew.shares)[0] is not anew.part(1, 0, anew.shares)[0]
+    assert seen(kept, 1, kept.shares) == seen(anew, 1, anew.shares)
+
+
+def test_few_shares_still_meet_every_pixel_over_the_frames(scene: Scene) -> None:
+    """Of a head that hardly moves, so that its pixels are the same: five shares, one a frame."""
+    long = replace(scene, frame_ids=tuple("abcde"), poses=Track.of([np.eye(3)] * 5, np.zeros((5, 3))))
+    every = rays(long)
+    few = rays(long, share=every.count / 5, shares=1)
+    assert few.shares == 5
+    pixels = [set(seen(few, frame, 1)) for frame in range(5)]
+    assert set().union(*pixels) == set(seen(every, 0, every.shares))
+
+
+def test_perceptrons_rays_come_from_the_cameras_of_their_frame(scene: Scene) -> None:
+    turned = replace(scene, poses=TURNED)
+    sampler = RaySampler(turned, torch.tensor(CENTRE, dtype=torch.float32), 0.45, torch.device("cpu"))
+    drawn = sampler.draw(400, torch.Generator().manual_seed(0))
+    store = turned.open_frames()
+    for o, d, t, rgb in zip(drawn.origins, drawn.directions, drawn.time, drawn.rgb, strict=True):
+        views = [(c, turned.camera_in_head(c, int(t))) for c in turned.indices("train")]
+        c, camera = min(views, key=lambda pair: float(np.abs(pair[1].centre - o.numpy()).sum()))
+        assert camera.centre == pytest.approx(o.numpy(), abs=1e-5)
+        (x, y), _ = camera.project((o + d).numpy().astype(float))
+        assert x % 1 == pytest.approx(0.5, abs=2e-3) and y % 1 == pytest.approx(0.5, abs=2e-3)
+        assert rgb.numpy() * 255 == pytest.approx(store.image(c, int(t))[int(y), int(x)], abs=0.01)

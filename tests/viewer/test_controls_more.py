@@ -1,0 +1,130 @@
+"""What the player offers beside playing: other views, pictures, code to embed; small, idle, for all eyes and keys."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.asset import read_asset
+from facefolds_core.rendering import AssetCaster, composite
+from tests.pictures import five_cameras, psnr
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+
+
+@pytest.fixture
+def player(new_player: NewPlayer, rich: Path) -> Player:
+    player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    return player
+
+
+def test_opacity_depth_and_texture_coordinates(player: Player, rich: Path) -> None:
+    asset, camera = read_asset(rich), five_cameras(160)[0]
+    _, alpha = composite(AssetCaster(asset).cast(camera), asset.frame(0))
+    player.button("Settings")
+    show = player.page.get_by_label("Show")
+    show.select_option("Opacity")
+    seen = player.capture(camera)
+    assert psnr(seen[..., 0], alpha) >= 40
+    assert np.ptp(seen[..., :3], axis=-1).max() == 0  # grey
+    solid = alpha > 0.98
+    show.select_option("Depth")
+    depth = player.capture(camera)[..., 0]
+    rows, columns = np.nonzero(solid)
+    middle = np.hypot(rows - rows.mean(), columns - columns.mean())
+    assert depth[solid][middle < 8].mean() > depth[solid][middle > 0.8 * middle.max()].mean()  # nearer is brighter
+    show.select_option("Texture coordinates")
+    uv = player.capture(camera)
+    assert np.abs(uv[..., 2][solid] - 0.35).max() < 0.02
+    assert np.corrcoef(uv[..., 0][solid], columns)[0, 1] > 0.9  # s to the right
+    assert np.corrcoef(uv[..., 1][solid], rows)[0, 1] > 0.9  # t down
+
+
+def test_a_picture_is_saved(player: Player) -> None:
+    player.page.locator("canvas").focus()
+    with player.page.expect_download() as download:
+        player.page.keyboard.press("i")
+    assert download.value.suggested_filename == "caps-1.png"
+    saved = np.asarray(Image.open(io.BytesIO(Path(download.value.path()).read_bytes())).convert("RGBA")) / 255
+    assert np.abs(saved - player.capture()).max() <= 1 / 255
+
+
+def test_the_code_to_embed_plays(player: Player) -> None:
+    player.run("e.player.view.set({azimuth: 12, elevation: 3, distance: 1.1, target: [0, 0, 0]})")
+    player.button("Settings")
+    player.button("Embed")
+    frame = player.page.get_by_label("As a frame").input_value()
+    element = player.page.get_by_label("As an element").input_value()
+    player.page.keyboard.press("Escape")
+    assert player.run("return [e.shadowRoot.querySelector('dialog').open]") == [False]
+    assert "view=12,3,1.1,0,0,0" in frame
+    page_of_yours(player, element + frame)
+    player.wait("e.ready")
+    player.page.locator("iframe").scroll_into_view_if_needed()
+    player.page.frame_locator("iframe").locator("facefolds-player canvas").wait_for()
+
+
+def test_escape_closes_what_is_open(player: Player) -> None:
+    player.button("Settings")
+    player.page.keyboard.press("Escape")
+    assert not player.page.locator(".panel").is_visible()
+    assert player.run("return e.shadowRoot.activeElement.dataset.do") == "settings"
+
+
+def test_the_bar_goes_while_it_plays_and_comes_back(player: Player) -> None:
+    player.page.mouse.move(300, 100)
+    player.run("e.speed = 0.1; e.play()")
+    player.wait("e.shadowRoot.querySelector('.stage').classList.contains('idle')")
+    player.page.mouse.move(320, 120)
+    player.wait("!e.shadowRoot.querySelector('.stage').classList.contains('idle')")
+    player.run("e.pause()")
+    player.page.wait_for_timeout(3300)
+    assert not player.run("return e.shadowRoot.querySelector('.stage').classList.contains('idle')")
+
+
+@pytest.mark.parametrize("size", [(280, 160), (240, 320)])
+def test_a_small_player_has_what_it_needs_in_one_line(new_player: NewPlayer, rich: Path, size: tuple[int, int]) -> None:
+    player = new_player({"asset": rich}, viewport={"width": size[0], "height": size[1]})
+    player.open("asset")
+    boxes = [button.bounding_box() for button in player.page.locator(".bar button:visible").all()]
+    assert len(boxes) == 3
+    assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= size[0] for box in boxes)
+    assert len({round(box["y"]) for box in boxes if box}) == 1
+
+
+def test_forced_colours_show_what_is_pressed(player: Player) -> None:
+    player.page.emulate_media(forced_colors="active")
+    look = "return getComputedStyle(e.shadowRoot.querySelector(`[data-do=${v}]`)).backgroundColor"
+    assert player.run(look, "loop") != player.run(look, "settings")
+
+
+def test_the_counter_is_quiet(player: Player) -> None:
+    """A screen reader is not told every frame."""
+    assert player.run(
+        "return [...e.shadowRoot.querySelectorAll('.bar output, .bar [aria-live]')].length"
+    ) == 0  # fmt: skip
+    assert player.run("return e.shadowRoot.querySelector('.count').ariaHidden") == "true"
+
+
+def test_a_page_with_a_strict_policy(new_player: NewPlayer, rich: Path) -> None:
+    """No inline styles, no blobs of scripts: only what must be."""
+    player = new_player({"asset": rich})
+    policy = (
+        "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'; "
+        "img-src 'self' blob: data:; media-src blob:; style-src 'self'"
+    )
+    html = (
+        '<!doctype html><link rel="icon" href="data:,"><script type="module" src="facefolds-player.js"></script>'
+        '<facefolds-player src="asset/"></facefolds-player>'
+    )
+    headers = {"Content-Security-Policy": policy}
+    player.page.route(
+        "**/strict.html", lambda route: route.fulfill(body=html, content_type="text/html", headers=headers)
+    )
+    player.page.goto(f"{player.address}strict.html")
+    player.wait("e.level === 'full'")

@@ -1,0 +1,231 @@
+"""The player as an element among others: what it takes of the page, what it gives back, what it keeps."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from tests.viewer.conftest import PATIENCE, NewPlayer, Player, page_of_yours
+
+COUNT_FRAMES = """window.frames_asked = 0; const ask = requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (act) => { ++window.frames_asked; return ask(act); };"""
+TALL = '<div style="height:3000px"></div>'
+ONE = '<facefolds-player src="asset/" style="height:300px" {0}></facefolds-player>'
+
+
+def names(player: Player) -> list[str]:
+    return [Path(urlsplit(url).path).name for url in player.requests]
+
+
+def opened(new_player: NewPlayer, asset: Path, body: str, script: str = "", **options: object) -> Player:
+    player = new_player({"asset": asset}, script=script, **options)
+    page_of_yours(player, body)
+    player.page.locator("facefolds-player").first.wait_for(state="attached")
+    return player
+
+
+@pytest.mark.parametrize(
+    ("colour", "seen"),
+    [
+        ("#fff", (255, 255, 255, 255)),
+        ("rebeccapurple", (0x66, 0x33, 0x99, 255)),
+        ("rgb(0 200 100 / 50%)", (0, 100, 50, 128)),  # premultiplied
+        ("var(--mine)", (1, 2, 3, 255)),
+    ],
+)
+def test_any_colour_of_css_is_a_background(
+    new_player: NewPlayer, rich: Path, colour: str, seen: tuple[int, ...]
+) -> None:
+    body = f'<style>:root {{ --mine: rgb(1 2 3) }}</style>{ONE.format(f"""background="{colour}" """)}'
+    player = opened(new_player, rich, body)
+    player.wait("e.ready")
+    assert np.abs(player.capture()[0, 0] * 255 - seen).max() <= 1
+
+
+def test_what_is_no_colour_is_refused_and_changes_nothing(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format('background="#ff0000"'))
+    player.wait("e.ready")
+    assert player.run("try { e.background = 'nonsense' } catch (error) { return [error.name, e.background] }") == [
+        "TypeError",
+        "#ff0000",
+    ]
+
+
+def test_the_wheel_scrolls_the_page_until_the_player_is_meant(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format("") + TALL)
+    player.wait("e.ready")
+    before = player.run("return e.player.view.goal.distance")
+    mouse = player.page.mouse
+    mouse.move(200, 100)
+    mouse.wheel(0, 60)
+    player.page.wait_for_function("() => scrollY > 0")
+    assert player.run("return e.player.view.goal.distance") == before
+    player.page.evaluate("() => scrollTo(0, 0)")
+    player.page.keyboard.down("Control")
+    mouse.wheel(0, -60)
+    player.page.keyboard.up("Control")
+    player.wait(f"e.player.view.goal.distance < {before}")
+    player.run("e.player.view.reset()")
+    mouse.click(200, 100)  # now it has the focus
+    mouse.wheel(0, -60)
+    player.wait(f"e.player.view.goal.distance < {before}")
+    assert player.page.evaluate("() => scrollY") == 0
+
+
+def test_one_finger_scrolls_the_page_upright_and_turns_across(new_player: NewPlayer, rich: Path) -> None:
+    phone = {"viewport": {"width": 390, "height": 600}, "has_touch": True, "is_mobile": True}
+    player = opened(new_player, rich, ONE.format("") + TALL, **phone)
+    player.wait("e.ready")
+    assert player.run("return getComputedStyle(e.shadowRoot.querySelector('canvas')).touchAction") == "pan-y"
+    client = player.page.context.new_cdp_session(player.page)
+    touch = lambda kind, *points: client.send(  # noqa: E731
+        "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
+    )
+    touch("touchStart", (200, 200))
+    for k in range(1, 13):
+        touch("touchMove", (200, 200 - 10 * k))
+    touch("touchEnd")
+    player.page.wait_for_function("() => scrollY > 50")
+    assert player.run("return [e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [0, 0]
+    player.page.wait_for_timeout(1000)  # the page has come to rest
+    player.page.evaluate("() => scrollTo(0, 0)")
+    touch("touchStart", (200, 150))
+    for k in range(1, 9):
+        touch("touchMove", (200 - 10 * k, 150))
+    touch("touchEnd")
+    player.wait("e.player.view.goal.azimuth > 5")
+    assert player.page.evaluate("() => scrollY") == 0
+
+
+def test_twenty_players_share_one_context_and_give_it_back(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 20 * ONE.format('controls="none"'), viewport={"width": 400, "height": 6000})
+    player.page.wait_for_function(
+        "() => [...document.querySelectorAll('facefolds-player')].every((e) => e.ready)", timeout=PATIENCE
+    )
+    all_of_them = "const all = [...document.querySelectorAll('facefolds-player')];"
+    assert player.run(
+        f"""{all_of_them} const count = new Set(all.map((e) => e.player.renderer.graphics.gl)).size;
+        const middle = all.map(({{ player: {{ canvas }} }}) => [...canvas.getContext('2d').getImageData(
+          canvas.width / 2, canvas.height / 2, 1, 1).data].join());
+        return [count, all.some((e) => e.player.lost), middle.every((pixel) => pixel !== '22,24,29,255')];"""
+    ) == [1, False, True]
+    assert player.run(
+        f"""{all_of_them} const {{ gl }} = all[0].player.renderer.graphics; const before = gl.isContextLost();
+        for (const one of all) one.remove(); await 0; return [before, gl.isContextLost()];"""
+    ) == [False, True]
+
+
+def test_nothing_moves_at_rest(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format(""), COUNT_FRAMES)
+    player.wait("e.level === 'full'")
+    player.page.wait_for_timeout(300)
+    assert player.run(
+        "const n = frames_asked; await new Promise((done) => setTimeout(done, 500)); return frames_asked - n"
+    ) == (0)
+    player.run("e.play()")
+    player.wait("frames_asked > 5")
+
+
+def test_off_the_screen_nothing_is_drawn_decoded_or_fetched(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, TALL + ONE.format(""), COUNT_FRAMES)
+    player.wait("e.ready")
+    player.run("e.play()")
+    player.page.wait_for_timeout(600)
+    assert "coarse.mp4" in names(player)
+    assert "full.mp4" not in names(player)
+    rest = """const n = [frames_asked, e.frame, e.player.drawn.length];
+        await new Promise((done) => setTimeout(done, 500));
+        return [frames_asked - n[0], e.frame - n[1], e.playing];"""
+    assert player.run(rest) == [0, 0, True]
+    player.page.evaluate("() => scrollTo(0, 3000)")
+    player.wait("e.level === 'full' && e.frame > 0")
+    player.page.evaluate("() => scrollTo(0, 0)")
+    player.wait("!e.player.onScreen")
+    assert player.run(rest) == [0, 0, True]
+
+
+def test_a_lazy_player_waits_until_it_is_near(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, TALL + ONE.format('loading="lazy"'))
+    player.page.wait_for_timeout(500)
+    assert "manifest.json" not in names(player)
+    player.page.evaluate("() => scrollTo(0, 3000)")
+    player.wait("e.ready")
+
+
+def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format('level="coarse"'))
+    player.wait("e.ready")
+    assert player.run("return e.level") == "coarse"
+    player.run("e.setAttribute('level', 'full')")
+    player.wait("e.level === 'full'")
+    player.run("e.level = 'coarse'")
+    player.wait("e.level === 'coarse'")
+    player.run("e.removeAttribute('level')")
+    player.wait("e.level === 'full' && e.player.detail.auto")
+
+
+def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format("") + '<div id="other"></div>')
+    player.wait("e.level === 'full'")
+    player.run("await e.seek(3); e.spread = 0.5; e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
+               "target: [0, 0, 0]})")  # fmt: skip
+    count = len(names(player))
+    moved = "const b = e.player; document.querySelector('#other').append(e); await 0; return [e.player === b, e.frame]"
+    assert player.run(moved) == [True, 3]
+    assert len(names(player)) == count  # nothing was loaded again
+    player.run("const other = e.parentElement; e.remove(); await 0; other.append(e)")
+    player.wait("e.ready && e.frame === 3")
+    view = player.run("return e.player.view.get()")
+    assert isinstance(view, dict)
+    assert view["azimuth"] == pytest.approx(30)
+    assert player.run("return e.spread") == 0.5
+
+
+def test_auto_steps_down_where_pictures_are_late_and_up_again(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, ONE.format(""))
+    player.wait("e.level === 'full'")
+    player.run(
+        """window.slow = true; e.addEventListener('frame', () => {
+          for (const end = performance.now() + 120; slow && e.level === 'full' && performance.now() < end;); });
+        e.speed = 0.5; e.play();"""
+    )
+    player.wait("e.level === 'coarse'")
+    player.run("slow = false; e.player.detail.adaptation.wait = 0.5")
+    player.wait("e.level === 'full'")
+
+
+def test_many_sizes_do_not_disturb_each_other(new_player: NewPlayer, rich: Path) -> None:
+    """The shared canvas is as large as the largest: a small player copies its own part."""
+    small = '<facefolds-player src="asset/" controls="none" style="width:120px; height:150px"></facefolds-player>'
+    player = opened(new_player, rich, small + ONE.format('controls="none"'))
+    player.page.wait_for_function("() => [...document.querySelectorAll('facefolds-player')].every((e) => e.ready)")
+    difference = player.run(
+        """e.pause(); await e.seek(2); const { canvas } = e.player; const seen = e.capture().data;
+        const there = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+        return Math.max(...there.map((value, i) => Math.abs(value - seen[i])));"""
+    )
+    assert isinstance(difference, int | float)
+    assert difference <= 1
+
+
+def test_a_folder_without_an_address_plays(new_player: NewPlayer, rich: Path, tmp_path: Path) -> None:
+    """A ZIP that is dropped on the page."""
+    archive = Path(shutil.make_archive(str(tmp_path / "asset"), "zip", rich.parent, rich.name))
+    player = new_player({"asset": rich})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    code = """const bytes = Uint8Array.from(atob(v), (sign) => sign.charCodeAt(0)); const transfer = new DataTransfer();
+        transfer.items.add(new File([bytes], 'asset.zip')); window.before = e.player;
+        dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, cancelable: true, bubbles: true }));"""
+    player.requests.clear()
+    player.run(code, base64.b64encode(archive.read_bytes()).decode())
+    player.wait("e.player !== before && e.level === 'full'")
+    assert "full.mp4" not in names(player)
+    transfer = "const t = new DataTransfer(); t.items.add(new File(['x'], 'x.txt'));"
+    player.run(transfer + "dispatchEvent(new DragEvent('drop', { dataTransfer: t, cancelable: true }));")
+    assert "no manifest.json" in player.notice()

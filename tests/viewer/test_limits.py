@@ -1,0 +1,138 @@
+"""What was filmed bounds the view, softly; the head stands above the bar at every size; reset, sway."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.fixtures import change_manifest
+
+FILMED = {"azimuth": [-30, 40], "elevation": [-10, 20]}
+
+
+@pytest.fixture
+def player(new_player: NewPlayer, rich_copy: Path) -> Player:
+    change_manifest(rich_copy, lambda value: value.update(view=FILMED))
+    player = new_player({"asset": rich_copy}, viewport={"width": 760, "height": 500})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    return player
+
+
+def test_a_drag_beyond_what_was_filmed_meets_resistance_fades_and_comes_back(player: Player) -> None:
+    mouse = player.page.mouse
+    mouse.move(600, 200)
+    mouse.down()
+    mouse.move(100, 200, steps=10)  # far more than the range
+    player.wait("e.player.view.strength < 0.3")
+    assert player.run("return e.player.view.get().azimuth < 70")
+    background = [0x16, 0x18, 0x1D]
+    pixel = "return [...e.shadowRoot.querySelector('canvas').getContext('2d').getImageData(380, 200, 1, 1).data]"
+    faded = player.run(pixel)
+    assert isinstance(faded, list)
+    assert np.abs(np.array(faded[:3]) - background).max() < 80
+    mouse.up()
+    player.wait("e.player.view.strength === 1 && e.player.view.get().azimuth < 44.1")
+
+
+def test_a_link_beyond_what_was_filmed_shows_the_nearest_that_was(player: Player) -> None:
+    player.run("e.state = { view: { azimuth: 170, elevation: 60, distance: 1, target: [0, 0, 0] } }")
+    view = player.run("return e.player.view.get()")
+    assert isinstance(view, dict)
+    assert [view["azimuth"], view["elevation"]] == pytest.approx([44, 24])
+
+
+def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) -> None:
+    player.page.locator("canvas").focus()
+    player.page.keyboard.press("p")
+    player.wait("e.player.view.get().azimuth > 54 && e.player.view.strength === 1")
+    player.page.keyboard.press("p")
+    player.wait("Math.abs(e.player.view.get().azimuth) < 1")
+
+
+def test_an_exact_camera_is_never_bounded(player: Player) -> None:
+    player.run(
+        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
+        "w2c: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 1]]})"
+    )
+    assert player.run("return e.player.view.strength") == 1
+
+
+def lowest_and_highest(player: Player) -> tuple[float, float]:
+    """Rows of the picture that show anything, CSS pixels."""
+    player.run("e.background = '#00ff00'; await new Promise(requestAnimationFrame)")
+    shown = player.capture()[..., :3]
+    rows = np.flatnonzero((np.abs(shown - (0, 1, 0)).max(-1) > 0.1).any(1))
+    return float(rows[0]), float(rows[-1])
+
+
+def test_the_head_stands_above_the_bar_at_every_size(player: Player) -> None:
+    for width, height in ((760, 500), (390, 700), (700, 300), (360, 240)):
+        player.page.set_viewport_size({"width": width, "height": height})
+        player.wait(f"e.player.size[0] === {width} && e.player.size[1] === {height}")
+        player.page.wait_for_timeout(100)
+        bar = player.page.locator(".bar").bounding_box()
+        assert bar
+        high, low = lowest_and_highest(player)
+        assert 0 < high < low <= bar["y"] + 1, (width, height)
+        assert low - high > 0.3 * min(width, bar["y"]), (width, height)
+
+
+def test_the_sheet_of_a_phone_leaves_the_face_in_sight(player: Player) -> None:
+    player.page.set_viewport_size({"width": 390, "height": 700})
+    player.wait("e.player.size[0] === 390")
+    player.button("Settings")
+    panel = player.page.locator(".panel")
+    panel.wait_for()
+    player.page.wait_for_timeout(200)
+    box = panel.bounding_box()
+    assert box
+    high, low = lowest_and_highest(player)
+    assert 0 < high < low <= box["y"] + 1
+
+
+def test_a_view_that_somebody_chose_stays_when_the_size_changes(player: Player) -> None:
+    player.run("e.player.view.set({azimuth: 20, elevation: 5, distance: 0.8, target: [0, 0, 0]})")
+    player.page.set_viewport_size({"width": 400, "height": 640})
+    player.wait("e.player.size[0] === 400")
+    view = player.run("return e.player.view.get()")
+    assert isinstance(view, dict)
+    assert [view["azimuth"], view["distance"]] == pytest.approx([20, 0.8])
+
+
+def test_reset_brings_everything_back(player: Player) -> None:
+    before = player.capture()
+    player.run(
+        """e.player.view.set({azimuth: 20, elevation: 5, distance: 0.8, target: [0, 0.1, 0]});
+        e.background = 'white'; e.spread = 0.3; e.layers = [true, false, true]; e.wireframe = true; e.effects = false;
+        e.mode = 'depth'; e.speed = 2; e.loop = false; e.level = 'coarse';"""
+    )
+    player.wait("e.level === 'coarse'")
+    player.page.locator("canvas").focus()
+    player.page.keyboard.press("0")
+    player.wait("e.level === 'full'")
+    assert player.run("return [e.speed, e.loop, e.mode, e.spread, e.wireframe]") == [1, True, "colour", 0, False]
+    assert np.abs(player.capture() - before).max() <= 1 / 255
+
+
+def test_it_sways_until_somebody_touches_it(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
+    player.open("asset", "")
+    player.wait("e.playing && e.player.view.swaying > 0.5")
+    player.page.mouse.move(300, 200)
+    player.page.mouse.down()
+    player.page.mouse.up()
+    assert player.run("return e.player.view.swaying") == 0
+
+
+@pytest.mark.parametrize(("view", "options"), [("view=10,0,1,0,0,0", {}), ("", {"reduced_motion": "reduce"})])
+def test_a_chosen_view_and_reduced_motion_do_not_sway(
+    new_player: NewPlayer, rich: Path, view: str, options: dict
+) -> None:
+    player = new_player({"asset": rich}, **options)
+    player.open("asset", view)
+    player.page.wait_for_timeout(200)
+    assert player.run("return e.player.view.swaying") == 0

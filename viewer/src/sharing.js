@@ -1,0 +1,54 @@
+/** What leaves the page: links, code to embed, pictures. */
+import { encode } from "./viewstate.js";
+
+/** Address of the full-page player with this asset and view. @param {import("./element.js").FacefoldsPlayer} element */
+export function linkTo(element) {
+  const page = new URL("./index.html", import.meta.url);
+  page.searchParams.set("src", new URL(element.getAttribute("src"), document.baseURI).href.replace(page.origin, ""));
+  page.hash = encode(element.state);
+  return page.href;
+}
+
+/** HTML for a page of somebody else's. @returns {{frame: string, element: string}} */
+export function embedCode(element) {
+  const quoted = (text) => text.replace(/&/g, "&amp;").replace(/"/g, "&quot;");
+  const script = new URL("./facefolds-player.js", import.meta.url).href;
+  const source = new URL(element.getAttribute("src"), document.baseURI).href;
+  const title = element.player?.manifest?.subject || "facefolds";
+  return {
+    frame: `<iframe src="${quoted(linkTo(element))}" title="${quoted(title)}" width="640" height="480" style="border: 0" loading="lazy" allow="fullscreen; clipboard-write"></iframe>`,
+    element: `<script type="module" src="${quoted(script)}"></script>\n<facefolds-player src="${quoted(source)}" loading="lazy" style="height: 480px"></facefolds-player>`,
+  };
+}
+
+/** A picture as a file. @param {ImageData} picture premultiplied, as `capture` gives it @returns {Promise<Blob>} PNG */
+export async function asPng({ data, width, height }) {
+  const straight = new ImageData(width, height);
+  for (let i = 0; i < data.length; i += 4) {
+    const alpha = data[i + 3];
+    for (let k = 0; k < 3; ++k) straight.data[i + k] = alpha ? Math.round((255 * data[i + k]) / alpha) : 0;
+    straight.data[i + 3] = alpha;
+  }
+  const canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d").putImageData(straight, 0, 0);
+  return canvas.convertToBlob({ type: "image/png" });
+}
+
+/** Offers a file for download. */
+export function save(blob, name) {
+  const anchor = document.createElement("a");
+  anchor.href = URL.createObjectURL(blob);
+  anchor.download = name;
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(anchor.href), 60000);
+}
+
+/** @returns {Promise<boolean>} whether the browser allowed it */
+export async function toClipboard(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    return true;
+  } catch {
+    return false;
+  }
+}

@@ -1,0 +1,46 @@
+/** All controls of the player, put together; what they need of the element's size and gestures. */
+import { connectBar } from "./bar.js";
+import { Comparison } from "./compare.js";
+import { connectEmbed } from "./embed.js";
+import { connectIdle } from "./idle.js";
+import { connectKeys } from "./keys.js";
+import { connectPanel } from "./panel.js";
+
+const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
+
+/** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
+export function connectControls(element) {
+  const { player, shadowRoot: root } = element;
+  const stage = root.querySelector(".stage");
+  const [bar, panel] = [".bar", ".panel"].map((name) => root.querySelector(name));
+  element.comparison = new Comparison(element);
+  connectBar(element);
+  connectPanel(element);
+  connectEmbed(element);
+  connectKeys(element);
+  connectGesturesOf(element);
+  const idle = connectIdle(element);
+  const resizing = new ResizeObserver(() => {
+    // The bar, and on a phone the open sheet of the settings: the head stands above them.
+    const sheet = panel.offsetHeight && panel.offsetTop > stage.clientHeight / 3;
+    const top = sheet ? panel.offsetTop : bar.offsetTop;
+    const below = bar.offsetHeight ? stage.clientHeight - top : 0;
+    player.resize(stage.clientWidth, stage.clientHeight, Math.min(RATIO, devicePixelRatio), below);
+  });
+  for (const part of [stage, bar, panel]) resizing.observe(part);
+  return () => {
+    resizing.disconnect();
+    idle();
+  };
+}
+
+/** The wheel zooms where that takes nothing from the page: with the focus, in full screen, or with Ctrl. */
+function connectGesturesOf(element) {
+  const { player, shadowRoot: root } = element;
+  const own = () => element.getAttribute("gestures") === "all" || document.fullscreenElement === element;
+  player.view.wheels = () => own() || root.activeElement !== null;
+  let told = 0;
+  player.canvas.addEventListener("unwanted-wheel", () => {
+    if (told++ < 2) element.overlays.say("Ctrl + wheel zooms, or click first");
+  });
+}

@@ -1,0 +1,14 @@
+// Compiled, never run: what a program in TypeScript may write.
+import { FacefoldsPlayer, type ViewState } from "../types.js";
+
+const element = document.createElement("facefolds-player");
+const player: FacefoldsPlayer = element;
+const state: ViewState = { frame: 3, mode: "depth" };
+player.state = state;
+player.addEventListener("error", ({ detail }) => ("remedy" in detail ? detail.remedy : detail.message));
+player.seek(3).then((drawn: boolean) => drawn);
+player.screenshot().then((blob) => blob.size);
+// @ts-expect-error: not a mode
+player.mode = "colours";
+// @ts-expect-error: read only
+player.frame = 3;

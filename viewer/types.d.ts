@@ -1,0 +1,128 @@
+/** Types of facefolds-player. Importing the module defines the element <facefolds-player>. */
+
+export type Mode = "colour" | "alpha" | "depth" | "uv";
+
+/** Degrees; azimuth from before the subject (+x) to its left (+y). */
+export interface Orbit {
+  azimuth: number;
+  elevation: number;
+  distance: number;
+  target: number[];
+}
+
+/** A pinhole camera: K by rows, pixel centres at (i + 0.5, j + 0.5); w2c = (R | t) by rows, OpenCV's axes. */
+export interface Camera {
+  K: number[][];
+  w2c: number[][];
+  width: number;
+  height: number;
+}
+
+/** What a link holds; layers and photos by index. */
+export interface ViewState {
+  frame?: number;
+  view?: Orbit;
+  level?: string;
+  background?: string;
+  hidden?: number[];
+  spread?: number;
+  wireframe?: boolean;
+  effects?: boolean;
+  mode?: Mode;
+  speed?: number;
+  loop?: boolean;
+  photo?: number;
+}
+
+export interface Statistics {
+  fps: number;
+  layers: number;
+  triangles: number;
+  bytesLoaded: number;
+  gpuBytes: number;
+  level: string;
+  texture: [number, number];
+  canvas: [number, number];
+  video: string;
+  decoder: string;
+}
+
+export type FailureKind =
+  "missing" | "damaged" | "unsupported" | "codec" | "webgl" | "lost" | "offline" | "cors" | "csp" | "file";
+
+export interface PlayerError extends Error {
+  readonly remedy: string;
+  readonly file: string;
+  readonly kind: FailureKind;
+}
+
+export interface PlayerEvents {
+  ready: CustomEvent<null>;
+  level: CustomEvent<null>;
+  frame: CustomEvent<null>;
+  play: CustomEvent<null>;
+  pause: CustomEvent<null>;
+  change: CustomEvent<null>;
+  error: CustomEvent<PlayerError | Error>;
+}
+
+export class FacefoldsPlayer extends HTMLElement {
+  /** There is a picture. */
+  readonly ready: boolean;
+  /** The frame on the screen, from 0; -1 before the first. */
+  readonly frame: number;
+  readonly frames: number;
+  readonly fps: number;
+  readonly playing: boolean;
+  /** Names of the levels that this machine can show, coarsest first. */
+  readonly levels: string[];
+  readonly statistics: Statistics | undefined;
+  /** Address of the full page with this asset and view. */
+  readonly link: string;
+  /** Whether the asset has an address that others could open. */
+  readonly shareable: boolean;
+  loop: boolean;
+  speed: number;
+  /** Any colour of CSS. */
+  background: string;
+  /** How far the layers are pulled apart, 0 to 1. */
+  spread: number;
+  wireframe: boolean;
+  effects: boolean;
+  mode: Mode;
+  /** Which layers are drawn, outermost first. */
+  layers: boolean[];
+  /** Name of the level shown; to set also "auto". */
+  level: string;
+  state: ViewState;
+  play(): void;
+  pause(): void;
+  /** True once that frame has been drawn, false if another was asked for meanwhile. */
+  seek(frame: number): Promise<boolean>;
+  step(by?: number): Promise<boolean>;
+  reset(): void;
+  resetView(): void;
+  setCamera(camera: Camera | null): void;
+  capture(camera?: Camera): ImageData;
+  /** A PNG. */
+  screenshot(camera?: Camera): Promise<Blob>;
+  compare(photo: number | null): void;
+  /** Plays an asset that is at hand: name -> content, manifest.json among them. */
+  openFiles(files: Map<string, Blob>): void;
+  addEventListener<K extends keyof PlayerEvents>(
+    type: K,
+    listener: (this: FacefoldsPlayer, event: PlayerEvents[K]) => unknown,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+  addEventListener(
+    type: string,
+    listener: EventListenerOrEventListenerObject,
+    options?: boolean | AddEventListenerOptions,
+  ): void;
+}
+
+declare global {
+  interface HTMLElementTagNameMap {
+    "facefolds-player": FacefoldsPlayer;
+  }
+}
