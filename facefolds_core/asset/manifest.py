@@ -176,7 +176,7 @@ class Reflection(StoredFile):
         width, height: of the PNG.
         uv_window: (u0, u1, v0, v1), what gloss, offset and normals cover of the hemisphere's (u, v).
         environment_rect, gloss_rect, offset_rect, normals_rect: in pixels of the PNG.
-        environment_scale, gloss_scale, offset_scale: what code 255 means, code 0 being 0.
+        environment_scale, gloss_scale, offset_scale: what code 255 means; code 0 is 0, of the offset its negative.
     """
 
     width: Count

@@ -25,7 +25,7 @@ class ReflectionPicture:
     Attributes:
         codes: (height, width, 3) uint8.
         rects: of the four.
-        scales: what code 255 means, of the first three.
+        scales: what code 255 means, of the first three; code 0 is 0, of the offset its negative.
         window: (u0, u1, v0, v1) of the last three.
     """
 
@@ -38,10 +38,9 @@ class ReflectionPicture:
     def of(cls, maps: ReflectionMaps) -> ReflectionPicture:
         """Quantise maps and pack them."""
         gloss = np.repeat(maps.gloss[..., None], 3, 2)
-        parts = [maps.environment, gloss, maps.offset]
-        scales = [max(float(part.max()), 1e-6) for part in parts]
-        coded = [_codes(part / scale * 255) for part, scale in zip(parts, scales, strict=True)]
-        coded.append(_codes((maps.normals + 1) * 127.5))
+        scales = [max(float(np.abs(part).max()), 1e-6) for part in (maps.environment, gloss, maps.offset)]
+        coded = [_codes(part / scale * 255) for part, scale in zip((maps.environment, gloss), scales, strict=False)]
+        coded += [_codes((part + 1) * 127.5) for part in (maps.offset / scales[2], maps.normals)]
         tops = np.cumsum([0, *(len(part) for part in coded)])
         codes = np.zeros((int(tops[-1]), max(part.shape[1] for part in coded), 3), np.uint8)
         rects: list[Rect] = []
@@ -83,7 +82,7 @@ def read_reflection(folder: Path, level: Level) -> ReflectionMaps | None:
     return ReflectionMaps(
         entry.uv_window,
         gloss[..., 0] * np.float32(entry.gloss_scale / 255),
-        offset * np.float32(entry.offset_scale / 255),
+        (offset / np.float32(127.5) - 1) * np.float32(entry.offset_scale),
         normals / np.float32(127.5) - 1,
         environment * np.float32(entry.environment_scale / 255),
     )

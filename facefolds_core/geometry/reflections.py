@@ -34,7 +34,7 @@ class ReflectionMaps:
     Attributes:
         window: (u0, u1, v0, v1) that gloss, offset and normals cover.
         gloss: (h, w), not negative.
-        offset: (h, w, 3), not negative.
+        offset: (h, w, 3).
         normals: (h, w, 3), about unit length.
         environment: (e, e, 3), not negative.
     """

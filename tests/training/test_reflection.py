@@ -17,6 +17,7 @@ from facefolds_core.training.explicit.reflection import (
     centred,
     fit_maps,
     gain_on_cameras,
+    grounded,
     surface_normals,
     values_at,
 )
@@ -120,7 +121,15 @@ def test_a_known_reflection_is_found() -> None:
     left = seen.residual - found.added(seen.st, seen.directions)
     noise = 1e-4
     assert left.var() - noise < 0.1 * (seen.residual.var() - noise)  # seen: 0.07
-    assert found.gloss.min() >= 0 and found.environment.min() == 0
+    assert found.gloss.min() >= 0
+
+
+def test_light_begins_at_nothing_and_the_sum_stays() -> None:
+    maps, (st, along) = _random_maps(3), _rays(500)
+    lit = Maps(maps.gloss, maps.offset, maps.normals, maps.environment - np.float32(0.7))
+    found = grounded(lit)
+    assert found.environment.min() == 0
+    np.testing.assert_allclose(found.added(st, along), lit.added(st, along), atol=1e-5)
 
 
 @pytest.mark.parametrize("strength, helps", [(0.2, True), (0.0, False)])

@@ -70,7 +70,7 @@ vec3 reflected() {
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   vec3 light = lookAt(reflection, environmentRect, place).rgb * reflectionScales.x;
   float gloss = lookAt(reflection, glossRect, at).r * reflectionScales.y;
-  return gloss * light - lookAt(reflection, offsetRect, at).rgb * reflectionScales.z;
+  return gloss * light - (lookAt(reflection, offsetRect, at).rgb * 2.0 - 1.0) * reflectionScales.z;
 }
 #endif
 

@@ -19,6 +19,7 @@ from facefolds_core.training.explicit.reflection import (
     centred,
     fit_maps,
     gain_on_cameras,
+    grounded,
     surface_normals,
 )
 from facefolds_core.training.explicit.state import TextureState
@@ -75,7 +76,9 @@ class GlossFit:
         start = replace(Maps.blank(self.window, self.params), normals=self._normals) if first else self.maps
         assert start is not None
         rounds = self.params.first_rounds if first else self.params.rounds
-        self.maps = centred(fit_maps(used, start, rounds, self.params), used, self.params)
+        maps = grounded(fit_maps(used, start, rounds, self.params))
+        # Textures that are still trained would follow an offset that takes up what they leave over.
+        self.maps = maps if self.params.begin == "end" else centred(maps, used, self.params)
         self._shine(state, seen)
 
     def decide(self, state: TextureState, source: Rays, images: Images) -> Fact:

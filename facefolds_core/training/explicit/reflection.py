@@ -146,11 +146,14 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> 
     return replace(start, gloss=gloss, offset=offset, environment=environment)
 
 
-def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
-    """The same with the offset that leaves the mean over the rays at every place as it is without reflections, and an
-    environment that begins at 0."""
+def grounded(maps: Maps) -> Maps:
+    """The same with an environment that begins at 0: what is taken off it goes to the offset."""
     darkest = maps.environment.min((0, 1))
-    maps = replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
+    return replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
+
+
+def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
+    """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
     light = values_at(maps.environment, maps.positions(seen.st, seen.directions)) * values_at(
         maps.gloss[..., None], seen.st
     )

@@ -64,7 +64,7 @@ void fragment() {
 		vec2 from = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 0.000001));
 		vec3 light = read(reflection, environment_rect, reflection_size, from) * reflection_scales.x;
 		colour += light * read(reflection, gloss_rect, reflection_size, at).r * reflection_scales.y;
-		colour -= read(reflection, offset_rect, reflection_size, at) * reflection_scales.z;
+		colour -= (read(reflection, offset_rect, reflection_size, at) * 2.0 - 1.0) * reflection_scales.z;
 		colour = clamp(colour, 0.0, 1.0);
 	}
 	ALBEDO = OUTPUT_IS_SRGB ? colour : to_linear(colour);
