@@ -50,6 +50,8 @@ WORDS = {
     "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
     "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
     "its size, and `stabilize: false` takes it to stand still: expect a blurred or doubled face",
+    "poses_refused": "warning: the pictures of frame {frames} fit no pose of the head; they are given that between "
+    "their neighbours'",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
@@ -80,6 +82,8 @@ WORDS = {
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
+    "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
+    "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
     "mattes help (docs/guide/subjects.md)",

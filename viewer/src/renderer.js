@@ -7,7 +7,7 @@
  */
 import { Graphics } from "./gl/graphics.js";
 import { Upload } from "./gl/upload.js";
-import { eyeOf } from "./matrices.js";
+import { eyeOf, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
@@ -19,6 +19,7 @@ export class LayerRenderer {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.level = null;
+    this.pose = null;
     this.upload = null;
     this.visible = [];
     this.effectsOn = true;
@@ -47,6 +48,11 @@ export class LayerRenderer {
   /** @param {VideoFrame | HTMLVideoElement} image */
   setFrame(image) {
     this.upload.show(image);
+  }
+
+  /** Where the head stands from the next picture on. @param {import("./matrices.js").Matrix | null} matrix null: at rest */
+  setPose(matrix) {
+    this.pose = matrix;
   }
 
   /** After a lost context came back. The frame has to be given again. */
@@ -131,7 +137,7 @@ export class LayerRenderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.CULL_FACE);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    const passes = this.#passes(projection, view);
+    const passes = this.#passes(projection, this.pose ? multiplied(view, this.pose) : view);
     const count = this.level.geometries.length;
     for (let index = count - 1; index >= 0; --index) {
       if (!this.visible[index]) continue;
@@ -193,10 +199,11 @@ export class LayerRenderer {
     const { level, upload } = this;
     const { gl } = this.graphics;
     const head = "#version 300 es\n";
-    const colour = prepared(
-      upload.effects ? COLOUR_FRAGMENT.replace(head, `${head}#define EFFECTS 1\n`) : COLOUR_FRAGMENT,
-    );
+    const defines = (upload.effects ? "#define EFFECTS 1\n" : "") + (upload.reflection ? "#define REFLECTION 1\n" : "");
+    const colour = prepared(COLOUR_FRAGMENT.replace(head, head + defines));
     const { at } = colour;
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, upload.effects);
     gl.activeTexture(gl.TEXTURE0);
@@ -210,6 +217,15 @@ export class LayerRenderer {
       gl.uniform1i(at.effects, 1);
       gl.uniform1f(at.effectsScale, this.effectsOn ? level.info.effects.scale : 0);
     }
+    if (upload.reflection) {
+      const { environment, gloss, offset, normals, scales } = level.info.reflection;
+      gl.uniform1i(at.reflection, 2);
+      gl.uniform4fv(at.environmentRect, environment);
+      gl.uniform4fv(at.glossRect, gloss);
+      gl.uniform4fv(at.offsetRect, offset);
+      gl.uniform4fv(at.normalsRect, normals);
+      gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
+    }
     return colour;
   }
 
@@ -220,6 +236,7 @@ export class LayerRenderer {
     const [x, y, w, h] = info.layers[index].rect;
     gl.uniform4f(at.colourRect, cx + x, cy + y, w, h);
     gl.uniform2f(at.alphaOffset, ax - cx, ay - cy);
+    if (info.reflection) gl.uniform4fv(at.toMaps, toWindow(info.layers[index].window, info.reflection.window));
     if (!this.upload.effects) return;
     const [ex, ey, ew, eh] = info.layers[index].effectsRect;
     gl.uniform4fv(
@@ -274,7 +291,9 @@ export class LayerRenderer {
     });
     if (!Number.isFinite(low[0])) return { centre: [0, 0, 0], radius: 1, low: [-1, -1, -1], high: [1, 1, 1] };
     const centre = low.map((v, k) => (v + high[k]) / 2);
-    return { centre, radius: Math.hypot(...low.map((v, k) => (high[k] - v) / 2)), low, high };
+    const moved = this.pose ? transformed(this.pose, centre) : centre; // a ball that holds the head as it stands, too
+    const away = Math.hypot(...moved.map((v, k) => v - centre[k]));
+    return { centre, radius: away + Math.hypot(...low.map((v, k) => (high[k] - v) / 2)), low, high };
   }
 
   dispose() {
@@ -284,6 +303,12 @@ export class LayerRenderer {
 }
 
 const cssOf = ([r, g, b, a]) => `rgb(${255 * r} ${255 * g} ${255 * b} / ${a})`;
+
+/** (s, t) over one window of (u, v) -> that over another: times the first two, plus the last two. @returns {number[]} */
+function toWindow([u0, u1, v0, v1], [wu0, wu1, wv0, wv1]) {
+  const [height, width] = [wu1 - wu0, wv1 - wv0];
+  return [(v1 - v0) / width, (u1 - u0) / height, (v0 - wv0) / width, (wu1 - u1) / height];
+}
 
 /** From warm (outermost) to cold (innermost). @returns {number[]} RGBA */
 function wireColour(index, count) {

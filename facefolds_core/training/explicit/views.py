@@ -27,11 +27,13 @@ class Views:
             steps.
         camera: (P,) int32, position in the list of training cameras.
         pixel: (P,) int32, row-major.
+        directions: (P, 3) float32, unit vectors.
     """
 
     codes: NDArray[np.uint16]
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
+    directions: NDArray[np.float32]
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
@@ -40,7 +42,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    codes, cameras, pixels = [], [], []
+    codes, cameras, pixels, along = [], [], [], []
     centre = manifolds.centre.cpu().numpy().astype(np.float64)
     window = np.array(manifolds.window)
     for position, index in enumerate(scene.indices("train")):
@@ -54,7 +56,8 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
         codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
         cameras.append(np.full(len(hit), position, np.int32))
         pixels.append(chosen[hit].astype(np.int32))
-    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels))
+        along.append(directions[hit].astype(np.float32))
+    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels), np.concatenate(along))
     if len(views.pixel) == 0:
         raise _nothing_seen(scene)
     return views
@@ -152,7 +155,7 @@ class MovingRays:
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)
-            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel))
+            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel, views.directions))
             if size <= self._room:
                 self._kept[frame, number] = views
                 self._room -= size
@@ -169,7 +172,8 @@ class MovingRays:
         hit = np.flatnonzero((distance > 0).any(1))
         codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window)
         camera = np.repeat(np.arange(len(chosen), dtype=np.int32), [len(pixels) for pixels in chosen])
-        return Views(codes, camera[hit], np.concatenate(chosen)[hit].astype(np.int32))
+        pixels = np.concatenate(chosen)[hit].astype(np.int32)
+        return Views(codes, camera[hit], pixels, directions[hit].astype(np.float32))
 
     def _rays(self, camera: int, frame: int, pixels: NDArray[np.int64]) -> tuple[Array, Array]:
         """Origins minus c and directions (R, 3) through pixels (R,)."""
