@@ -89,8 +89,8 @@ def test_a_solid_head_is_thin_and_a_foggy_one_thick() -> None:
     head = _ball(0.2, 0.0, 0.0, 0.0)
     solid, fog = _volume((head, 8.0)), _volume((head, float(np.log(np.expm1(0.1)))))
     assert thickness(solid, 0.5) < 2 * VOXEL
-    # 0.1 a voxel: of 1 - exp(-s / 0.15) along 0.4 a tenth is reached 0.014 deep, nine tenths 0.28 deep
-    assert 0.2 < thickness(fog, 0.5) < 0.3
+    # Of 1 - exp(-s / 0.15) a tenth is reached 0.015 deep, nine tenths 0.3 deep; most ways through the ball are shorter.
+    assert 0.15 < thickness(fog, 0.5) < 0.25
     assert thickness(_volume(), 0.5) == 0
 
 
