@@ -187,7 +187,15 @@ def readme_table(data: Path) -> str:
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = ["subject", "PSNR, dB", "taken", "model", "SSIM", "cameras, frames, pixels", "held out (degrees from front)"]
+    head = [
+        "subject",
+        "PSNR, dB",
+        "region",
+        "model",
+        "SSIM",
+        "cameras, frames, pixels",
+        "held out (degrees from front)",
+    ]
     return markdown([*head, "triangles", "meshes + video", "training"], [_readme_row(path) for path in files])
 
 
