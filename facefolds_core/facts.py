@@ -77,9 +77,13 @@ WORDS = {
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
+    "room_given_up": "with a room behind it the subject is fog, {depth:.2f} units deep (over {over:g}): the far sphere "
+    "is kept (train.room.max_thickness)",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
+    "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
+    "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
     "mattes help (docs/guide/subjects.md)",

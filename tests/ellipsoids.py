@@ -56,6 +56,9 @@ class Ellipsoids:
         valid = ((uv - 0.2).norm(dim=-1) >= self.hole).expand(self.num_layers, -1)
         return self.centre + radius[..., None] * n, valid
 
+    def reflection_maps(self) -> None:
+        return None
+
     def crossings(self, origins: Tensor, directions: Tensor) -> Crossed:
         points, hits = [], []
         for axes in self.axes:

@@ -169,7 +169,7 @@ def _level_problems(level: Level) -> list[str]:
             problems.append(f"{layer.vertices} vertices and {layer.triangles} triangles of layer {index}: too many")
     if level.bytes != (total := sum(size for _, size, _ in level.files())):
         problems.append(f"bytes are {level.bytes}, those of its files are {total}")
-    return problems + _effects_problems(level)
+    return problems + _effects_problems(level) + _reflection_problems(level)
 
 
 def _effects_problems(level: Level) -> list[str]:
@@ -191,6 +191,23 @@ def _effects_problems(level: Level) -> list[str]:
         if not inside(p, (effects.width, effects.height))
     ]
     problems += [f"effects_rect {list(r)} is not inside its plane" for r in rects if not inside(r, planes[0][2:])]
+    return problems
+
+
+def _reflection_problems(level: Level) -> list[str]:
+    one = level.reflection
+    if one is None:
+        return []
+    problems = _size_problems(one.width, one.height)
+    problems += ["view effects and a reflection"] * (level.view_effects is not None)
+    u0, u1, v0, v1 = one.uv_window
+    if not (u0 < u1 and v0 < v1):
+        problems.append(f"uv_window {[u0, u1, v0, v1]} of the reflection is empty")
+    problems += [
+        f"{list(rect)} is not inside the reflection's picture"
+        for rect in one.rects()
+        if not inside(rect, (one.width, one.height))
+    ]
     return problems
 
 

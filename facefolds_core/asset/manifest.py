@@ -37,6 +37,7 @@ UV = Annotated[float, Field(ge=-1, le=1)]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=200)]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Offset = Annotated[int, Field(ge=0)]
+Scale = Annotated[float, Field(gt=0, le=1000)]
 Rect = tuple[Offset, Offset, Count, Count]
 """(x, y, width, height) in pixels from the top left corner of the video."""
 Vector = tuple[float, float, float]
@@ -168,6 +169,32 @@ class ViewEffects(StoredFile):
     planes: tuple[Rect, Rect, Rect]
 
 
+class Reflection(StoredFile):
+    """What gloss adds to the colours by the direction; players may ignore it.
+
+    Attributes:
+        width, height: of the PNG.
+        uv_window: (u0, u1, v0, v1), what gloss, offset and normals cover of the hemisphere's (u, v).
+        environment_rect, gloss_rect, offset_rect, normals_rect: in pixels of the PNG.
+        environment_scale, gloss_scale, offset_scale: what code 255 means; code 0 is 0, of the offset its negative.
+    """
+
+    width: Count
+    height: Count
+    uv_window: tuple[UV, UV, UV, UV]
+    environment_rect: Rect
+    gloss_rect: Rect
+    offset_rect: Rect
+    normals_rect: Rect
+    environment_scale: Scale
+    gloss_scale: Scale
+    offset_scale: Scale
+
+    def rects(self) -> tuple[Rect, Rect, Rect, Rect]:
+        """Of environment, gloss, offset and normals."""
+        return self.environment_rect, self.gloss_rect, self.offset_rect, self.normals_rect
+
+
 class Quality(Part):
     """How near the level is to what was trained.
 
@@ -183,6 +210,7 @@ class Level(Part):
 
     Attributes:
         layers: outermost first; their number may differ between levels.
+        reflection: what gloss adds; absent where there is none.
         bytes: of all its files.
     """
 
@@ -190,13 +218,22 @@ class Level(Part):
     layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
     texture: Texture
     view_effects: ViewEffects | None = None
+    reflection: Annotated[Reflection | None, Field(exclude_if=lambda one: one is None)] = None
     bytes: Count
     quality: Quality | None = None
+
+    @field_validator("reflection")
+    @classmethod
+    def _absent_or_whole(cls, value: Reflection | None) -> Reflection:
+        if value is None:
+            raise ValueError("a reflection, or no such key")
+        return value
 
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of each of its files, the meshes first."""
         found = [(layer.mesh, layer.bytes, layer.sha256) for layer in self.layers]
-        others: list[StoredFile] = [*self.texture.videos, *([self.view_effects] if self.view_effects else [])]
+        extras = [one for one in (self.view_effects, self.reflection) if one is not None]
+        others: list[StoredFile] = [*self.texture.videos, *extras]
         return found + [(other.file, other.bytes, other.sha256) for other in others]
 
 
@@ -325,6 +362,9 @@ def manifest_schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of `Manifest`; keys with a default are required all the same in a file."""
     schema = Manifest.model_json_schema(mode="serialization")
     layer = schema["$defs"]["Layer"]
+    level, reflection = schema["$defs"]["Level"], {"$ref": "#/$defs/Reflection"}
+    level["properties"]["reflection"] = reflection
+    level["required"] = [key for key in level["required"] if key != "reflection"]
     layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
     poses = schema["properties"]["track"]["anyOf"][0]
     schema["properties"]["track"] = poses | {"title": "Track"}

@@ -25,11 +25,14 @@ from facefolds_core.asset.manifest import (
     Manifest,
     parse_manifest,
 )
+from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.track import Track
 
 Frame = tuple[NDArray[np.uint8], ...]
@@ -76,6 +79,22 @@ class AssetLevel:
         if effects is not None:
             refuse_changed(self.folder / effects.file, effects.bytes, effects.sha256, REMEDY)
         return read_effects(self.folder, self.entry)
+
+    def reflection(self) -> ReflectionMaps | None:
+        """The reflection that all layers and frames share; None where the level has none.
+
+        Raises:
+            UserError: if its picture is damaged.
+        """
+        entry = self.entry.reflection
+        if entry is not None:
+            refuse_changed(self.folder / entry.file, entry.bytes, entry.sha256, REMEDY)
+        return read_reflection(self.folder, self.entry)
+
+    @property
+    def windows(self) -> list[Window]:
+        """(u0, u1, v0, v1) of each layer's texture coordinates."""
+        return [layer.uv_window for layer in self.entry.layers]
 
     def frames(self) -> Iterator[Frame]:
         """All frames in order, decoded as they are asked for.

@@ -16,6 +16,7 @@ from facefolds_core.asset.manifest import (
     Level,
     Manifest,
     Poster,
+    Reflection,
     Texture,
     Video,
     ViewEffects,
@@ -84,8 +85,12 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
             if video.file in whole:
                 found = _video_problems(folder / video.file, video, level.texture)
                 yield from (f"{video.file}: {problem}" for problem in found)
-    pictures: list[Poster | ViewEffects] = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
+    pictures: list[Poster | ViewEffects | Reflection] = [
+        *manifest.photos,
+        *([manifest.poster] if manifest.poster else []),
+    ]
     pictures += [level.view_effects for level in manifest.levels if level.view_effects]
+    pictures += [level.reflection for level in manifest.levels if level.reflection]
     for picture in pictures:
         if picture.file in whole:
             yield from (f"{picture.file}: {found}" for found in _picture_problems(folder / picture.file, picture))
@@ -178,7 +183,7 @@ def _colourful(picture: Picture, texture: Texture) -> bool:
     return bool((np.abs(chroma.astype(np.int16) - 128) > _COLOURFUL).any(0).mean() > 0.01)
 
 
-def _picture_problems(path: Path, said: Poster | ViewEffects) -> list[str]:
+def _picture_problems(path: Path, said: Poster | ViewEffects | Reflection) -> list[str]:
     try:
         size = picture_size(path)
         if size != (said.width, said.height):

@@ -9,23 +9,28 @@ A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordin
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
-from facefolds_core.asset.manifest import Texture
+from facefolds_core.asset.manifest import REMEDY, Texture
 from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.asset.stored import refuse_changed
 from facefolds_core.asset.video import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import window_to_window
 
 CONTENTS = "facefolds.json"
 FORMAT, VERSION = "facefolds-godot", 1
 PICTURE = "frame_{:05d}.webp"
+_OF_A_REFLECTION = {"file", "width", "height", "environment_rect", "gloss_rect", "offset_rect", "normals_rect"}
 QUALITY = 95
 """Of the pictures: lossy WebP, 0..100. Lossless ones would be several times larger."""
 
@@ -61,7 +66,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
         )
     texture = level.entry.texture
     with atomic_folder(folder) as out:
-        layers = []
+        layers: list[dict[str, Any]] = []
         for index, (mesh, entry) in enumerate(zip(level.layers, level.entry.layers, strict=True)):
             name = f"layer_{index:02d}.mesh"
             (out / name).write_bytes(mesh_bytes(mesh))
@@ -69,7 +74,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             layers.append({"mesh": name, **counts, "texture_rect": list(entry.texture_rect)})
         for number, picture in enumerate(level.pictures()):
             Image.fromarray(rgb_picture(picture, texture)).save(out / PICTURE.format(number), quality=QUALITY, method=4)
-        contents = {
+        contents: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
             "subject": subject,
@@ -82,6 +87,14 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             "pictures": [PICTURE.format(number) for number in range(texture.frames)],
             "layers": layers,
         }
+        one = level.entry.reflection
+        if one is not None:
+            refuse_changed(level.folder / one.file, one.bytes, one.sha256, REMEDY)
+            shutil.copyfile(level.folder / one.file, out / one.file)
+            scales = [one.environment_scale, one.gloss_scale, one.offset_scale]
+            contents["reflection"] = {**one.model_dump(mode="json", include=_OF_A_REFLECTION), "scales": scales}
+            for layer, window in zip(layers, level.windows, strict=True):
+                layer["to_maps"] = list(window_to_window(window, one.uv_window))
         write_json(out / CONTENTS, contents)
         return sum(path.stat().st_size for path in out.iterdir())
 

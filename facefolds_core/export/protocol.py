@@ -6,6 +6,8 @@ from typing import Protocol
 
 from torch import Tensor
 
+from facefolds_core.geometry.reflections import ReflectionMaps
+
 
 class CrossingsLike(Protocol):
     """First crossings of R rays with N layers, outermost first."""
@@ -47,6 +49,10 @@ class LayeredModel(Protocol):
     def crossings(self, origins: Tensor, directions: Tensor) -> CrossingsLike: ...
 
     def render(self, origins: Tensor, directions: Tensor, time: float, view_effects: bool) -> RenderedLike: ...
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """What it adds by the direction, the same for all layers and frames; None for nothing."""
+        ...
 
     def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         """[M, 2] -> points [N, M, 3], valid [N, M]."""

@@ -56,7 +56,8 @@ def sample_model(model: LayeredModel, cameras: Sequence[Camera], params: SampleP
     """
     window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else FULL_WINDOW
     grids = sample_grids(model, params.resolution, window)
-    return replace(grids, opacity=write_textures(folder / TEXTURES, model, grids))
+    opacity = write_textures(folder / TEXTURES, model, grids)
+    return replace(grids, opacity=opacity, reflection=model.reflection_maps())
 
 
 def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:

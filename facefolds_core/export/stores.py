@@ -1,7 +1,7 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
 - `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, opacity (N, R, R) uint8,
-  windows (N, 4) float64, centre (3,) float64;
+  windows (N, 4) float64, centre (3,) float64; of a model with a reflection its arrays, as `reflection_gloss`, ...;
 - `surfaces/surfaces.npz`: of `poisson` vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer; of
   `grid` the arrays of `Sheets`;
 - `meshes/meshes.npz`: such pairs and st_00 (V, 2) float32, layer-local texture coordinates.
@@ -12,7 +12,7 @@ Layers are outermost first. Every array is checked when it is read: shape, type,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.reading import remake
 
@@ -38,6 +39,7 @@ class Grids:
         opacity: (N, R, R) uint8: no frame's alpha is larger, as a code of 8 bits; 0 where not valid.
         windows: (N, 4) float64, (u0, u1, v0, v1) of each layer's grid.
         centre: (3,) float64, the model's c.
+        reflection: what the model adds by the direction, or None.
     """
 
     points: NDArray[np.float32]
@@ -46,6 +48,7 @@ class Grids:
     opacity: NDArray[np.uint8]
     windows: NDArray[np.float64]
     centre: NDArray[np.float64]
+    reflection: ReflectionMaps | None = None
 
     @property
     def num_layers(self) -> int:
@@ -88,7 +91,10 @@ class Sheets:
 
 
 def write_grids(path: Path, grids: Grids) -> None:
-    _write(path, {field.name: getattr(grids, field.name) for field in fields(grids)})
+    arrays = {field.name: getattr(grids, field.name) for field in fields(grids) if field.name != "reflection"}
+    if grids.reflection is not None:
+        arrays |= {f"reflection_{name}": np.asarray(value) for name, value in vars(grids.reflection).items()}
+    _write(path, arrays)
 
 
 def read_grids(path: Path) -> Grids:
@@ -104,7 +110,26 @@ def read_grids(path: Path) -> Grids:
         centre=_take(arrays, path, "centre", (3,), np.float64),
     )
     _check_windows(grids.windows, path)
-    return grids
+    return replace(grids, reflection=read_reflection_maps(path))
+
+
+def read_reflection_maps(path: Path) -> ReflectionMaps | None:
+    """Only the reflection in a file of `write_grids`, None where there is none; raises as `read_grids` does."""
+    arrays = _read(path, {f"reflection_{field.name}" for field in fields(ReflectionMaps)})
+    if not arrays:
+        return None
+    window = _take(arrays, path, "reflection_window", (4,), np.float64)
+    _check_windows(window[None], path)
+    h, w = _shape(arrays, path, "reflection_gloss", 2)[:2]
+    e = _shape(arrays, path, "reflection_environment", 2)[0]
+    u0, u1, v0, v1 = (float(x) for x in window)
+    return ReflectionMaps(
+        window=(u0, u1, v0, v1),
+        gloss=_take(arrays, path, "reflection_gloss", (h, w), np.float32),
+        offset=_take(arrays, path, "reflection_offset", (h, w, 3), np.float32),
+        normals=_take(arrays, path, "reflection_normals", (h, w, 3), np.float32),
+        environment=_take(arrays, path, "reflection_environment", (e, e, 3), np.float32),
+    )
 
 
 def read_windows(path: Path) -> list[Window]:

@@ -25,7 +25,7 @@ FULL_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
 """(u0, u1, v0, v1) of the whole hemisphere."""
 
 
-def _library(x: Any) -> Any:
+def library_of(x: Any) -> Any:
     """torch for its tensors, numpy for all else. Nobody has a tensor who has not imported torch: readers need none."""
     torch = sys.modules.get("torch")
     return torch if torch is not None and isinstance(x, torch.Tensor) else np
@@ -33,7 +33,7 @@ def _library(x: Any) -> Any:
 
 def directions_to_uv(directions: Any) -> Any:
     """Unit directions (..., 3) -> (u, v) (..., 2). v goes beyond [-1, 1] where n_x < 0."""
-    lib = _library(directions)
+    lib = library_of(directions)
     # asin has an infinite slope at +-1; clipping a hair inside keeps the gradient finite at the poles.
     z = lib.clip(directions[..., 2], -1 + 1e-7, 1 - 1e-7)
     u = lib.arcsin(z) * (2 / math.pi)
@@ -43,7 +43,7 @@ def directions_to_uv(directions: Any) -> Any:
 
 def uv_to_directions(uv: Any) -> Any:
     """(u, v) (..., 2) -> unit directions (..., 3). The inverse of `directions_to_uv`."""
-    lib = _library(uv)
+    lib = library_of(uv)
     elevation = uv[..., 0] * (math.pi / 2)
     azimuth = uv[..., 1] * (math.pi / 2)
     flat = lib.cos(elevation)
@@ -52,7 +52,7 @@ def uv_to_directions(uv: Any) -> Any:
 
 def points_to_uv(points: Any, centre: Any) -> tuple[Any, Any]:
     """Points (..., 3) and the centre (3,) -> (u, v) (..., 2) and the radius |p - c| (...)."""
-    lib = _library(points)
+    lib = library_of(points)
     offset = points - centre
     radius = lib.sqrt((offset**2).sum(-1))
     safe = lib.clip(radius, 1e-12, None)
@@ -61,14 +61,14 @@ def points_to_uv(points: Any, centre: Any) -> tuple[Any, Any]:
 
 def uv_to_st(uv: Any, window: Window = FULL_WINDOW) -> Any:
     """(u, v) (..., 2) -> (s, t) (..., 2): s right, t down, [0, 1] over the window's image."""
-    lib = _library(uv)
+    lib = library_of(uv)
     u0, u1, v0, v1 = window
     return lib.stack([(uv[..., 1] - v0) / (v1 - v0), (u1 - uv[..., 0]) / (u1 - u0)], -1)
 
 
 def st_to_uv(st: Any, window: Window = FULL_WINDOW) -> Any:
     """(s, t) (..., 2) -> (u, v) (..., 2). The inverse of `uv_to_st`."""
-    lib = _library(st)
+    lib = library_of(st)
     u0, u1, v0, v1 = window
     return lib.stack([u1 - st[..., 1] * (u1 - u0), v0 + st[..., 0] * (v1 - v0)], -1)
 

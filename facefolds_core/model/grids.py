@@ -8,7 +8,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import grid_sample
 
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.model.reflection import Reflection
 from facefolds_core.model.textures import Shaded
 
 
@@ -26,13 +28,23 @@ class GridTextures(nn.Module):
         frame_colour: [K, H, W, 3].
         frame_alpha: [K, H, W, N], added to the logit.
 
+    A reflection, where there is one, is added by `shade` for the directions that it is given.
+
     Args:
         window: (u0, u1, v0, v1).
         shape: (H, W).
         num_layers, num_frames: N and K.
+        reflection: shared by layers and frames, or None.
     """
 
-    def __init__(self, window: Window, shape: tuple[int, int], num_layers: int, num_frames: int) -> None:
+    def __init__(
+        self,
+        window: Window,
+        shape: tuple[int, int],
+        num_layers: int,
+        num_frames: int,
+        reflection: Reflection | None = None,
+    ) -> None:
         super().__init__()
         self.window = window
         h, w = shape
@@ -40,10 +52,15 @@ class GridTextures(nn.Module):
         self.layers = nn.Parameter(torch.zeros(h, w, num_layers, 4))
         self.frame_colour = nn.Parameter(torch.zeros(num_frames, h, w, 3))
         self.frame_alpha = nn.Parameter(torch.zeros(num_frames, h, w, num_layers))
+        self.reflection = reflection
 
     @property
     def num_frames(self) -> int:
         return len(self.frame_alpha)
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """The reflection, as an asset has it."""
+        return None if self.reflection is None else self.reflection.maps(self.window)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -69,7 +86,7 @@ class GridTextures(nn.Module):
         return Shaded(rgba[:, :3], rgba[:, 3], None)
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
-        """Points at uv [P, 2] of layers [P] at frame times [P]. There is no view-dependent term."""
+        """Points at uv [P, 2] of layers [P] at frame times [P]; the view term is the reflection's [P, 3]."""
         height, width = self.shape
         st = uv_to_st(uv, self.window)
         x = (st[:, 0] * width - 0.5).clamp(0, width - 1)
@@ -81,7 +98,8 @@ class GridTextures(nn.Module):
         for di, wi in ((0, 1 - a), (1, a)):
             for dj, wj in ((0, 1 - b), (1, b)):
                 rgba = rgba + wi * wj * look_up((i + di).clamp(max=height - 1), (j + dj).clamp(max=width - 1))
-        return Shaded(rgba[:, :3], rgba[:, 3], None)
+        seen = None if directions is None or self.reflection is None else self.reflection.added(st, directions)
+        return Shaded(rgba[:, :3], rgba[:, 3], seen)
 
     def _look_up(self, layer: Tensor, time: Tensor) -> Callable[[Tensor, Tensor], Tensor]:
         """Function of texel rows and columns [P] -> RGBA [P, 4], for points of layers [P] at times [P]."""

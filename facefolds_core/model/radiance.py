@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.intersection import Crossings
@@ -42,7 +43,7 @@ class Traced:
     Attributes:
         rgb: [R, 3] over black, not clamped.
         weights: [R, N].
-        view: [P] the view-dependent term at the P crossings of all rays; None if it was switched off.
+        view: [P] or [P, 3] the view-dependent term at the P crossings of all rays; None if it was switched off.
     """
 
     rgb: Tensor
@@ -76,6 +77,10 @@ class RadianceManifolds(nn.Module):
         """[3], c."""
         return self.manifolds.centre
 
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """The reflection that all layers and frames share, where the textures have one."""
+        return self.textures.reflection_maps()
+
     def trace(self, origins: Tensor, directions: Tensor, time: Tensor, view_effects: bool) -> Traced:
         """Cross, shade and composite rays, all at once and differentiable.
 
@@ -88,7 +93,7 @@ class RadianceManifolds(nn.Module):
         ray, layer = crossings.hit.nonzero(as_tuple=True)
         uv, _ = points_to_uv(crossings.points[ray, layer], self.centre)
         shaded = self.textures.shade(uv, layer, time[ray], directions[ray] if view_effects else None)
-        colour = shaded.rgb if shaded.view is None else shaded.rgb + shaded.view[:, None]
+        colour = shaded.rgb if shaded.added is None else shaded.rgb + shaded.added
         alpha = torch.zeros_like(crossings.distance).index_put((ray, layer), shaded.alpha)
         weights, _ = compositing_weights(alpha)
         # Dense [R, N, 3]: index_add along rays would be one small operation a crossing on a CPU.

@@ -21,6 +21,7 @@ from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
+from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.model.textures import MlpTextures
 from facefolds_core.reading import check_regular, no_memory
 
@@ -86,6 +87,7 @@ class ExplicitSpec(BaseModel):
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
+        reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
     """
 
@@ -100,6 +102,7 @@ class ExplicitSpec(BaseModel):
     texels: tuple[Count, Count]
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
+    reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
     fingerprint: str = ""
 
 
@@ -114,9 +117,13 @@ def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
 
 def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     blank = torch.ones(spec.nodes)
+    reflection = None
+    if spec.reflection is not None:
+        rows, columns, environment = spec.reflection
+        reflection = Reflection(ReflectionShape((rows, columns), environment))
     return RadianceManifolds(
         RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
-        GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames),
+        GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection),
     )
 
 

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import embedding, relu
 
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.model.encoding import encoded_size, positional_encoding
 from facefolds_core.model.layers import LinearStack
 
@@ -20,12 +21,18 @@ class Shaded:
     Attributes:
         rgb: [P, 3] view-independent colour in [0, 1].
         alpha: [P] opacity in [0, 1].
-        view: [P] grey view-dependent term to add to all three channels, or None where it was not asked for.
+        view: [P] grey view-dependent term to add to all three channels, [P, 3] a coloured one, or None where it was not
+            asked for.
     """
 
     rgb: Tensor
     alpha: Tensor
     view: Tensor | None
+
+    @property
+    def added(self) -> Tensor | None:
+        """`view` as [P, 1] or [P, 3]."""
+        return self.view[:, None] if self.view is not None and self.view.dim() == 1 else self.view
 
 
 class Textures(Protocol):
@@ -33,6 +40,10 @@ class Textures(Protocol):
 
     @property
     def num_frames(self) -> int: ...
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """The reflection that all layers and frames share, or None."""
+        ...
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
         """Points at uv [P, 2] of layers [P] (int64), at frame times [P]; directions [P, 3] of the rays, or None."""
@@ -97,6 +108,10 @@ class MlpTextures(nn.Module):
         """Set the bias of the opacity, of all layers and frames: before training only."""
         with torch.no_grad():
             self.base.bias[3] = logit
+
+    def reflection_maps(self) -> ReflectionMaps | None:
+        """None: the view branch is dropped at export."""
+        return None
 
     @property
     def num_frames(self) -> int:

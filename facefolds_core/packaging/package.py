@@ -30,6 +30,7 @@ from facefolds_core.asset.manifest import (
     write_manifest,
 )
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import (
     FULL,
@@ -47,6 +48,7 @@ from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.effects import fit_effects
 from facefolds_core.packaging.levels import coarse_content, level_params
@@ -66,6 +68,7 @@ class Export:
         windows: of each layer's texture.
         textures: layered store, N layers x K frames of (R, R, 4).
         centre: c of the UV map, units.
+        reflection: what the model adds by the direction, or None.
         coarser: R^m -> the layers with at most R^m x R^m vertices, for the coarser levels.
     """
 
@@ -74,6 +77,7 @@ class Export:
     textures: FrameStore
     centre: tuple[float, float, float]
     coarser: Mapping[int, Sequence[TexturedMesh]]
+    reflection: ReflectionMaps | None = None
 
     @classmethod
     def of(
@@ -86,7 +90,7 @@ class Export:
         """From what the steps of the export give; `textures` is the frame store of `bake`."""
         windows = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in grids.windows]
         x, y, z = (float(value) for value in grids.centre)
-        return cls(meshes, windows, FrameStore(textures), (x, y, z), coarser)
+        return cls(meshes, windows, FrameStore(textures), (x, y, z), coarser, grids.reflection)
 
 
 def package(folder: Path, export: Export, scene: Scene, params: CompressParams) -> Manifest:
@@ -113,10 +117,14 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
             levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
         level = _level(temporary, FULL, full, params, meter, cameras)
-        if params.view_effects:
+        if params.view_effects and export.reflection is None:
             photographed = replace(full, textures=export.textures, frames=frames)
             allowed = params.effects.share * level.bytes
             level = _with_effects(temporary, level, fit_effects(photographed, scene, allowed, params.effects))
+        if export.reflection is not None:
+            picture = ReflectionPicture.of(export.reflection)
+            levels = [_with_reflection(temporary, one, picture) for one in levels]
+            level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
         manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos, params.jpeg_quality)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
@@ -180,6 +188,14 @@ def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) ->
     ]
     update = {"layers": tuple(layers), "view_effects": effects, "bytes": level.bytes + effects.bytes}
     return level.model_copy(update=update)
+
+
+def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:
+    """Add the reflection to a level; each has its own copy, a few kB: a level is complete in itself."""
+    path = folder / f"{level.name}_reflection.png"
+    path.write_bytes(picture.png())
+    entry = reflection_entry(picture, _stored(path))
+    return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 
 def _crf(

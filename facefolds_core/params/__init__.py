@@ -39,6 +39,7 @@ from facefolds_core.params.export import (
     TextureParams,
 )
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
+from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -93,6 +94,7 @@ __all__ = [
     "PruningParams",
     "ReconstructParams",
     "RefitParams",
+    "ReflectionParams",
     "RegistrationParams",
     "RoomParams",
     "SampleParams",

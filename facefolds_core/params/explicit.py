@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.volume import (
     CameraParams,
@@ -208,6 +209,9 @@ class ExplicitParams(Section):
 
     textures: GridTextureParams = GridTextureParams()
     """The texel grids."""
+
+    reflection: ReflectionParams = ReflectionParams()
+    """What gloss adds, by the direction."""
 
     losses: LossParams = LossParams()
     """Prices beside the squared error."""

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.effects import Map
+from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy
 from facefolds_core.rendering.reference import BLACK, Image, Layered, seen_from
 
 VERTEX = """
@@ -77,18 +78,22 @@ class OpenGLRenderer:
     Args:
         asset: its meshes go to the card at once, textures as frames are asked for.
         effects: one map of view effects a layer, such as `asset.effects()`; None for none.
+        glossy: the reflection, instead of view effects; None for none.
 
     Raises:
         UserError: if there is no OpenGL here.
     """
 
-    def __init__(self, asset: Layered, effects: Sequence[Map] | None = None) -> None:
+    def __init__(self, asset: Layered, effects: Sequence[Map] | None = None, glossy: Glossy | None = None) -> None:
         self._asset = asset
         self._context = _make_context()
-        self._colour = self._context.program(VERTEX, FRAGMENT if effects is None else FRAGMENT_WITH_EFFECTS)
+        fragment = FRAGMENT if effects is None else FRAGMENT_WITH_EFFECTS
+        self._colour = self._context.program(VERTEX, FRAGMENT_WITH_REFLECTION if glossy else fragment)
         self._depth = self._context.program(VERTEX, NOTHING)
         self._layers = [self._upload(layer) for layer in asset.layers]
-        self._effects = [self._effect(table) for table in effects or ()]
+        self._effects = [self._effect(table) for table in effects or ()] if glossy is None else []
+        self._glossy = glossy
+        self._reflections = [] if glossy is None else glossy.textures(self._context)
         self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
         self._frame = -1
         self._textures: list[moderngl.Texture] = []
@@ -127,6 +132,10 @@ class OpenGLRenderer:
             _uniform(program, "projection").write(projection)
         if self._effects:
             _uniform(self._colour, "effects").value = 1
+        for unit, (name, texture) in enumerate(self._reflections, 1):
+            _uniform(self._colour, name).value = unit
+            texture.use(unit)
+        if self._effects or self._reflections:
             _uniform(self._colour, "eye").write(camera.centre.astype("f4").tobytes())
         count = len(self._layers)
         for index in reversed(range(count)):
@@ -136,6 +145,8 @@ class OpenGLRenderer:
                 _uniform(program, "slice").write(slice_)
             if self._effects:
                 self._effects[index].use(1)
+            if self._glossy is not None:
+                _uniform(self._colour, "to_maps").write(self._glossy.to_maps(index).tobytes())
             self._draw_layer(target, *self._layers[index], self._textures[index])
         data = np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
         rgba = data.reshape(camera.height, camera.width, 4)[::-1]

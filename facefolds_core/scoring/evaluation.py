@@ -200,7 +200,7 @@ def rendered(
         images = {
             "model": Rendering(with_view, alpha),
             "diffuse": Rendering(without_view, alpha),
-            "asset": Rendering(*composite(view.hits, textures)),
+            "asset": Rendering(*composite(view.hits, textures, added=view.glossy)),
         }
         if view.added is not None:
             images[WITH_EFFECTS] = Rendering(*composite(view.hits, textures, added=view.added))

@@ -54,17 +54,17 @@ class ModelView:
         alpha[self._ray, self._layer] = opacity
         weights, transmittance = compositing_weights(alpha)
         weight = weights[self._ray, self._layer][:, None]
-        with_view = self._sum(weight * (rgb + view[:, None]))
+        with_view = self._sum(weight * (rgb + view))
         return with_view, self._sum(weight * rgb), (1 - transmittance).reshape(self._size).cpu().numpy()
 
     def _shaded(self, time: float) -> list[tuple[Tensor, Tensor, Tensor]]:
-        """Colour [P, 3], view term [P] and opacity [P] of all crossings, in parts."""
+        """Colour [P, 3], view term [P, 1] or [P, 3] and opacity [P] of all crossings, in parts."""
         parts = []
         pieces = zip(*(t.split(CROSSINGS_AT_ONCE) for t in (self._uv, self._layer, self._ray)), strict=True)
         for uv, layer, ray in pieces:
             times = torch.full((len(uv),), float(time), dtype=uv.dtype, device=uv.device)
             shaded = self._model.textures.shade(uv, layer, times, self._directions[ray])
-            view = torch.zeros_like(shaded.alpha) if shaded.view is None else shaded.view
+            view = torch.zeros_like(shaded.alpha[:, None]) if shaded.added is None else shaded.added
             parts.append((shaded.rgb, view, shaded.alpha))
         return parts
 

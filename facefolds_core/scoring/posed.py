@@ -12,6 +12,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.rendering import AssetCaster
 from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.scoring.model_view import ModelView
 
 
@@ -28,6 +29,7 @@ class PosedView:
         seen_by: the camera in the frame of the asset's meshes.
         hits: there.
         model: the model's view.
+        glossy: what the reflection adds, or None.
         added: what view effects add, or None.
     """
 
@@ -36,7 +38,7 @@ class PosedView:
     ) -> None:
         self._poses, self._model, self._asset, self._caster = scene.poses, model, asset, caster
         self._camera, self._step = camera, step
-        self._maps = asset.effects()
+        self._maps, self._reflection = asset.effects(), asset.full.reflection()
         self._turn_model(0)
         self._turn_asset(0)
 
@@ -56,4 +58,7 @@ class PosedView:
     def _turn_asset(self, frame: int) -> None:
         self.seen_by = self._asset.camera_in_head(self._camera, frame * self._step)
         self.hits = self._caster.cast(self.seen_by)
+        windows = self._asset.full.windows
+        maps = self._reflection
+        self.glossy = None if maps is None else reflected_colours(self.hits, self.seen_by, windows, maps)
         self.added = None if self._maps is None else added_colours(self.hits, to_eye(self.seen_by), self._maps)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,12 @@ from PIL import Image
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines.godot import CONTENTS, write_godot
 from facefolds_core.errors import UserError
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
+from tests.viewer.fixtures import add_reflection
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +75,23 @@ def test_a_folder_with_other_files_is_left_alone(caps: Asset, tmp_path: Path) ->
     with pytest.raises(UserError, match="not empty"):
         write_godot(tmp_path, caps.full, "caps")
     assert (tmp_path / "precious").is_file()
+
+
+@pytest.mark.usefixtures("_godot")
+def test_reflections_agree_with_the_reference(caps: Asset, tmp_path: Path) -> None:
+    shutil.copytree(caps.folder, tmp_path / "asset")
+    add_reflection(tmp_path / "asset")
+    level, cameras = read_asset(tmp_path / "asset").full, five_cameras(SIZE)[:2]
+    write_godot(tmp_path / "godot", level, "caps")
+    found = pictures(tmp_path / "godot", cameras, (2,), GREY_VALUE)
+    maps, plain = level.reflection(), expected_pictures(caps, cameras, (2,))
+    assert maps is not None
+    for camera in cameras:
+        hits = AssetCaster(level).cast(camera)
+        added = reflected_colours(hits, camera, level.windows, maps)
+        expected, _ = composite(hits, level.frame(2), (GREY_VALUE,) * 3, added)
+        assert psnr(found[camera.name, 2], expected) >= AGREE
+        assert psnr(plain[camera.name, 2], expected) < 25
 
 
 @pytest.mark.usefixtures("_godot")

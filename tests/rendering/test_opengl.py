@@ -19,8 +19,11 @@ from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.opengl import OpenGLRenderer
+from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
+from tests.viewer.fixtures import random_reflection
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +64,17 @@ def test_view_effects_agree_with_the_reference(caps: Asset) -> None:
         rgb, _ = renderer.render(camera, 1)
     assert psnr(rgb, expected) > 45
     assert psnr(plain, expected) < 35
+
+
+def test_reflections_agree_with_the_reference(caps: Asset) -> None:
+    camera, maps = look_at_origin("camera", 30, 10, 120), random_reflection()
+    hits, windows = AssetCaster(caps).cast(camera), caps.full.windows
+    expected, _ = composite(hits, caps.frame(1), added=reflected_colours(hits, camera, windows, maps))
+    plain, _ = composite(hits, caps.frame(1))
+    with OpenGLRenderer(caps, glossy=Glossy(maps, windows)) as renderer:
+        rgb, _ = renderer.render(camera, 1)
+    assert psnr(rgb, expected) > 45
+    assert psnr(plain, expected) < 25
 
 
 def test_a_background_picture_shines_through(caps: Asset) -> None:

@@ -32,6 +32,7 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
         "images": rng.integers(0, 256, (1, rays, 3)).astype(np.uint8),
         "background": rng.random((1, rays, 3), np.float32),
         "texture": texture,
+        "shine": rng.random((rays, 3), np.float32) * 0.4 - 0.2,
     }
 
 
@@ -58,7 +59,9 @@ def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int]
     squares = shading_kernel.shade(*p.values(), gradient, *SETTINGS[setting])
     target = torch.from_numpy(p["images"][0]).float() / 255
     codes = torch.from_numpy(p["codes"].astype(np.int32))
-    expected, moved, total = reference.shade(codes, target, before, torch.from_numpy(p["texture"]), *SETTINGS[setting])
+    expected, moved, total = reference.shade(
+        codes, target, before, torch.from_numpy(p["texture"]), torch.from_numpy(p["shine"]), *SETTINGS[setting]
+    )
     # Worst seen 1.4e-6 of gradients up to 2.3; 1.8 by a reference that does not leave out what is faint.
     torch.testing.assert_close(torch.from_numpy(gradient).permute(1, 2, 0, 3), expected, atol=1e-5, rtol=0)
     torch.testing.assert_close(torch.from_numpy(p["background"][0]), moved, atol=1e-6, rtol=0)  # seen: 1.2e-7

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.manifest import Manifest, parse_manifest, write_manifest
+from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
@@ -33,7 +35,11 @@ def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> M
     value = parse_manifest(path).model_dump(mode="json")
     change(value)
     for level in value["levels"]:
-        entries = [*level["layers"], *level["texture"]["videos"], *filter(None, [level.get("view_effects")])]
+        entries = [
+            *level["layers"],
+            *level["texture"]["videos"],
+            *filter(None, [level.get("view_effects"), level.get("reflection")]),
+        ]
         level["bytes"] = sum(entry["bytes"] for entry in entries)
     return write_manifest(Manifest.model_validate_json(json.dumps(value)), path)
 
@@ -72,6 +78,23 @@ def rich_asset(folder: Path) -> Path:
 
     change_manifest(folder, change)
     return folder
+
+
+def random_reflection(seed: int = 0) -> ReflectionMaps:
+    """Strong, coloured, with normals all over the front; its window is not that of the layers."""
+    rng = np.random.default_rng(seed)
+    normals = np.stack([np.ones((6, 5)), *rng.uniform(-0.7, 0.7, (2, 6, 5))], -1)
+    parts = rng.random((6, 5)), 0.3 * rng.random((6, 5, 3)), normals, rng.random((9, 9, 3))
+    gloss, offset, facing, environment = (np.asarray(part, np.float32) for part in parts)
+    return ReflectionMaps((-0.9, 0.8, -0.7, 0.9), gloss, offset, facing, environment)
+
+
+def add_reflection(folder: Path) -> None:
+    """`random_reflection` in the full level."""
+    picture = ReflectionPicture.of(random_reflection())
+    (folder / "full_reflection.png").write_bytes(picture.png())
+    entry = reflection_entry(picture, file_entry(folder / "full_reflection.png")).model_dump(mode="json")
+    change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
 
 
 def add_effects(folder: Path, level: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,10 +14,12 @@ from PIL import Image
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.rendering import AssetCaster, composite, render_asset
 from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_track import TRACK
 from tests.assets import SOURCE, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NewPlayer
+from tests.viewer.fixtures import add_reflection
 
 SIZE = 160
 AGREE = 40.0
@@ -72,6 +75,26 @@ def test_a_transparent_background_stays_transparent(new_player: NewPlayer, caps:
     rgb, alpha = composite(AssetCaster(caps).cast(camera), caps.frame(0))
     assert psnr(found[..., 3], alpha) >= AGREE
     assert psnr(found[..., :3], rgb) >= AGREE  # premultiplied: the composite over black
+
+
+def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_path: Path) -> None:
+    folder = tmp_path / "asset"
+    shutil.copytree(caps.folder, folder)
+    add_reflection(folder)
+    asset = read_asset(folder)
+    player = new_player({"asset": folder})
+    player.open("asset")
+    player.run("e.background = v", GREY)
+    camera = five_cameras(SIZE)[1]
+    maps, hits = asset.full.reflection(), AssetCaster(asset).cast(camera)
+    assert maps is not None
+    added = reflected_colours(hits, camera, asset.full.windows, maps)
+    expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added)
+    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
+    player.run("e.effects = false")
+    plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
+    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
+    assert psnr(plain, expected) < 25  # the reflection is strong enough to be seen in this test
 
 
 def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:

@@ -4,7 +4,7 @@ import { decodeMesh } from "./meshes.js";
 
 /**
  * @typedef {{info: import("./manifest.js").Level, geometries: import("./meshes.js").Geometry[],
- *   effects: ImageBitmap | null, source: import("./video/open.js").FrameSource,
+ *   effects: ImageBitmap | null, reflection: ImageBitmap | null, source: import("./video/open.js").FrameSource,
  *   video: import("./manifest.js").VideoEntry, dispose: () => void}} LoadedLevel
  * @param {import("./manifest.js").Level} info
  * @param {import("./files.js").Files} files
@@ -13,19 +13,21 @@ import { decodeMesh } from "./meshes.js";
  * @returns {Promise<LoadedLevel>}
  */
 export async function loadLevel(info, files, onVideoError, refused) {
-  const [geometries, effects, opened] = await allOrNothing([
+  const [geometries, effects, opened, reflection] = await allOrNothing([
     Promise.all(info.layers.map(async (layer) => {
       const buffer = await files.bytes(layer.mesh);
       return decodeMesh(buffer, layer, files.address(layer.mesh.name));
     })),
-    info.effects ? loadEffects(info.effects, files) : null,
+    info.effects ? loadPicture(info.effects.file, files) : null,
     import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused)),
+    info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
   const dispose = () => {
     effects?.close();
+    reflection?.close();
     opened.source.close();
   };
-  return { info, geometries, effects, source: opened.source, video: opened.video, dispose };
+  return { info, geometries, effects, reflection, source: opened.source, video: opened.video, dispose };
 }
 
 /** Like Promise.all, but a video opened in vain is closed. */
@@ -37,13 +39,13 @@ async function allOrNothing(work) {
   throw failed.reason;
 }
 
-async function loadEffects(entry, files) {
-  const blob = new Blob([await files.bytes(entry.file)], { type: "image/png" });
+async function loadPicture(entry, files) {
+  const blob = new Blob([await files.bytes(entry)], { type: "image/png" });
   try {
     return await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
   } catch (cause) {
-    const file = files.address(entry.file.name);
-    throw new PlayerError(`The picture ${entry.file.name} is damaged`, {
+    const file = files.address(entry.name);
+    throw new PlayerError(`The picture ${entry.name} is damaged`, {
       file,
       cause,
       remedy: "Copy or make the asset again.",
@@ -56,6 +58,6 @@ export function gpuBytes(level) {
   let bytes = 4 * level.info.texture.width * level.info.texture.height;
   for (const { index, position, uv } of level.geometries)
     bytes += index.byteLength + position.byteLength + uv.byteLength;
-  if (level.effects) bytes += 4 * level.effects.width * level.effects.height;
+  for (const image of [level.effects, level.reflection]) if (image) bytes += 4 * image.width * image.height;
   return bytes;
 }

@@ -7,12 +7,14 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
 /**
  * @typedef {[number, number, number, number]} Rect x, y, width, height in pixels, y down
  * @typedef {{name: string, bytes: number, sha256: string}} FileEntry
- * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, effectsRect: Rect | null}} LayerEntry
+ * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, window: number[], effectsRect: Rect | null}} LayerEntry
  * @typedef {FileEntry & {codec: string, mime: string}} VideoEntry
  * @typedef {{width: number, height: number, colourRect: Rect, alphaRect: Rect, frames: number, fps: number}} TextureEntry
  * @typedef {{file: FileEntry, scale: number, width: number, height: number, planes: Rect[]}} EffectsEntry
  * @typedef {{name: string, layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
- *   effects: EffectsEntry | null, bytes: number}} Level
+ *   effects: EffectsEntry | null, reflection: ReflectionEntry | null, bytes: number}} Level
+ * @typedef {{file: FileEntry, window: number[], environment: Rect, gloss: Rect, offset: Rect, normals: Rect,
+ *   scales: number[]}} ReflectionEntry `scales` of environment, gloss and offset
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry | null,
@@ -100,12 +102,14 @@ function readLevel(level, index) {
     readLayer(layer, effects !== null, `${place}.layers[${i}]`),
   );
   check(layers.length > 0, `${place}.layers is empty`);
+  const reflection = level.reflection ? readReflection(level.reflection, `${place}.reflection`) : null;
   return {
     name: String(level.name),
     layers,
     texture: readTexture(texture, `${place}.texture`),
     videos,
     effects,
+    reflection,
     bytes: count(level.bytes, `${place}.bytes`),
   };
 }
@@ -129,6 +133,7 @@ function readLayer(layer, hasEffects, place) {
     vertices: count(layer.vertices, `${place}.vertices`),
     triangles: count(layer.triangles, `${place}.triangles`),
     rect: rectangle(layer.texture_rect, `${place}.texture_rect`),
+    window: rectangle(layer.uv_window, `${place}.uv_window`),
     effectsRect: hasEffects ? rectangle(layer.effects_rect, `${place}.effects_rect`) : null,
   };
 }
@@ -142,6 +147,18 @@ function readEffects(effects, place) {
     width: count(effects.width, `${place}.width`),
     height: count(effects.height, `${place}.height`),
     planes: effects.planes.map((plane, i) => rectangle(plane, `${place}.planes[${i}]`)),
+  };
+}
+
+function readReflection(entry, place) {
+  const rect = (name) => rectangle(entry[`${name}_rect`], `${place}.${name}_rect`);
+  const scales = ["environment", "gloss", "offset"].map((name) => Number(entry[`${name}_scale`]));
+  check(scales.every(Number.isFinite), `${place} lacks a scale`);
+  return {
+    file: readFile(entry, entry.file, place),
+    window: rectangle(entry.uv_window, `${place}.uv_window`),
+    ...{ environment: rect("environment"), gloss: rect("gloss"), offset: rect("offset"), normals: rect("normals") },
+    scales,
   };
 }
 

@@ -199,10 +199,11 @@ export class LayerRenderer {
     const { level, upload } = this;
     const { gl } = this.graphics;
     const head = "#version 300 es\n";
-    const colour = prepared(
-      upload.effects ? COLOUR_FRAGMENT.replace(head, `${head}#define EFFECTS 1\n`) : COLOUR_FRAGMENT,
-    );
+    const defines = (upload.effects ? "#define EFFECTS 1\n" : "") + (upload.reflection ? "#define REFLECTION 1\n" : "");
+    const colour = prepared(COLOUR_FRAGMENT.replace(head, head + defines));
     const { at } = colour;
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE1);
     gl.bindTexture(gl.TEXTURE_2D, upload.effects);
     gl.activeTexture(gl.TEXTURE0);
@@ -216,6 +217,15 @@ export class LayerRenderer {
       gl.uniform1i(at.effects, 1);
       gl.uniform1f(at.effectsScale, this.effectsOn ? level.info.effects.scale : 0);
     }
+    if (upload.reflection) {
+      const { environment, gloss, offset, normals, scales } = level.info.reflection;
+      gl.uniform1i(at.reflection, 2);
+      gl.uniform4fv(at.environmentRect, environment);
+      gl.uniform4fv(at.glossRect, gloss);
+      gl.uniform4fv(at.offsetRect, offset);
+      gl.uniform4fv(at.normalsRect, normals);
+      gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
+    }
     return colour;
   }
 
@@ -226,6 +236,7 @@ export class LayerRenderer {
     const [x, y, w, h] = info.layers[index].rect;
     gl.uniform4f(at.colourRect, cx + x, cy + y, w, h);
     gl.uniform2f(at.alphaOffset, ax - cx, ay - cy);
+    if (info.reflection) gl.uniform4fv(at.toMaps, toWindow(info.layers[index].window, info.reflection.window));
     if (!this.upload.effects) return;
     const [ex, ey, ew, eh] = info.layers[index].effectsRect;
     gl.uniform4fv(
@@ -292,6 +303,12 @@ export class LayerRenderer {
 }
 
 const cssOf = ([r, g, b, a]) => `rgb(${255 * r} ${255 * g} ${255 * b} / ${a})`;
+
+/** (s, t) over one window of (u, v) -> that over another: times the first two, plus the last two. @returns {number[]} */
+function toWindow([u0, u1, v0, v1], [wu0, wu1, wv0, wv1]) {
+  const [height, width] = [wu1 - wu0, wv1 - wv0];
+  return [(v1 - v0) / width, (u1 - u0) / height, (v0 - wv0) / width, (wu1 - u1) / height];
+}
 
 /** From warm (outermost) to cold (innermost). @returns {number[]} RGBA */
 function wireColour(index, count) {

@@ -39,14 +39,40 @@ uniform sampler2D effects;
 uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
 uniform float effectsScale; // 0: off
 #endif
+#ifdef REFLECTION
+uniform sampler2D reflection;
+uniform vec4 environmentRect; // of the reflection's picture, pixels; so are the next three
+uniform vec4 glossRect;
+uniform vec4 offsetRect;
+uniform vec4 normalsRect;
+uniform vec3 reflectionScales; // of environment, gloss, offset; all 0: off
+uniform vec4 toMaps; // (s, t) of this layer -> that of the maps: times xy, plus zw
+#endif
 in vec2 st;
 in vec3 point;
 out vec4 result;
 
-vec4 look(sampler2D image, vec4 rect, vec2 offset) {
+vec4 lookAt(sampler2D image, vec4 rect, vec2 at) {
   vec2 margin = 0.5 / rect.zw;
-  return texture(image, (rect.xy + offset + clamp(st, margin, 1.0 - margin) * rect.zw) / vec2(textureSize(image, 0)));
+  return texture(image, (rect.xy + clamp(at, margin, 1.0 - margin) * rect.zw) / vec2(textureSize(image, 0)));
 }
+
+vec4 look(sampler2D image, vec4 rect, vec2 offset) {
+  return lookAt(image, vec4(rect.xy + offset, rect.zw), st);
+}
+
+#ifdef REFLECTION
+vec3 reflected() {
+  vec2 at = st * toMaps.xy + toMaps.zw;
+  vec3 normal = normalize(lookAt(reflection, normalsRect, at).rgb * 2.0 - 1.0);
+  vec3 along = normalize(point - eye);
+  vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+  vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
+  vec3 light = lookAt(reflection, environmentRect, place).rgb * reflectionScales.x;
+  float gloss = lookAt(reflection, glossRect, at).r * reflectionScales.y;
+  return gloss * light - (lookAt(reflection, offsetRect, at).rgb * 2.0 - 1.0) * reflectionScales.z;
+}
+#endif
 
 void main() {
   vec3 colour = look(picture, colourRect, vec2(0.0)).rgb;
@@ -59,6 +85,9 @@ void main() {
     }
     colour = clamp(colour, 0.0, 1.0);
   }
+#endif
+#ifdef REFLECTION
+  colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif
   if (kind == 1) colour = vec3(1.0);
   if (kind == 2) colour = vec3(1.0 - clamp((distance(eye, point) - range.x) / (range.y - range.x), 0.0, 1.0));

@@ -27,6 +27,7 @@ from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
+from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Epochs, Level, plan
 from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
@@ -108,6 +109,7 @@ class _Trainer:
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
+        self.gloss = GlossFit(fit.window, params.reflection, cameras.scene.poses is not None)
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
@@ -120,6 +122,7 @@ class _Trainer:
         saved = self.state.snapshot()
         for _ in range(self.params.divergence.attempts):
             if self._attempt(level, number, live, bar):
+                self._judge_reflection(number, bar)
                 return
             self.state.restore(saved)
             self.rate /= self.params.divergence.slow_down
@@ -132,13 +135,23 @@ class _Trainer:
             remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
         )
 
+    def _judge_reflection(self, number: int, bar: tqdm) -> None:
+        """After a level, where it is time: whether the reflection helps."""
+        assert self.state is not None and self.views is not None
+        rounds = len(self.params.geometry.rounds)
+        found = self.gloss.after(number, rounds, self.state, self.views, self.images)
+        if found is not None:
+            self.events.append(found)
+            bar.write(f"train: {found}")
+
     def _prepare(self, level: Level) -> None:
         """Geometry, stored crossings and grids of this level."""
         moved = self.geometry != level.geometry
         if moved and self.state is not None:
             self._recentre()
         self.geometry = level.geometry
-        if moved or self.stride != level.stride:
+        new_rays = moved or self.stride != level.stride
+        if new_rays:
             finest = level.texels if level.stride > 1 else self.fit.texels
             share = self.params.textures.rays_per_texel * finest[0] * finest[1]
             self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving)
@@ -153,6 +166,8 @@ class _Trainer:
             self.state.grow(level.texels)
         if moved:
             self.state.reset_alpha()
+        if new_rays:
+            self.gloss.follow(self.state, self.views, self.images, self.middle)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
@@ -202,6 +217,8 @@ class _Trainer:
             best = min(best, recent)
             if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
                 return False
+            if self.gloss.due(i, level):
+                self.gloss.fit(self.state, self.views, self.images)
             self.iteration += 1
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
@@ -253,7 +270,8 @@ class _Trainer:
         h, w = state.shape
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
         manifolds = RadialManifolds(self.centre, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
-        textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames)
+        reflection = self.gloss.model()
+        textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames, reflection)
         with torch.no_grad():
             textures.colour.copy_(state.colour[0].view(h, w, 3))
             textures.layers.copy_(state.layers[0].view(h, w, n, 4)[:, :, first : last + 1])
@@ -266,6 +284,7 @@ class _Trainer:
             texels=(h, w),
             num_layers=last - first + 1,
             num_frames=self.scene.num_frames,
+            reflection=None if reflection is None else (*reflection.shape.maps, reflection.shape.environment),
             fingerprint=fingerprint,
         )
         return RadianceManifolds(manifolds, textures), spec

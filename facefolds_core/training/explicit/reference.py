@@ -64,6 +64,7 @@ def shade(
     target: Tensor,  # [R, 3] in [0, 1]
     background: Tensor,  # [R, 3]
     texture: Tensor,  # [H, W, N, 4]
+    shine: Tensor | None,  # [R, 3]
     opacity_weight: float,
     binarisation_weight: float,
     rate: float,
@@ -76,7 +77,8 @@ def shade(
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha, min_light), rgba[..., 3], 0.0)
         weights, transmittance = compositing_weights(alpha)
-        colour = (weights[..., None] * rgba[..., :3]).sum(1) + transmittance[:, None] * background
+        rgb = rgba[..., :3] if shine is None else rgba[..., :3] + shine[:, None]
+        colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * background
         squares = (colour - target).square().sum()
         nearly = transmittance.clamp(max=0.5)
         loss = (

@@ -20,7 +20,7 @@ _scatter = scatter_of(4)
 
 
 @inlined
-def _tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
+def rgba_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     one = np.float32(1.0)
     top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
     bottom = texture[i + 1, j, n, q] * (one - b) + texture[i + 1, j + 1, n, q] * b
@@ -36,6 +36,7 @@ def shade(  # type: ignore[no-untyped-def]
     images,  # (C, H W, 3) uint8
     background,  # (C, H W, 3) float32, updated in place
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
+    shine,  # (P, 3) float32, added to the colours that a ray meets; (0, 3) for none
     gradient,  # (N, H, W, 4), added to
     opacity_weight,  # weight of opacity
     binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
@@ -74,6 +75,7 @@ def shade(  # type: ignore[no-untyped-def]
                 images,
                 background,
                 texture,
+                shine,
                 terms,
                 index[:, first:last],
                 wish[:, first:last],
@@ -96,6 +98,7 @@ def _shade(
     images: Any,
     background: Any,
     texture: Any,
+    shine: Any,
     terms: Any,
     index: Any,
     wish: Any,
@@ -108,10 +111,13 @@ def _shade(
     layer = np.empty(layers, np.int64)
     c = np.empty((layers, 4), np.float32)
     before = np.empty(layers, np.float32)
+    added = np.empty(3, np.float32)
     total = 0.0
     for k in range(rays.shape[0]):
         p = rays[k]
         transmittance, r0, r1, r2 = one, zero, zero, zero
+        for q in range(3):
+            added[q] = shine[p, q] if shine.shape[0] > 0 else zero
         m = 0
         for n in range(layers):
             index[n, k] = -1
@@ -120,13 +126,13 @@ def _shade(
                 continue
             j, b = corner(codes[p, n, 0], width)
             i, a = corner(codes[p, n, 1], height)
-            alpha = _tap(texture, i, j, n, 3, a, b)
+            alpha = rgba_tap(texture, i, j, n, 3, a, b)
             if alpha < min_alpha:
                 continue
             index[n, k] = i * width + j
             wish[n, k, 0], wish[n, k, 1] = a, b
             for q in range(3):
-                c[m, q] = _tap(texture, i, j, n, q, a, b)
+                c[m, q] = rgba_tap(texture, i, j, n, q, a, b) + added[q]
             c[m, 3] = alpha
             layer[m], before[m] = n, transmittance
             light = transmittance * alpha
@@ -180,7 +186,7 @@ def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-unt
                 if codes[p, n, 0] > 0 and transmittance >= min_light:
                     j, b = corner(codes[p, n, 0], width)
                     i, a = corner(codes[p, n, 1], height)
-                    transmittance *= 1 - _tap(texture, i, j, n, 3, a, b)
+                    transmittance *= 1 - rgba_tap(texture, i, j, n, 3, a, b)
         for task in prange(layers):
             n = spread(task, layers)
             for k in range(own):

@@ -12,6 +12,7 @@ from torch import Tensor
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
+from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
 from facefolds_core.training.explicit.views import Rays, Views
 
@@ -49,6 +50,7 @@ class TextureState:
             borders at the first and last rows and columns.
         background: [C, pixels, 3] float32.
         params: of the training.
+        shine: (P, 3) what the reflection adds to each ray of the views; (0, 3) where there is none.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
     """
 
@@ -72,6 +74,7 @@ class TextureState:
         self.start = start.to(device)
         self.colour[0] = self._start()[:, :3]
         self.background = background.to(device)
+        self.shine = np.zeros((0, 3), np.float32)
         self.reset_alpha()
         self._allocate()
 
@@ -149,6 +152,7 @@ class TextureState:
                 images,
                 self.background.numpy(),
                 texture.numpy().reshape(h, w, n, 4),
+                self.shine,
                 self.gradient.numpy().reshape(n, h, w, 4),
                 weights.opacity,
                 weights.binarisation,
@@ -197,6 +201,7 @@ class TextureState:
             target,
             self.background[at],
             texture.view(*self.shape, n, 4),
+            torch.from_numpy(self.shine[rays]).to(self.device) if len(self.shine) else None,
             weights.opacity,
             weights.binarisation,
             self.params.background.rate,
@@ -226,6 +231,13 @@ class TextureState:
             else:
                 smoothed = smooth_reference(logits, *self.shape)
             logits.copy_(smoothed)
+
+    def look(self, views: Views, images: NDArray[np.uint8], frame: int, seen: NDArray[np.float32]) -> None:
+        """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
+        (h, w), n = self.shape, self.layers.shape[2]
+        texture = self.activated(frame).cpu().numpy().reshape(h, w, n, 4)
+        background, least = self.background.cpu().numpy(), self.params.textures.min_light
+        look(views.codes, views.camera, views.pixel, images, background, texture, seen, least)
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""

@@ -27,11 +27,13 @@ class Views:
             steps.
         camera: (P,) int32, position in the list of training cameras.
         pixel: (P,) int32, row-major.
+        directions: (P, 3) float32, unit vectors.
     """
 
     codes: NDArray[np.uint16]
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
+    directions: NDArray[np.float32]
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
@@ -40,7 +42,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    codes, cameras, pixels = [], [], []
+    codes, cameras, pixels, along = [], [], [], []
     centre = manifolds.centre.cpu().numpy().astype(np.float64)
     window = np.array(manifolds.window)
     for position, index in enumerate(scene.indices("train")):
@@ -54,7 +56,8 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
         codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
         cameras.append(np.full(len(hit), position, np.int32))
         pixels.append(chosen[hit].astype(np.int32))
-    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels))
+        along.append(directions[hit].astype(np.float32))
+    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels), np.concatenate(along))
     if len(views.pixel) == 0:
         raise _nothing_seen(scene)
     return views
@@ -152,7 +155,7 @@ class MovingRays:
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)
-            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel))
+            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel, views.directions))
             if size <= self._room:
                 self._kept[frame, number] = views
                 self._room -= size
@@ -169,7 +172,8 @@ class MovingRays:
         hit = np.flatnonzero((distance > 0).any(1))
         codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window)
         camera = np.repeat(np.arange(len(chosen), dtype=np.int32), [len(pixels) for pixels in chosen])
-        return Views(codes, camera[hit], np.concatenate(chosen)[hit].astype(np.int32))
+        pixels = np.concatenate(chosen)[hit].astype(np.int32)
+        return Views(codes, camera[hit], pixels, directions[hit].astype(np.float32))
 
     def _rays(self, camera: int, frame: int, pixels: NDArray[np.int64]) -> tuple[Array, Array]:
         """Origins minus c and directions (R, 3) through pixels (R,)."""
@@ -199,15 +203,25 @@ class Images:
 
     def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
         self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)
-        self.store = scene.open_frames()
+        self.store, self._plates = scene.open_frames(), scene.open_plates()
         self.cameras = scene.indices("train")
 
     def frame(self, index: int) -> NDArray[np.uint8]:
         """(C, H W, 3)."""
-        images = [self.store.image(c, index) for c in self.cameras]
-        if self.tables is not None:
-            images = [cv2.LUT(image, table).astype(np.uint8) for image, table in zip(images, self.tables, strict=True)]
+        images = [self._alike(position, self.store.image(c, index)) for position, c in enumerate(self.cameras)]
         return np.stack([image.reshape(-1, 3) for image in images])
+
+    def plates(self) -> list[NDArray[np.uint8] | None]:
+        """Of each camera its clean plate (H, W, 3), or None."""
+        plates = self._plates
+        return [
+            self._alike(position, plates.image(c, 0)) if plates is not None and (c, 0) in plates else None
+            for position, c in enumerate(self.cameras)
+        ]
+
+    def _alike(self, position: int, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """An image of the camera at a position of the list, without its gains."""
+        return image if self.tables is None else cv2.LUT(image, self.tables[position]).astype(np.uint8)
 
 
 def _tables(gains: NDArray[np.float64]) -> list[NDArray[np.uint8]]:

@@ -1,4 +1,4 @@
-/** What a level has on the graphics card: vertex arrays, the picture's texture and that of the view effects. */
+/** What a level has on the graphics card: vertex arrays, the picture's texture and those of view effects and reflection. */
 
 export class Upload {
   /** @param {WebGL2RenderingContext} gl @param {import("../levels.js").LoadedLevel} level */
@@ -7,6 +7,7 @@ export class Upload {
     this.layers = level.geometries.map((geometry) => this.#layer(geometry));
     this.picture = this.#texture();
     this.effects = level.effects ? this.#texture(level.effects) : null;
+    this.reflection = level.reflection ? this.#texture(level.reflection) : null;
   }
 
   #layer({ index, position, uv }) {
@@ -88,5 +89,6 @@ export class Upload {
     }
     gl.deleteTexture(this.picture);
     if (this.effects) gl.deleteTexture(this.effects);
+    if (this.reflection) gl.deleteTexture(this.reflection);
   }
 }

@@ -142,9 +142,36 @@ func _build_layers():
 		instance.material_override = depth
 		instance.cast_shadow = GeometryInstance.SHADOW_CASTING_SETTING_OFF
 		add_child(instance)
+	var problem = _add_reflection()
+	if problem != "":
+		return problem
 	_set_all("slices", float(count))
 	_set_all("centre", bounds.position + bounds.size / 2)
 	_set_all("radius", bounds.size.length() / 2)
+	return ""
+
+
+# Optional: what gloss adds, by the direction.
+func _add_reflection():
+	if not contents.has("reflection"):
+		return ""
+	var reflection = contents.reflection
+	var image = Image.new()
+	if image.load(folder.plus_file(reflection.file)) != OK:
+		return "cannot read " + folder.plus_file(reflection.file)
+	var texture = ImageTexture.new()
+	texture.create_from_image(image, Texture.FLAG_FILTER)
+	_set_all("reflection", texture)
+	_set_all("reflection_size", Vector2(reflection.width, reflection.height))
+	for name in ["environment_rect", "gloss_rect", "offset_rect", "normals_rect"]:
+		var r = reflection[name]
+		_set_all(name, Plane(r[0], r[1], r[2], r[3]))
+	var scales = reflection.scales
+	_set_all("reflection_scales", Vector3(scales[0], scales[1], scales[2]))
+	for index in contents.layers.size():
+		var m = contents.layers[index].to_maps
+		for material in [_materials[2 * index], _materials[2 * index + 1]]:
+			material.set_shader_param("to_maps", Plane(m[0], m[1], m[2], m[3]))
 	return ""
 
 

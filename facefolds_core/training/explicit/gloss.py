@@ -1,0 +1,120 @@
+"""The shared reflection along a training: when it is fitted, to what, and whether it stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.model.reflection import Reflection
+from facefolds_core.params import ReflectionParams
+from facefolds_core.training.explicit.plan import Level
+from facefolds_core.training.explicit.reflection import (
+    Maps,
+    Seen,
+    centred,
+    fit_maps,
+    gain_on_cameras,
+    grounded,
+    surface_normals,
+)
+from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.views import Images, Rays, StillRays, Views
+
+
+class GlossFit:
+    """Fits the reflection to what the textures leave over, and gives the textures' rays what it adds.
+
+    Attributes:
+        maps: as fitted last; None before the first fit, and where there is no reflection.
+        on: whether there is one.
+    """
+
+    def __init__(self, window: Window, params: ReflectionParams, turns: bool) -> None:
+        self.window, self.params = window, params
+        self.on = params.enabled and not turns
+        self.maps: Maps | None = None
+        self._normals: NDArray[np.float32] | None = None
+
+    def follow(self, state: TextureState, source: Rays, images: Images, middle: torch.Tensor) -> None:
+        """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
+        if not self.on:
+            return
+        blank = Maps.blank(self.window, self.params)
+        radii = middle.cpu().numpy().astype(np.float64)
+        self._normals = surface_normals(radii, self.window, blank.gloss.shape[:2], self.params.normal_blur)
+        if self.maps is not None:
+            self.maps = replace(self.maps, normals=self._normals)
+            self._shine(state, self._look(state, source, images))
+
+    def due(self, step: int, level: Level) -> bool:
+        """Whether to fit after this step of a level: `fits` times, the last after its last one."""
+        fits, steps = self.params.fits, level.iterations
+        begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
+        return self.on and begun and (step + 1) * fits // steps > step * fits // steps
+
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, images: Images) -> Fact | None:
+        """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
+        `begin: end` it is fitted now."""
+        if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
+            return None
+        found = self.decide(state, source, images)
+        if self.on and self.params.begin == "end":
+            self.fit(state, source, images)
+        return found
+
+    def fit(self, state: TextureState, source: Rays, images: Images) -> None:
+        """Fit to what the textures leave over now."""
+        seen = self._look(state, source, images)
+        used = self._used(seen)
+        first = self.maps is None
+        assert self._normals is not None
+        start = replace(Maps.blank(self.window, self.params), normals=self._normals) if first else self.maps
+        assert start is not None
+        rounds = self.params.first_rounds if first else self.params.rounds
+        maps = grounded(fit_maps(used, start, rounds, self.params))
+        # Textures that are still trained would follow an offset that takes up what they leave over.
+        self.maps = maps if self.params.begin == "end" else centred(maps, used, self.params)
+        self._shine(state, seen)
+
+    def decide(self, state: TextureState, source: Rays, images: Images) -> Fact:
+        """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
+        assert self._normals is not None
+        start = replace(Maps.blank(self.window, self.params), normals=self._normals)
+        gain = gain_on_cameras(self._used(self._look(state, source, images)), start, self.params)
+        self.on = gain >= self.params.min_gain
+        if not self.on:
+            self.maps, state.shine = None, np.zeros((0, 3), np.float32)
+        return fact("reflection" if self.on else "no_reflection", gain=gain, least=self.params.min_gain)
+
+    def model(self) -> Reflection | None:
+        """What the model gets."""
+        return None if self.maps is None else self.maps.model()
+
+    def _look(self, state: TextureState, source: Rays, images: Images) -> Seen:
+        views = _views(source)
+        sums = np.zeros((len(views.pixel), 6), np.float32)
+        frames = sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.frames)})
+        for frame in frames:
+            state.look(views, images.frame(frame), frame, sums)
+        return Seen.of(views.camera, views.directions, sums, len(frames))
+
+    def _used(self, seen: Seen) -> Seen:
+        """The rays of a fit."""
+        opaque = np.flatnonzero(seen.opacity >= self.params.min_opacity)
+        step = max(1, -(-len(opaque) // self.params.rays))
+        return seen.part(opaque[::step])
+
+    def _shine(self, state: TextureState, seen: Seen) -> None:
+        assert self.maps is not None
+        state.shine = self.maps.added(seen.st, seen.directions)
+
+
+def _views(source: Rays) -> Views:
+    """The rays of a head that stands still, the same in all frames."""
+    assert isinstance(source, StillRays)  # a head that turns has no reflection yet
+    return source.views

@@ -1,0 +1,158 @@
+"""The shared reflection: kernels against torch, its fit against a known one, and whether it is left out."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
+from facefolds_core.model.reflection import Reflection, ReflectionShape
+from facefolds_core.params import ReflectionParams
+from facefolds_core.training.explicit import reference
+from facefolds_core.training.explicit.reflection import (
+    Maps,
+    Seen,
+    centred,
+    fit_maps,
+    gain_on_cameras,
+    grounded,
+    surface_normals,
+    values_at,
+)
+from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
+
+WINDOW = (-0.5, 0.4, -0.3, 0.6)
+PARAMS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
+
+
+def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8), environment: int = 8) -> Maps:
+    rng = np.random.default_rng(seed)
+    normals = np.stack([np.ones(shape), *(0.3 * rng.standard_normal((2, *shape)))], -1)
+    gloss, offset = rng.random(shape), 0.2 * rng.random((*shape, 3))
+    light = rng.random((environment, environment, 3))
+    return Maps(*(np.asarray(x, np.float32) for x in (gloss, offset, normals, light)))
+
+
+def _rays(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Places, and directions from before the face."""
+    rng = np.random.default_rng(seed)
+    along = np.stack([-np.ones(count), *rng.uniform(-0.8, 0.8, (2, count))], -1)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return rng.random((count, 2), np.float32), along.astype(np.float32)
+
+
+def test_compiled_reflection_is_that_of_the_model() -> None:
+    """Turned-away normals included: there the direction goes on."""
+    maps = _random_maps(shape=(5, 7))
+    st, along = _rays(2000)
+    along[::5] *= -1
+    expected = maps.model().added(torch.from_numpy(st), torch.from_numpy(along))
+    torch.testing.assert_close(torch.from_numpy(maps.added(st, along)), expected.detach(), atol=2e-5, rtol=0)
+
+
+def test_a_mirror_before_the_face_shows_what_is_behind_the_eye() -> None:
+    """A normal along +x, seen from +x: the reflected direction is +x, in the middle of the environment."""
+    module = Reflection(ReflectionShape((2, 2), 3))
+    with torch.no_grad():
+        module.gloss.fill_(1)
+        module.normals.copy_(torch.tensor([1.0, 0, 0]))
+        module.environment[1, 1] = torch.tensor([0.2, 0.4, 0.6])
+        added = module.added(torch.tensor([[0.5, 0.5]]), torch.tensor([[-1.0, 0, 0]]))
+    torch.testing.assert_close(added, torch.tensor([[0.2, 0.4, 0.6]]))
+
+
+def test_look_is_the_difference_of_photo_and_reference() -> None:
+    rng = np.random.default_rng(0)
+    codes = rng.integers(0, 65536, (400, 4, 2)).astype(np.uint16)
+    codes[codes[..., 1] == 0] = 0
+    texture = rng.random((6, 9, 4, 4), np.float32)
+    images, background = rng.integers(0, 256, (1, 400, 3)).astype(np.uint8), rng.random((1, 400, 3), np.float32)
+    seen = np.zeros((400, 6), np.float32)
+    look(codes, np.zeros(400, np.int32), np.arange(400, dtype=np.int32), images, background, texture, seen, 0.002)
+    rgba = reference.look_up(torch.from_numpy(codes.astype(np.int32)), torch.from_numpy(texture))
+    weights, through = reference.compositing_weights(rgba[..., 3])
+    st = (torch.from_numpy(codes.astype(np.float32)) - 1) / 65534
+    colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * torch.from_numpy(background[0])
+    expected = torch.cat([torch.from_numpy(images[0]) / 255 - colour, 1 - through[:, None]], 1)
+    expected = torch.cat([expected, (weights[..., None] * st).sum(1)], 1)
+    torch.testing.assert_close(torch.from_numpy(seen), expected, atol=5e-3, rtol=0)  # what lies behind T < 0.002
+
+
+def test_normal_equations_are_those_of_a_dense_matrix() -> None:
+    rng = np.random.default_rng(0)
+    st, weight = rng.random((300, 2), np.float32), rng.random(300, np.float32)
+    wish = rng.random((300, 2), np.float32)
+    h, w = 4, 5
+    band, right = np.zeros((w + 2, h * w)), np.zeros((h * w, 2))
+    normal_equations(st, weight, wish, h, w, band, right)
+    rows = np.stack([values_at(one.reshape(h, w, 1), st) for one in np.eye(h * w, dtype=np.float32)], 1)[..., 0]
+    full = (rows * weight[:, None]).T @ rows
+    found = np.zeros_like(full)
+    for below in range(w + 2):
+        for column in range(h * w - below):
+            found[column + below, column] = band[below, column]
+    np.testing.assert_allclose(found, np.tril(full), atol=1e-4)
+    np.testing.assert_allclose(right, rows.T @ wish, atol=1e-4)
+
+
+def _start(truth: Maps) -> Maps:
+    """The right normals, nothing else known."""
+    blank = Maps.blank(WINDOW, PARAMS)
+    return Maps(blank.gloss, blank.offset, truth.normals, blank.environment)
+
+
+def _seen(maps: Maps, strength: float, noise: float = 0.01) -> Seen:
+    """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
+    st, along = _rays(20_000)
+    rng = np.random.default_rng(2)
+    known = centred(maps, Seen(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), along), PARAMS)
+    residual = strength * known.added(st, along) + noise * rng.standard_normal((len(st), 3)).astype(np.float32)
+    camera = (np.arange(len(st)) % 8).astype(np.int32)
+    return Seen(camera, along, st, np.ones(len(st), np.float32), residual.astype(np.float32))
+
+
+def test_a_known_reflection_is_found() -> None:
+    truth = _random_maps(3)
+    seen = _seen(truth, 0.2)
+    start = _start(truth)
+    found = centred(fit_maps(seen, start, 12, PARAMS), seen, PARAMS)
+    left = seen.residual - found.added(seen.st, seen.directions)
+    noise = 1e-4
+    assert left.var() - noise < 0.1 * (seen.residual.var() - noise)  # seen: 0.07
+    assert found.gloss.min() >= 0
+
+
+def test_light_begins_at_nothing_and_the_sum_stays() -> None:
+    maps, (st, along) = _random_maps(3), _rays(500)
+    lit = Maps(maps.gloss, maps.offset, maps.normals, maps.environment - np.float32(0.7))
+    found = grounded(lit)
+    assert found.environment.min() == 0
+    np.testing.assert_allclose(found.added(st, along), lit.added(st, along), atol=1e-5)
+
+
+@pytest.mark.parametrize("strength, helps", [(0.2, True), (0.0, False)])
+def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool) -> None:
+    """On matte noise a fit always gains on its own rays, and nothing on others."""
+    truth = _random_maps(3)
+    start = _start(truth)
+    assert (gain_on_cameras(_seen(truth, strength), start, PARAMS) >= PARAMS.min_gain) == helps
+
+
+def test_the_fit_does_not_depend_on_threads() -> None:
+    truth = _random_maps(3)
+    seen, found = _seen(truth, 0.2), []
+    before = numba.get_num_threads()
+    try:
+        for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
+            numba.set_num_threads(threads)
+            found.append(fit_maps(seen, truth, 3, PARAMS))
+    finally:
+        numba.set_num_threads(before)
+    assert all(np.array_equal(getattr(found[0], n), getattr(found[1], n)) for n in ("gloss", "offset", "environment"))
+
+
+def test_normals_of_a_sphere_are_its_directions() -> None:
+    normals = surface_normals(np.full((40, 40), 0.3), WINDOW, (6, 6), 2.0)
+    np.testing.assert_allclose(normals, uv_to_directions(texel_uv(6, 6, WINDOW)), atol=2e-3)
