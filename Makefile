@@ -27,7 +27,7 @@ PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WO
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc repro
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc --wait-for-lock repro
 	@echo && $(BIN)/facefolds scores
 
 check: $(READY)

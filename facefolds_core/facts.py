@@ -50,6 +50,8 @@ WORDS = {
     "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
     "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
     "its size, and `stabilize: false` takes it to stand still: expect a blurred or doubled face",
+    "poses_refused": "warning: the pictures of frame {frames} fit no pose of the head; they are given that between "
+    "their neighbours'",
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
@@ -75,6 +77,8 @@ WORDS = {
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
+    "room_given_up": "with a room behind it the subject is fog, {depth:.2f} units deep (over {over:g}): the far sphere "
+    "is kept (train.room.max_thickness)",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import psutil
 import typer
 
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_json
-from facefolds_core.locks import holding, owner
+from facefolds_core.locks import Lock, holding, owner, try_lock
 from facefolds_core.paths import SubjectFolders, check_subject_name, subject_folders, subject_of_dvc_stage
+from facefolds_core.processes import end_with_parent
 
 Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
 Work = Callable[[SubjectFolders], str]
@@ -27,10 +25,7 @@ LOCK_WAIT = 20.0
 """Seconds that a stage waits for another run of it, which may be ending, on the same subject."""
 
 LOOK = 0.25
-"""Seconds between two looks at DVC's process."""
-
-GRACE = 10.0
-"""Seconds that a stage may clean up after DVC ended, before it is killed."""
+"""Seconds between two looks at DVC's lock."""
 
 
 def run_stage(name: str, work: Work, help_text: str) -> None:
@@ -56,6 +51,7 @@ def run_stage(name: str, work: Work, help_text: str) -> None:
                 write_json(folders.timing(name), {"stage": name, "seconds": round(seconds, 3)})
                 said, *more = made.splitlines()
                 typer.echo("\n".join([f"{name}: {said} ({seconds:.1f} s)", *more]))
+            wait_for_other_dvcs()
 
     _run(name, command, help_text)
 
@@ -79,6 +75,7 @@ def run_for_all(name: str, work: Callable[[Path], str], help_text: str) -> None:
                 start = time.perf_counter()
                 made, *notes = work(data).splitlines()
                 typer.echo("\n".join([f"{name}: {made} ({time.perf_counter() - start:.1f} s)", *notes]))
+            wait_for_other_dvcs()
 
     _run(name, command, help_text)
 
@@ -115,35 +112,31 @@ def end_with_dvc() -> None:
     """End this stage when the DVC that started it has ended, however it ended: nobody else waits for its results.
 
     A stage started by hand goes on: its terminal may be closed on purpose (`nohup`).
-
-    A thread looks; Linux' PR_SET_PDEATHSIG would be sent when the thread of DVC that started us ends, not DVC, and
-    not at all where a shell stands between.
     """
-    if "DVC_STAGE" not in os.environ:  # DVC sets it for the commands that it runs
-        return
-    parent = psutil.Process().parent()
-    if parent is None:
-        return
-    chain = [(psutil.Process(), parent.pid)]
-    try:
-        if "-c" in parent.cmdline()[1:] and (above := parent.ppid()):  # a shell that waits for us
-            chain.append((parent, above))
-    except psutil.Error:
-        pass  # it ended just now: the thread sees it
-    threading.Thread(target=_watch, args=(chain,), daemon=True, name="end with DVC").start()
+    if "DVC_STAGE" in os.environ:  # DVC sets it for the commands that it runs
+        end_with_parent()
 
 
-def _watch(chain: list[tuple[psutil.Process, int]]) -> None:
-    """Wait until a process of `chain` has another parent than the one noted, which has ended; then end this one."""
-    while all(_parent(child) == pid for child, pid in chain):
+def wait_for_other_dvcs() -> None:
+    """Wait until no other DVC holds the lock of this project's folder.
+
+    The DVC that started this stage takes the lock when the stage has ended, gives up after 3 s (treeverse/dvc,
+    dvc/lock.py), and then what was made is not recorded: made for nothing. Others hold it while they hash or push.
+    """
+    root = os.environ.get("DVC_ROOT")
+    if root is None:
+        return
+    told = False
+    while (lock := _try_dvcs_lock(Path(root, ".dvc", "tmp", "lock"))) is None:
+        if not told:
+            typer.echo("waiting for another DVC that is at work in this folder, so that what was made is recorded")
+            told = True
         time.sleep(LOOK)
-    os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(GRACE)
-    os.kill(os.getpid(), signal.SIGKILL)
+    lock.release()
 
 
-def _parent(process: psutil.Process) -> int:
+def _try_dvcs_lock(path: Path) -> Lock | None:
     try:
-        return int(process.ppid())
-    except psutil.Error:
-        return -1
+        return try_lock(path, create=False)
+    except OSError:  # no such file, or one that is not ours to open: nobody to wait for
+        return Lock(os.open(os.devnull, os.O_RDONLY))

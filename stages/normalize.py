@@ -10,6 +10,7 @@ from facefolds_core.captures.sources import read_capture
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.params import CaptureParams, NormalizeParams
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.registration import with_found_poses
 from stages.common import run_stage
 
 SHOWN = 5
@@ -42,7 +43,7 @@ def normalize(folders: SubjectFolders) -> str:
     params = read_stage(NormalizeParams, folders.config)
     capture = read_capture(subject, folders, read_stage(CaptureParams, folders.config))
     plan = plan_scene(capture, folders.root.name, subject, params, folders.scene)
-    for line in left_out(write_plan(plan, params)):
+    for line in left_out(with_found_poses(write_plan(plan, params), params)):
         typer.echo(line)
     return summary(plan)
 

@@ -83,6 +83,8 @@ export class FacefoldsPlayer extends HTMLElement {
   readonly shareable: boolean;
   loop: boolean;
   speed: number;
+  /** A head that turns is held still. */
+  still: boolean;
   /** Any colour of CSS. */
   background: string;
   /** How far the layers are pulled apart, 0 to 1. */

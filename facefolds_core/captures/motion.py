@@ -12,7 +12,7 @@ from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.track import Track, mean_rotation, rigid_motion
+from facefolds_core.geometry.track import Track, own_track, rigid_motion
 from facefolds_core.params import NormalizeParams
 
 Array = NDArray[np.float64]
@@ -40,18 +40,22 @@ def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity,
         UserError: if it is asked for, and the capture has nothing to know it from.
     """
     tracking = capture.tracking
+    if params.stabilize == "found":
+        return HeadMotion(None, ())
     if tracking is None:
         if params.stabilize is True:
             raise UserError(
                 "there are no head poses to stabilise by",
                 file=capture.root,
                 expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
-                remedy="set `stabilize: false` in `normalize` for this subject",
+                remedy="set `stabilize: found` in `normalize` for this subject, which looks for them in the pictures",
             )
         return HeadMotion(None, ())
     rotations, translations, source = _poses(tracking, frames)
     vertices = similarity.apply(tracking.world_vertices()[list(frames)])
-    track = _own_frame(rotations, translations, vertices, similarity)
+    moves = zip(rotations, translations, strict=True)
+    poses = [similarity.after(Similarity(1.0, R, t)).after(similarity.inverse()) for R, t in moves]
+    track = own_track(poses, _middles(vertices))
     size = float(np.ptp(vertices, axis=1).max(1).mean())
     found = {"degrees": float(track.degrees().max()), "shift": _shift(track, vertices) / max(size, 1e-12)}
     much = found["degrees"] > params.motion.degrees or found["shift"] > params.motion.shift
@@ -83,25 +87,6 @@ def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str
         motions = [rigid_motion(shape, points) for points in vertices]
         shape = np.mean([(points - t) @ R for points, (R, t) in zip(vertices, motions, strict=True)], 0)
     return np.array([R for R, _ in motions]), np.array([t for _, t in motions]), "laid over the tracked meshes"
-
-
-def _own_frame(rotations: Array, translations: Array, vertices: Array, similarity: Similarity) -> Track:
-    """The motion against the mean pose: its rotation is the mean, and it has the head's middle where it is on average.
-
-    Args:
-        vertices: (K, V, 3) normalised, in the world.
-    """
-    poses = [
-        similarity.after(Similarity(1.0, R, t)).after(similarity.inverse())
-        for R, t in zip(rotations, translations, strict=True)
-    ]
-    R = np.array([pose.rotation for pose in poses])
-    middle = (vertices.min(1) + vertices.max(1)).mean(0) / 2
-    there = np.mean([pose.inverse().apply(box) for pose, box in zip(poses, _middles(vertices), strict=True)], 0)
-    mean = mean_rotation(R)
-    still = Similarity(1.0, mean, middle - mean @ there)
-    against = [pose.after(still.inverse()) for pose in poses]
-    return Track.of([one.rotation for one in against], [one.translation for one in against])
 
 
 def _middles(vertices: Array) -> Array:

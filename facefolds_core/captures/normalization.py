@@ -185,13 +185,14 @@ def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact]
     """
     held = _named("holdout", subject.holdout, names, unused, file)
     if isinstance(subject.holdout, HoldoutEvery) and not held:
-        every = subject.holdout.every
+        every, culled = subject.holdout.every, sum(one.kind == "culled" for one in unused)
         raise UserError(
             "too few cameras to hold one out",
             file=str(file),
             place="holdout",
             expected=f"at least {every} cameras for `holdout: {{every: {every}}}`",
-            found=f"{len(names)}: {shorten(names)}",
+            found=f"{len(names)}: {shorten(names)}"
+            + (f"; {culled} more were culled by elevation and azimuth (`normalize`)" if culled else ""),
             remedy=f"name one or two in `holdout` of this subject, such as ['{names[len(names) // 2]}']; with "
             "`holdout: []` all are trained on, and `evaluate` has nothing to score",
         )

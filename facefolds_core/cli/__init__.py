@@ -25,6 +25,7 @@ COMMANDS = {
     "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
     "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
+    "run": "Many subjects, or a grid of parameters, at once: here or on a cluster.",
     "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
     "recommend": "The best configuration within a budget, of such a table.",
@@ -38,6 +39,7 @@ EXTRAS = {
     "scores": "train",
     "report": "report",
     "waterfall": "train",
+    "run": "cluster",
     "collect": "pipeline",
     "recommend": "pipeline",
 }

@@ -117,6 +117,27 @@ def slerp(first: Array, second: Array, share: float) -> Array:
     return mixed / np.linalg.norm(mixed)
 
 
+def turn_of(vector: Array) -> Array:
+    """(3, 3) rotation about a vector (3,) by its length, radians."""
+    angle = float(np.linalg.norm(vector))
+    axis = vector / max(angle, 1e-30)
+    return rotation(np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)]))
+
+
+def own_track(poses: Sequence[Similarity], middles: Array) -> Track:
+    """The motion against the mean pose: its rotation is the mean, and it has the head's middle where it is on average.
+
+    Args:
+        poses: K rigid motions of something that moves with the head -> world.
+        middles: (K, 3) of the head, in the world.
+    """
+    there = np.mean([pose.inverse().apply(middle) for pose, middle in zip(poses, middles, strict=True)], 0)
+    mean = mean_rotation([pose.rotation for pose in poses])
+    still = Similarity(1.0, mean, middles.mean(0) - mean @ there)
+    against = [pose.after(still.inverse()) for pose in poses]
+    return Track.of([one.rotation for one in against], [one.translation for one in against])
+
+
 def mean_rotation(rotations: Sequence[Array] | Array) -> Array:
     """(3, 3) the rotation nearest to the mean of rotations (K, 3, 3) (chordal mean; Hartley et al. 2013)."""
     u, _, vt = np.linalg.svd(np.mean(np.asarray(rotations), 0))

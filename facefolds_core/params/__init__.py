@@ -5,7 +5,7 @@ below takes a number that somebody might tune from anywhere but a section (tests
 """
 
 from facefolds_core.params.base import Section, merged, nested, value_at
-from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams
+from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams, RegistrationParams
 from facefolds_core.params.compress import (
     BetweenParams,
     CodecName,
@@ -95,6 +95,7 @@ __all__ = [
     "ReconstructParams",
     "RefitParams",
     "ReflectionParams",
+    "RegistrationParams",
     "RoomParams",
     "SampleParams",
     "ScoreWarningParams",

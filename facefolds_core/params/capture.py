@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, FrameRate, ImageSide, Section, Seed
+from facefolds_core.params.base import Count, Factor, FrameRate, ImageSide, Length, Many, Natural, Section, Seed, Share
 
 
 class CaptureParams(Section):
@@ -50,6 +50,51 @@ class MotionParams(Section):
     """Shift of the head, shares of the tracked mesh's largest extent (of a head about 5 mm)."""
 
 
+class RegistrationParams(Section):
+    """How poses are found from the pictures (training/registration.py)."""
+
+    stride: Count = 3
+    """Every so-manieth pixel of each camera's picture of the reference frame is a point, if it shows the subject."""
+
+    scales: Annotated[Many[Share], Field(min_length=1)] = (0.032, 0.016, 0.008, 0.004)
+    """Blurs, from coarse to fine, standard deviations in shares of the picture's shorter side: the first bridges what
+    moves in a frame, the last is a pixel of 250."""
+
+    rounds: Natural = 3
+    """How often the depth of the points is corrected, and all frames are laid over the reference anew."""
+
+    max_deeper: Length = 0.01
+    """Units that a correction moves them at most, a voxel of the volume."""
+
+    steps: Count = 12
+    """Gauss-Newton steps a scale, at most."""
+
+    enough: Annotated[float, Field(gt=0, le=1)] = 2e-5
+    """A scale ends with a step of less, radians and units."""
+
+    damping: Share = 0.001
+    """Added to the normal equations, shares of their diagonal."""
+
+    outlier: Factor = 2.0
+    """Median residuals at which a point counts half: what performs or shines."""
+
+    min_opacity: Share = 0.9
+    """Of the volume on a ray that shows the subject's surface."""
+
+    min_cosine: Share = 0.3
+    """Between a point's normal and the direction to the camera."""
+
+    min_points: Count = 200
+    """Fewer tell no pose."""
+
+    min_likeness: Share = 0.6
+    """A frame whose pictures, at the pose found, correlate with the reference's less than this share of the median
+    frame's is refused: its pose is bridged."""
+
+    max_leap: Annotated[float, Field(gt=0, le=180)] = 8.0
+    """Degrees between a frame's pose and the middle of its neighbours', beyond which it is refused."""
+
+
 class NormalizeParams(Section):
     """From a capture to a scene: cameras, images and tracked mesh in the one convention."""
 
@@ -68,10 +113,14 @@ class NormalizeParams(Section):
     display_colour: bool = False
     """Apply Multiface's display colour correction."""
 
-    stabilize: bool | Literal["auto"] = "auto"
+    stabilize: bool | Literal["auto", "found"] = "auto"
     """Whether the model is made in the head's own frame: true moves each frame's cameras by the head's pose, false
     takes the head to stand still, "auto" decides by `motion`. Where the poses of the capture are all alike, those are
-    taken that lay its tracked meshes over one another. See docs/guide/subjects.md."""
+    taken that lay its tracked meshes over one another; where it has no tracked mesh, "auto" looks for them in the
+    pictures, as "found" does whatever the capture has. See docs/guide/subjects.md."""
 
     motion: MotionParams = MotionParams()
     """How much motion of the head is much."""
+
+    registration: RegistrationParams = RegistrationParams()
+    """How poses are found where the capture has none."""

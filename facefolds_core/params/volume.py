@@ -59,6 +59,10 @@ class VolumeParams(Section):
     binarisation_weight: Weight = 0.003
     """Of the binarisation loss, the sum over rays of t (1 - t), t = min(T, 1/2): a face is solid."""
 
+    matte_weight: Weight = 0.3
+    """Of half the squared distance of a ray's opacity from the capture's matte, where it has mattes. Colours may be off
+    by 0.1, opacities are known: what is beside the subject is empty, whatever it looks like."""
+
     smoothness_weight: Weight = 0.001
     """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
 
@@ -122,6 +126,11 @@ class RoomParams(Section):
 
     fog: Factor = 1.0
     """Optical depth at the start, from the ball to infinity: half of the volume's, behind which it lies."""
+
+    max_thickness: Length = 0.13
+    """Median depth over which the subject's surface is spread in the volume, units, above which the outer zone is given
+    up again: the volume explains the images, but by fog, which layers cannot show. `studio` 0.04, `fox` 0.10; of the
+    smooth pale plaster of `buddha` 0.15, and 0.12 without an outer zone."""
 
     step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
     """Between samples on a ray, voxels: no voxel is stepped over."""

@@ -193,6 +193,7 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
     """Truth, asset and error of each view."""
     result: list[dict[str, Any]] = []
     for view in subject.views:
+        shown = view.asset if view.over is None else view.over
         known = [name for name in HEADLINES if getattr(view, name) is not None]
         values = [f"{words.number(getattr(view, name))} dB {HEADLINE_WORDS[name]}" for name in known]
         values += place_words(places.get(view.camera))
@@ -209,8 +210,10 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
                 "height": view.truth.shape[0],
                 "width": view.truth.shape[1],
                 "truth": pictures.photo(view.truth),
-                "asset": pictures.photo(view.asset if view.over is None else view.over),
-                "error": pictures.error_map(view.asset, view.truth, view.mask),
+                "asset": pictures.photo(shown),
+                # Over the plate nothing is left out: what stands beside the subject is an error, too.
+                "error": pictures.error_map(shown, view.truth, view.mask if view.over is None else None),
+                "part": "of the subject alone" if view.over is None and view.mask is not None else "of the whole frame",
             }
         )
     return result

@@ -126,7 +126,8 @@ def quality_words(metrics: dict[str, Any]) -> str:
             f" The model without its view branch, of which the asset is made, reaches {number(before)} dB: "
             f"the export {'costs' if loss >= 0 else 'adds'} {number(abs(loss))} dB."
         )
-    inside, along = finite(asset.get("psnr_interior")), finite(asset.get("psnr_band"))
+    inside, band = finite(asset.get("psnr_interior")), finite(asset.get("psnr_band"))
+    along = finite(asset.get("psnr_band_over_plate")) or band
     if inside is not None and along is not None:
         text += f" Inside its outline it is {number(inside)} dB, along it {number(along)} dB."
     temporal = finite(asset.get("temporal"))

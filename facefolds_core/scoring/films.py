@@ -40,11 +40,21 @@ class FilmRoll:
     def __init__(self, path: Path, fps: Fraction, crf: int) -> None:
         self.frames: list[str] = []
         self._path, self._fps, self._crf = path, fps, crf
+        self._first: tuple[Array, Array] = (np.zeros((0, 0, 3)), np.zeros((0, 0, 3)))
         self._container: Any = None
         self._stream: Any = None
 
     def add(self, frame: str, truth: Array, asset: Array) -> None:
         """Args: `frame` its name; truth, asset (H, W, 3) in [0, 1]."""
+        self.frames.append(frame)
+        if len(self.frames) == 1:  # a single frame is no film: it waits for the second
+            self._first = (truth, asset)
+            return
+        if self._container is None:
+            self._write(0, *self._first)
+        self._write(len(self.frames) - 1, truth, asset)
+
+    def _write(self, position: int, truth: Array, asset: Array) -> None:
         both = np.concatenate([truth, asset], 1)
         both = np.pad(both, ((0, -both.shape[0] % 4), (0, 0), (0, 0)), mode="edge")  # planes of whole rows
         if self._container is None:
@@ -53,9 +63,8 @@ class FilmRoll:
         picture = np.concatenate([plane.ravel() for plane in planes]).reshape(-1, both.shape[1])
         video = av.VideoFrame.from_ndarray(picture, format="yuv420p")
         video.colorspace, video.color_range = Colorspace.ITU709, ColorRange.MPEG
-        video.pts, video.time_base = len(self.frames), 1 / self._fps
+        video.pts, video.time_base = position, 1 / self._fps
         self._container.mux(self._stream.encode(video))
-        self.frames.append(frame)
 
     def _open(self, width: int, height: int) -> None:
         muxer = {"fflags": "bitexact", "movflags": "faststart"}
@@ -98,5 +107,5 @@ class FilmFolder:
             yield roll
         finally:
             roll.close()
-        if roll.frames:
+        if len(roll.frames) > 1:
             self.files.append(FilmFile(camera, name, float(self._fps), tuple(roll.frames)))

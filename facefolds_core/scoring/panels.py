@@ -72,8 +72,7 @@ class Panel:
         return self.asset if self.over is None else self.over
 
     @property
-    def rank(self) -> tuple[bool, float]:
-        """Least for the worst picture of the asset: by PSNR within the subject, and pictures without one last."""
-        values = self.asset_score.values
-        within = next((v for name in ("psnr_subject", "psnr_found") if (v := values.get(name)) is not None), None)
-        return (within is None, within if within is not None else values["psnr"] or 0.0)
+    def rank(self) -> tuple[int, float]:
+        """Least for the worst picture of the asset: by the metric that says most, pictures that lack it last."""
+        key = self.asset_score.headline
+        return HEADLINES.index(key), self.asset_score.values[key] or 0.0

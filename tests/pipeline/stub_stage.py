@@ -46,7 +46,7 @@ def main() -> None:
             "video_bits_per_second": t,
         }
         cost |= {"train_seconds": 1.0, "export_seconds": 2.0}
-        metrics = {"subject": subject, "asset": {"psnr": 10 + r / 10 + t / 100, "lpips": None}, "cost": cost}
+        metrics = {"subject": subject, "asset": {"psnr_subject": 10 + r / 10 + t / 100, "lpips": None}, "cost": cost}
         Path("data", subject, "metrics.json").write_text(json.dumps(metrics))
 
 

@@ -14,6 +14,7 @@ import pytest
 
 import stages.common
 from facefolds_core.errors import UserError
+from facefolds_core.locks import try_lock
 from facefolds_core.paths import SubjectFolders
 from stages.common import alone
 
@@ -121,3 +122,21 @@ def test_a_stage_started_by_hand_outlives_its_terminal(folder: Path, project_roo
     process.communicate()
     assert not has_ended(stage, 1)
     os.kill(stage, signal.SIGKILL)
+
+
+def test_what_ends_while_another_dvc_holds_the_lock_is_recorded(folder: Path, project_root: Path) -> None:
+    """DVC gives up after 3 s; the stage therefore waits before it ends."""
+    (folder / ".dvc").mkdir()
+    (folder / ".dvc" / "config").write_text("[core]\n    analytics = false\n    no_scm = true\n")
+    (folder / "dvc.yaml").write_text(DVC_YAML.format("python stage.py --subject x"))
+    (folder / "seconds").write_text("1")
+    process = start(folder, project_root, sys.executable, "-m", "dvc", "repro")
+    wait_for(folder / "ready")
+    lock = try_lock(folder / ".dvc" / "tmp" / "lock")
+    assert lock is not None
+    time.sleep(6)
+    lock.release()
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, output
+    assert "waiting for another DVC" in output
+    assert "data/x/model" in (folder / "dvc.lock").read_text()

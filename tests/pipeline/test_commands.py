@@ -38,9 +38,9 @@ def facefolds(*words: str | Path) -> str:
 
 
 def test_all_commands_are_here() -> None:
-    """A new command needs a line here; `submission` films a capture of another source."""
+    """A new command needs a line here; three have tests elsewhere: tests/viewer, tests/rendering, tests/cluster."""
     text = Path(__file__).read_text(encoding="utf-8")
-    assert [name for name in COMMANDS if f'facefolds("{name}"' not in text] == ["submission"]
+    assert [name for name in COMMANDS if f'facefolds("{name}"' not in text] == ["export-html", "submission", "run"]
 
 
 def test_validate() -> None:
@@ -79,6 +79,12 @@ def test_report(project: TinyProject) -> None:
     assert [name for name in written if f">{name}<" not in page] == []
     scores = json.loads((project.root / "data" / "actor" / "metrics.json").read_text())
     assert f"{scores['asset']['psnr_subject']:.2f}" in page
+
+
+def test_scores(project: TinyProject) -> None:
+    scores = json.loads((project.root / "data" / "actor" / "metrics.json").read_text())
+    said = facefolds("scores")
+    assert f"{scores['asset']['psnr_subject']:.2f}" in said and "data/actor/asset" in said
 
 
 def test_waterfall(project: TinyProject) -> None:

@@ -83,7 +83,7 @@ def test_a_failed_cell_does_not_lose_the_others(grid: tuple[list[Run], Counter[s
     assert set(found) == {13, 128}
     assert found[13].error and not found[13].figures
     assert not found[128].error
-    assert found[128].figure("psnr") == pytest.approx(10 + 16 / 10 + 128 / 100)
+    assert found[128].figure("psnr_subject") == pytest.approx(10 + 16 / 10 + 128 / 100)
     assert found[128].figure("bytes") == 16 + 100 * 128
 
 

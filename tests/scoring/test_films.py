@@ -35,6 +35,15 @@ def test_every_frame_comes_back_side_by_side(tmp_path: Path, size: tuple[int, in
         np.testing.assert_allclose(picture[: height - 2, width + 4 : -4].mean(), 1 - grey, atol=0.02)
 
 
+def test_a_single_frame_is_no_film(tmp_path: Path) -> None:
+    folder = FilmFolder(tmp_path, 30.0, 18)
+    for camera in ("a@0", "a@1"):  # as a stabilised scene has them
+        with folder.roll(camera) as roll:
+            assert roll is not None
+            roll.add("0", np.zeros((16, 16, 3)), np.ones((16, 16, 3)))
+    assert folder.files == []
+
+
 def test_a_still_scene_has_none(tmp_path: Path) -> None:
     folder = FilmFolder(tmp_path, 0.0, 18)
     with folder.roll("a") as roll:

@@ -156,7 +156,7 @@ def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
     chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
-    levels = plan(chosen, _params(iterations=400))
+    levels = plan(chosen, _params(iterations=400), frames=11)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
 
@@ -218,7 +218,7 @@ def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: 
     write_frames(scene.folder / "frames.arrow", image.shape, [(i, 0, image) for i in range(len(scene.cameras))])
     with pytest.raises(UserError, match="a training image is missing") as caught:
         train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
-    assert "quick" in str(caught.value.remedy)
+    assert "dvc repro" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize("grey", [0, 90])

@@ -10,6 +10,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.outline import thickness
 from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.search import cut_share
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
@@ -82,6 +83,15 @@ def test_ears_at_the_edge_of_the_ball_are_noticed() -> None:
     ears = (np.abs(_points()[..., 0] - 0.15) < 0.05) & (np.abs(_points()[..., 1]) < 0.1) & (_points()[..., 2] > 0)
     volume = _volume((_ball(0.2, 0.0, 0.0, 0.0), 5.0), (ears, 5.0))
     assert cut_share(volume, (), PARAMS) > PARAMS.subject.max_cut
+
+
+def test_a_solid_head_is_thin_and_a_foggy_one_thick() -> None:
+    head = _ball(0.2, 0.0, 0.0, 0.0)
+    solid, fog = _volume((head, 8.0)), _volume((head, float(np.log(np.expm1(0.1)))))
+    assert thickness(solid, 0.5) < 2 * VOXEL
+    # Of 1 - exp(-s / 0.15) a tenth is reached 0.015 deep, nine tenths 0.3 deep; most ways through the ball are shorter.
+    assert 0.15 < thickness(fog, 0.5) < 0.25
+    assert thickness(_volume(), 0.5) == 0
 
 
 def test_nothing_solid_is_no_body() -> None:

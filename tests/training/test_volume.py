@@ -45,13 +45,12 @@ def _problem(rays: int = 200) -> dict[str, np.ndarray]:
         "jitter": rng.random(rays, np.float32),
         "target": colours[0],
         "background": colours[1],
+        "matte": np.where(rng.random(rays) < 0.5, rng.random(rays), -1).astype(np.float32),
         "grid": grid,
     }
 
 
-def _shade(
-    p: dict[str, np.ndarray], opacity_weight: float, binarisation_weight: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _shade(p: dict[str, np.ndarray], *weights: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     grid, rays = p["grid"], len(p["origins"])
     gradient, touched = kernel.empty_gradient(grid.shape)
     residual, transmittance = np.empty((rays, 3), np.float32), np.empty(rays, np.float32)
@@ -67,23 +66,24 @@ def _shade(
         touched,
         residual,
         transmittance,
-        opacity_weight,
-        binarisation_weight,
+        *weights,
     )
     return gradient.sum(0), residual, transmittance, squares
 
 
 @pytest.mark.parametrize(
-    "opacity_weight, binarisation_weight",
-    [(0.0, 0.0), (PARAMS.volume.opacity_weight, PARAMS.volume.binarisation_weight), (0.02, 0.05)],
+    "weights",
+    [
+        (0.0, 0.0, 0.0),
+        (PARAMS.volume.opacity_weight, PARAMS.volume.binarisation_weight, PARAMS.volume.matte_weight),
+        (0.02, 0.05, 0.7),
+    ],
 )
-def test_shading_matches_autograd(opacity_weight: float, binarisation_weight: float) -> None:
+def test_shading_matches_autograd(weights: tuple[float, float, float]) -> None:
     p = _problem()
-    gradient, residual, transmittance, squares = _shade(p, opacity_weight, binarisation_weight)
+    gradient, residual, transmittance, squares = _shade(p, *weights)
     tensors = {name: torch.from_numpy(value).double() for name, value in p.items()}
-    expected = reference.shade(
-        *tensors.values(), torch.from_numpy(LOWER), VOXEL, 0.7 * VOXEL, opacity_weight, binarisation_weight
-    )
+    expected = reference.shade(*tensors.values(), torch.from_numpy(LOWER), VOXEL, 0.7 * VOXEL, *weights)
     # Worst seen 4e-7, 6e-7 and 2e-7: the reference leaves out clear samples and what lies behind opaque ones, too.
     np.testing.assert_allclose(gradient, expected[0].numpy(), atol=5e-6)
     np.testing.assert_allclose(residual, expected[1].numpy(), atol=5e-6)
@@ -95,7 +95,7 @@ def test_shading_matches_autograd(opacity_weight: float, binarisation_weight: fl
 def test_shading_at_extreme_densities(density: float) -> None:
     p = _problem(50)
     p["grid"][..., 0] = density
-    gradient, _, transmittance, squares = _shade(p, 0.1, 0.1)
+    gradient, _, transmittance, squares = _shade(p, 0.1, 0.1, 0.1)
     assert np.isfinite(gradient).all() and math.isfinite(squares)
     assert ((transmittance >= 0) & (transmittance <= 1)).all()
 

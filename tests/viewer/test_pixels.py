@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering import AssetCaster, composite, render_asset
 from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.assets import make_asset
+from tests.asset.test_track import TRACK
+from tests.assets import SOURCE, make_asset
 from tests.pictures import GREY, GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.conftest import NewPlayer
 from tests.viewer.fixtures import add_reflection
@@ -110,3 +112,19 @@ def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> No
     plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
     assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
     assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test
+
+
+def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
+    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    asset = read_asset(tmp_path / "asset")
+    player = new_player({"asset": asset.folder})
+    player.open("asset")
+    player.run("e.background = v; e.effects = false", GREY)
+    assert player.run("return await e.seek(v)", 2)
+    camera = five_cameras(SIZE)[1]
+    moved, _ = render_asset(asset, camera, 2, (GREY_VALUE,) * 3)
+    at_rest = expected_pictures(asset, [camera], [2])[camera.name, 2]
+    assert psnr(player.capture(camera)[..., :3], moved) >= AGREE
+    player.run("e.still = true")
+    assert psnr(player.capture(camera)[..., :3], at_rest) >= AGREE
+    assert psnr(moved, at_rest) < 25  # the motion is large enough to be seen in this test

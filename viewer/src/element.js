@@ -16,7 +16,7 @@ const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "change", "error"];
 
 export class FacefoldsPlayer extends HTMLElement {
-  static observedAttributes = ["src", "background", "loop", "speed", "level"];
+  static observedAttributes = ["src", "background", "loop", "speed", "level", "still"];
 
   #player = null;
   #given = null; // files that came without an address
@@ -59,6 +59,7 @@ export class FacefoldsPlayer extends HTMLElement {
     }
     if (name === "background") this.#paint(isColour(now) ? now : BACKGROUND);
     if (name === "loop") this.loop = now !== "false";
+    if (name === "still") this.still = now !== null;
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
     if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
   }
@@ -107,6 +108,7 @@ export class FacefoldsPlayer extends HTMLElement {
 
   #connect(player) {
     player.playback.loop = this.getAttribute("loop") !== "false";
+    player.still = this.hasAttribute("still");
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isColour(asked) ? asked : BACKGROUND);
@@ -191,6 +193,15 @@ export class FacefoldsPlayer extends HTMLElement {
 
   set loop(on) {
     this.#playback("loop", Boolean(on));
+  }
+
+  /** Whether a head that moves is held still. */
+  get still() {
+    return this.#player?.still ?? this.hasAttribute("still");
+  }
+
+  set still(on) {
+    if (this.#player) this.#player.still = Boolean(on);
   }
 
   get speed() {

@@ -18,7 +18,8 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry | null,
- *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null}} Manifest
+ *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null,
+ *   track: import("./track.js").Pose[] | null}} Manifest
  */
 
 /**
@@ -81,6 +82,7 @@ function readManifest(value) {
     audio: value.audio ? readFile(value.audio, value.audio.file, "audio") : null,
     poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
     photos: (value.photos ?? []).map(readPhoto),
+    track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
     view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
   };
 }
@@ -186,6 +188,15 @@ function count(value, place) {
 function rectangle(value, place) {
   check(Array.isArray(value) && value.length === 4 && value.every(Number.isFinite), `${place} is not a rectangle`);
   return value;
+}
+
+function readTrack(value, frames) {
+  check(list(value, "track").length === frames, `track has ${value.length} poses for ${frames} frames`);
+  return value.map(({ quaternion, translation }, i) => {
+    const numbers = [...list(quaternion, `track[${i}].quaternion`), ...list(translation, `track[${i}].translation`)];
+    check(numbers.length === 7 && numbers.every(Number.isFinite), `track[${i}] is no pose`);
+    return { quaternion, translation };
+  });
 }
 
 function range(view, key) {

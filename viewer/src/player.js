@@ -11,6 +11,7 @@ import { parseManifest } from "./manifest.js";
 import { Playback } from "./playback.js";
 import { LayerRenderer } from "./renderer.js";
 import { Sound } from "./sound.js";
+import { matrixOf } from "./track.js";
 import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
@@ -33,6 +34,7 @@ export class Player extends EventTarget {
     this.playback = new Playback({ frames: 1, fps: 1 });
     this.detail = new LevelChoice(this);
     this.manifest = null;
+    this.held = false; // a head that moves is held still
     this.files = null;
     this.level = null;
     this.sound = null;
@@ -314,6 +316,7 @@ export class Player extends EventTarget {
   #show(frame, picture) {
     this.renderer.setFrame(picture);
     this.shown = frame;
+    this.#place();
     this.stale = true;
     this.say("frame");
   }
@@ -325,6 +328,23 @@ export class Player extends EventTarget {
     this.stale = false;
     this.drawn.push(performance.now());
     this.say("draw");
+  }
+
+  /** The head where it stood in the frame shown, or at rest. */
+  #place() {
+    const { track } = this.manifest;
+    this.renderer.setPose(track && !this.held && this.shown >= 0 ? matrixOf(track[this.shown]) : null);
+    this.stale = true;
+  }
+
+  /** Whether a head that moves is held still. */
+  get still() {
+    return this.held;
+  }
+
+  set still(on) {
+    this.held = on;
+    if (this.manifest) this.#place();
   }
 
   #watchContext() {

@@ -7,7 +7,7 @@
  */
 import { Graphics } from "./gl/graphics.js";
 import { Upload } from "./gl/upload.js";
-import { eyeOf } from "./matrices.js";
+import { eyeOf, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
@@ -19,6 +19,7 @@ export class LayerRenderer {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.level = null;
+    this.pose = null;
     this.upload = null;
     this.visible = [];
     this.effectsOn = true;
@@ -47,6 +48,11 @@ export class LayerRenderer {
   /** @param {VideoFrame | HTMLVideoElement} image */
   setFrame(image) {
     this.upload.show(image);
+  }
+
+  /** Where the head stands from the next picture on. @param {import("./matrices.js").Matrix | null} matrix null: at rest */
+  setPose(matrix) {
+    this.pose = matrix;
   }
 
   /** After a lost context came back. The frame has to be given again. */
@@ -131,7 +137,7 @@ export class LayerRenderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.CULL_FACE);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    const passes = this.#passes(projection, view);
+    const passes = this.#passes(projection, this.pose ? multiplied(view, this.pose) : view);
     const count = this.level.geometries.length;
     for (let index = count - 1; index >= 0; --index) {
       if (!this.visible[index]) continue;
@@ -285,7 +291,9 @@ export class LayerRenderer {
     });
     if (!Number.isFinite(low[0])) return { centre: [0, 0, 0], radius: 1, low: [-1, -1, -1], high: [1, 1, 1] };
     const centre = low.map((v, k) => (v + high[k]) / 2);
-    return { centre, radius: Math.hypot(...low.map((v, k) => (high[k] - v) / 2)), low, high };
+    const moved = this.pose ? transformed(this.pose, centre) : centre; // a ball that holds the head as it stands, too
+    const away = Math.hypot(...moved.map((v, k) => v - centre[k]));
+    return { centre, radius: away + Math.hypot(...low.map((v, k) => (high[k] - v) / 2)), low, high };
   }
 
   dispose() {

@@ -2,12 +2,13 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Matrix4, Vector3, Vector4 } from "three";
 import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/camera.js";
-import { eyeOf } from "../src/matrices.js";
+import { eyeOf, transformed } from "../src/matrices.js";
 import { Adaptation } from "../src/adapt.js";
 import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
 import { Playback } from "../src/playback.js";
 import { droppedAsset } from "../src/ui/drop.js";
+import { matrixOf } from "../src/track.js";
 import { decode, encode } from "../src/viewstate.js";
 
 /** three's own arithmetic, to hold ours against. */
@@ -141,6 +142,18 @@ test("a manifest is read", () => {
   assert.equal(read.levels[0].videos[0].name, "full.mp4");
   assert.equal(read.poster, null);
   assert.deepEqual(read.photos, []);
+});
+
+test("a track is read, and moves points as its poses say", () => {
+  const pose = { quaternion: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], translation: [0.1, 0, -0.2] };
+  const value = { ...manifest(), track: [pose, pose] };
+  const { track } = parseManifest(JSON.stringify(value), "x");
+  const [x, y, z] = transformed(matrixOf(track[1]), [1, 0, 0]); // a quarter turn about z
+  near(x, 0.1);
+  near(y, 1);
+  near(z, -0.2);
+  assert.equal(parseManifest(JSON.stringify(manifest()), "x").track, null);
+  assert.throws(() => parseManifest(JSON.stringify({ ...value, track: [pose] }), "x"), /damaged/);
 });
 
 test("view effects of an unknown basis are left out", () => {

@@ -18,7 +18,8 @@ Array = NDArray[np.float32]
 
 
 def first_background(scene: Scene, images: Images, volume: Volume, params: BackgroundParams) -> Tensor:
-    """[C, H W, 3] in [0, 1]: the image where the volume is clear, what lies behind the volume elsewhere.
+    """[C, H W, 3] in [0, 1]: the clean plate; without one the image where the volume is clear, what lies behind the
+    volume elsewhere.
 
     Of a head that turns: the mean of the frames in which the volume, turned with it, is clear.
     """
@@ -33,6 +34,9 @@ def first_background(scene: Scene, images: Images, volume: Volume, params: Backg
     for image, hidden, index in zip(mean, covered, images.cameras, strict=True):
         at, along = _lattice(scene.camera_in_head(index, volume.frame), params)
         image[hidden] = _enlarged(volume.behind(at, along), scene.cameras[index], params)[hidden]
+    for image, plate in zip(mean, images.plates(), strict=True):
+        if plate is not None:
+            image[:] = plate.reshape(h, w, 3).astype(np.float32) / 255
     return torch.from_numpy(mean.reshape(len(mean), h * w, 3).astype(np.float32))
 
 

@@ -29,7 +29,7 @@ from facefolds_core.training.explicit.cameras import CameraChoice, choose_camera
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
-from facefolds_core.training.explicit.plan import Level, plan
+from facefolds_core.training.explicit.plan import Epochs, Level, plan
 from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
 from facefolds_core.training.explicit.views import Images, Rays, check_images, rays_of
 from facefolds_core.training.explicit.warnings import warnings_of
@@ -76,7 +76,8 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = _Trainer(cameras, params, fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
-        levels = plan(fit, params)
+        levels = plan(fit, params, scene.num_frames)
+        bar.total = bar.n + sum(level.iterations for level in levels)
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
@@ -197,8 +198,9 @@ class _Trainer:
         coarse = number < len(self.params.geometry.rounds)
         weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
         best, recent = float("inf"), float("nan")
+        epochs = Epochs(self.scene.num_frames, self.random)
         for i in range(level.iterations):
-            frame = int(self.random.integers(self.scene.num_frames))
+            frame = epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             rates = self._rates(i / level.iterations if level.last else 0.0)
             error = self.state.step(

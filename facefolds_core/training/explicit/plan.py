@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 
@@ -27,8 +29,26 @@ class Level:
     last: bool
 
 
-def plan(fit: Fit, params: ExplicitParams) -> list[Level]:
-    """Rounds of geometry, quarter, half and full resolution."""
+class Epochs:
+    """Frames in the order in which steps take them: without replacement, shuffled anew each time all have been taken.
+
+    Args:
+        frames: K.
+        random: draws the orders.
+    """
+
+    def __init__(self, frames: int, random: np.random.Generator) -> None:
+        self._frames, self._random = frames, random
+        self._left: list[int] = []
+
+    def next(self) -> int:
+        if not self._left:
+            self._left = self._random.permutation(self._frames).tolist()
+        return self._left.pop()
+
+
+def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
+    """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame."""
 
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
@@ -38,7 +58,8 @@ def plan(fit: Fit, params: ExplicitParams) -> list[Level]:
         Level(size(4), geometry.round_iterations, geometry.round_stride, scale, False) for scale in geometry.rounds
     ]
     rest = max(params.iterations, params.least_iterations) - geometry.round_iterations * len(levels)
+    rest = max(rest, params.textures.steps_per_frame * frames)
     half = round(params.textures.half_share * rest)
     levels.append(Level(size(2), half, 1, geometry.rounds[-1], False))
-    levels.append(Level(fit.texels, rest - half, 1, geometry.rounds[-1], True))
+    levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True))
     return levels

@@ -16,6 +16,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, VolumeParams
+from facefolds_core.training.photos import photos_of
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.optimise import Rays, clear, rays_of, train
@@ -123,11 +124,10 @@ class VolumeFit:
         self.params, self.outer = params, outer
         self.frame = scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
         self.cameras = [scene.camera_in_head(i, self.frame) for i in indices]
-        store = scene.open_frames()
-        self.images = [store.image(i, self.frame) for i in indices]
+        self.photos = photos_of(scene, indices, self.frame)
         self.lower, self.upper = bounding_box(self.cameras, params.volume)
         self.random = np.random.default_rng(params.seed)
-        self.mean = np.mean([image.mean((0, 1)) for image in self.images], 0) / 255
+        self.mean = np.mean([photo.image.mean((0, 1)) for photo in self.photos], 0) / 255
         farthest = max(float(np.linalg.norm(c.centre)) for c in self.cameras)
         self.room = Room(self.mean.astype(np.float32), farthest, params.volume.reach, params.room, params.environment)
         self.grid: Array | None = None
@@ -148,8 +148,10 @@ class VolumeFit:
         coarser = self.grid
         grid = _fog(share, self.mean, wanted) if coarser is None else _resample(coarser, self.voxel, shape, finer)
         grid[share == 0, 0] = -kernel.LIMIT
-        rays = rays_of(self.cameras, self.images, finer, wanted.pixel)
-        rays = replace(rays, colours=self.found.corrected(rays.colours, rays.camera))
+        rays = rays_of(self.cameras, self.photos, finer, wanted.pixel)
+        corrected = self.found.corrected
+        colours, plate = corrected(rays.colours, rays.camera), corrected(rays.plate, rays.camera)
+        rays = replace(rays, colours=colours, plate=plate)
         last = number == len(wanted.levels) - 1
         if self.outer:
             self.room.refine(level.room)

@@ -79,6 +79,7 @@ def shade(  # type: ignore[no-untyped-def]
     jitter,  # (R,) float32 in [0, 1): where in the first step the first sample lies
     target,  # (R, 3) float32 in [0, 1]
     background,  # (R, 3) float32
+    matte,  # (R,) float32: opacity of the subject, or -1 where it is not known
     grid,  # (X, Y, Z, 4) float32: raw density, rgb
     occupied,  # (X / BLOCK, ...) bool, rounded up: blocks that may hold something
     lower,  # (3,) position of voxel (0, 0, 0)
@@ -91,10 +92,12 @@ def shade(  # type: ignore[no-untyped-def]
     transmittance,  # (R,) out: transmittance
     opacity_weight,  # weight of opacity
     binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
+    matte_weight,  # weight of the squared distance from a known opacity
 ):
-    """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t).
+    """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t)
+    + 0.5 matte_weight (1 - T - A)^2.
 
-    T is the transmittance, t = min(T, 1/2).
+    T is the transmittance, t = min(T, 1/2), A the matte; without one the last term is 0.
 
     A sample has alpha = 1 - exp(-softplus(raw) step / voxel). Returns the sum of |C - I|^2.
     """
@@ -148,6 +151,8 @@ def shade(  # type: ignore[no-untyped-def]
                 total += residual[r, q] * residual[r, q]
             # From the back: `behind` is the colour, `after` the transmittance of all that lies behind sample n.
             push = np.float32(opacity_weight - binarisation_weight * max(1 - 2 * t, np.float32(0.0)))
+            if matte[r] >= 0:
+                push += np.float32(matte_weight) * (1 - t - matte[r])
             after = np.float32(1.0)
             for n in range(m - 1, -1, -1):
                 a, light = alpha[n], before[n]

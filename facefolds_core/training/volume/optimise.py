@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -15,6 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VolumeLevel, VolumeParams
 from facefolds_core.training.adam import corrections, decays
+from facefolds_core.training.photos import Photo
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.room import Room
 
@@ -23,30 +24,59 @@ Array = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Rays:
-    """R rays: origins, directions and colours (R, 3), numbers of their cameras (R,)."""
+    """R rays: origins, directions and colours (R, 3), numbers of their cameras (R,), and what is known beside.
+
+    Attributes:
+        plate: (R, 3) what is behind the subject, NaN where it is not known.
+        matte: (R,) opacity of the subject, -1 where it is not known.
+    """
 
     origins: Array
     directions: Array
     colours: Array
     camera: NDArray[np.int32]
+    plate: Array
+    matte: Array
+
+    def choose(self, which: NDArray[np.int64]) -> Rays:
+        return Rays(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
+
+    def over(self, behind: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """What is behind (R, 3): the plates, `behind` where there is none; and where that is (R,)."""
+        unknown = np.isnan(self.plate[:, 0])
+        return np.where(unknown[:, None], behind, self.plate).astype(np.float32), unknown
 
 
-def rays_of(cameras: list[Camera], images: list[NDArray[np.uint8]], voxel: float, reduced: float) -> Rays:
-    """One ray for each pixel of the images, reduced until one covers so many voxels."""
+def rays_of(cameras: list[Camera], photos: list[Photo], voxel: float, reduced: float) -> Rays:
+    """One ray for each pixel of the photos, reduced until one covers so many voxels."""
     pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
     factor = max(1, round(reduced * voxel / pixel))
-    origins, directions, colours, numbers = [], [], [], []
-    for number, (camera, image) in enumerate(zip(cameras, images, strict=True)):
+    parts = list[Rays]()
+    for number, (camera, photo) in enumerate(zip(cameras, photos, strict=True)):
         height, width = max(1, camera.height // factor), max(1, camera.width // factor)
         x, y = np.meshgrid((np.arange(width) + 0.5) * factor, (np.arange(height) + 0.5) * factor)
         origin, direction = camera.rays(np.stack([x, y], -1).reshape(-1, 2))
-        origins.append(np.broadcast_to(origin, direction.shape).astype(np.float32))
-        directions.append(direction.astype(np.float32))
-        part = np.ascontiguousarray(image[: height * factor, : width * factor])
-        small = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
-        colours.append(small.reshape(-1, 3).astype(np.float32) / 255)
-        numbers.append(np.full(width * height, number, np.int32))
-    return Rays(np.concatenate(origins), np.concatenate(directions), np.concatenate(colours), np.concatenate(numbers))
+
+        def small(image: NDArray[np.uint8] | None, height: int = height, width: int = width) -> Array | None:
+            if image is None:
+                return None
+            part = np.ascontiguousarray(image[: height * factor, : width * factor])
+            mean = cv2.resize(part, (width, height), interpolation=cv2.INTER_AREA)
+            return (mean.reshape(width * height, -1) / np.float32(255)).astype(np.float32)
+
+        colours, plate, matte = small(photo.image), small(photo.plate), small(photo.matte)
+        assert colours is not None
+        parts.append(
+            Rays(
+                origins=np.broadcast_to(origin, direction.shape).astype(np.float32),
+                directions=direction.astype(np.float32),
+                colours=colours,
+                camera=np.full(len(colours), number, np.int32),
+                plate=np.full_like(colours, np.nan) if plate is None else plate,
+                matte=np.full(len(colours), -1, np.float32) if matte is None else matte[:, 0],
+            )
+        )
+    return Rays(**{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Rays)})
 
 
 def _occupied(density: Array, empty_depth: float) -> NDArray[np.bool_]:
@@ -73,6 +103,7 @@ def _shade(
     step: float,
     opacity_weight: float,
     binarisation_weight: float,
+    matte_weight: float,
 ) -> tuple[float, Array, Array]:
     """`kernel.shade` with steps of so many voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
     residual, transmittance = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
@@ -83,6 +114,7 @@ def _shade(
         jitter,
         rays.colours,
         background,
+        rays.matte,
         grid,
         occupied,
         lower,
@@ -95,6 +127,7 @@ def _shade(
         transmittance,
         opacity_weight,
         binarisation_weight,
+        matte_weight,
     )
     return squares, residual, transmittance
 
@@ -110,7 +143,7 @@ def clear(
     """Empty the voxels without `min_contrast`, in place: the mean over rays, by their weights there, of how far what
     they see in the volume is from the room behind it. What no ray reaches stays."""
     gradient, touched = kernel.empty_gradient(grid.shape)
-    background = room.look_up(rays.origins, rays.directions)
+    background, _ = rays.over(room.look_up(rays.origins, rays.directions))
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
     # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
@@ -120,7 +153,7 @@ def clear(
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
     seen = replace(rays, colours=target)
-    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, params.step, 0.0, 0.0)
+    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, params.step, 0.0, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
     evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
@@ -149,10 +182,10 @@ def train(
         if i % 25 == 0:
             occupied = _occupied(grid[0, ..., 0], params.empty_depth)
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
-        origins, directions = rays.origins[chosen], rays.directions[chosen]
-        part = Rays(origins, directions, rays.colours[chosen], rays.camera[chosen])
+        part = rays.choose(chosen)
         jitter = random.random(count, np.float32)
-        behind = room.look(origins, directions, jitter)
+        behind = room.look(part.origins, part.directions, jitter)
+        background, unknown = part.over(behind.colours)
         squares, residual, transmittance = _shade(
             grid[0],
             occupied,
@@ -160,19 +193,20 @@ def train(
             voxel,
             part,
             jitter,
-            behind.colours,
+            background,
             gradient,
             touched,
             params.step,
             params.opacity_weight,
             params.binarisation_weight,
+            params.matte_weight,
         )
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - (1 - params.final_rate) * i / level.iterations if last else 1.0
         bias = corrections(params.betas, i + 1)
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
-        room.step(behind, transmittance[:, None] * residual, scale, *rates)
+        room.step(behind, (transmittance * unknown)[:, None] * residual, scale, *rates)
         kernel.adam_step(grid, gradient, touched, share, *rates, *bias, decay, params.smoothness_weight)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error

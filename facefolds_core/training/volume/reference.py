@@ -30,12 +30,14 @@ def shade(
     jitter: Tensor,  # [R]
     target: Tensor,  # [R, 3]
     background: Tensor,  # [R, 3]
+    matte: Tensor,  # [R], -1 where it is not known
     grid: Tensor,  # [X, Y, Z, 4]
     lower: Tensor,  # [3]
     voxel: float,
     step: float,
     opacity_weight: float,
     binarisation_weight: float,
+    matte_weight: float,
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """As `kernel.shade` with all blocks occupied.
 
@@ -59,5 +61,6 @@ def shade(
     squares = residual.square().sum()
     nearly = transmittance.clamp(max=0.5)
     loss = 0.5 * squares + (opacity_weight * (1 - transmittance) + binarisation_weight * nearly * (1 - nearly)).sum()
+    loss = loss + 0.5 * matte_weight * (1 - transmittance - matte)[matte >= 0].square().sum()
     (gradient,) = torch.autograd.grad(loss, grid)
     return gradient, residual.detach(), transmittance.detach(), squares.detach()

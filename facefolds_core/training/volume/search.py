@@ -13,7 +13,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume.fit import Volume, VolumeFit
-from facefolds_core.training.volume.outline import visible_points
+from facefolds_core.training.volume.outline import thickness, visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
 from facefolds_core.training.volume.walls import Wall, find_walls
 
@@ -27,31 +27,43 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     Raises:
         UserError: see `VolumeFit`.
     """
-    coarse = params.volume.levels[0].iterations
-    fit, notes = VolumeFit(scene, params, outer=False), list[Fact]()
-    fit.run(0, bar)
-    if fit.psnr < params.room.needed_below:
-        notes.append(fact("room_fitted", psnr=fit.psnr, under=params.room.needed_below))
-        reaches = [params.volume.reach, *params.subject.larger]
-        for number, reach in enumerate(reaches):
-            volume = params.volume.model_copy(update={"reach": reach})
-            fit = VolumeFit(scene, params.model_copy(update={"volume": volume}), outer=True)
-            bar.total += coarse
-            fit.run(0, bar)
-            coarser = fit.volume()
-            share = cut_share(coarser, _walls(coarser, fit.cameras, params), params)
-            if share < params.subject.max_cut:
-                break
-            more = number + 1 < len(reaches)
-            then = "a larger one is taken" if more else "it may be cut off; see train.volume.reach"
-            notes.append(fact("cut_by_the_ball", share=share, reach=reach, then=then))
+    plain, notes = VolumeFit(scene, params, outer=False), list[Fact]()
+    plain.run(0, bar)
+    if plain.psnr < params.room.needed_below:
+        notes.append(fact("room_fitted", psnr=plain.psnr, under=params.room.needed_below))
+        found = _with_room(scene, params, bar, notes)
+        depth = thickness(found, params.start.subject_opacity)
+        if depth <= params.room.max_thickness:
+            return found, tuple(notes)
+        notes = [fact("room_given_up", depth=depth, over=params.room.max_thickness)]
+        bar.total += sum(level.iterations for level in params.volume.levels[1:])
+    for number in range(1, len(params.volume.levels)):
+        plain.run(number, bar)
+    return subject_of(plain.finish(), (), params), tuple(notes)
+
+
+def _with_room(scene: Scene, params: ExplicitParams, bar: tqdm, notes: list[Fact]) -> Volume:
+    """The subject in a volume with an outer zone, in a ball that does not cut it off; `notes` grow."""
+    reaches = [params.volume.reach, *params.subject.larger]
+    for number, reach in enumerate(reaches):
+        volume = params.volume.model_copy(update={"reach": reach})
+        fit = VolumeFit(scene, params.model_copy(update={"volume": volume}), outer=True)
+        bar.total += params.volume.levels[0].iterations
+        fit.run(0, bar)
+        coarser = fit.volume()
+        share = cut_share(coarser, _walls(coarser, fit.cameras, params), params)
+        if share < params.subject.max_cut:
+            break
+        more = number + 1 < len(reaches)
+        then = "a larger one is taken" if more else "it may be cut off; see train.volume.reach"
+        notes.append(fact("cut_by_the_ball", share=share, reach=reach, then=then))
     for number in range(1, len(params.volume.levels)):
         fit.run(number, bar)
     found = fit.finish()
-    walls = _walls(found, fit.cameras, params) if fit.outer else ()
+    walls = _walls(found, fit.cameras, params)
     if walls:
         notes.append(fact("walls", count=len(walls), margin=params.subject.walls.margin))
-    return subject_of(found, walls, params), tuple(notes)
+    return subject_of(found, walls, params)
 
 
 def _walls(volume: Volume, cameras: list[Camera], params: ExplicitParams) -> tuple[Wall, ...]:

@@ -1,0 +1,160 @@
+"""One job, on whichever machine it runs: a folder of its own, `dvc repro` in it, and the folder is gone again.
+
+What it made is in DVC's cache, which the workers share, or was pushed to a DVC remote.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import dask.system
+from distributed import get_worker
+
+from facefolds_core.cluster.project import Project
+from facefolds_core.errors import UserError
+
+RUNNING = re.compile(r"Running stage '([^']+)'")
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Job:
+    """What `dvc repro` is to make.
+
+    Attributes:
+        name: shown, and a part of file names.
+        subject: whose metrics.json is looked at afterwards.
+        target: of DVC: "evaluate@anna".
+        params: the text of params.yaml, where it is another one than the project's.
+        links: paths relative to the project, and where they really are: captures outside it.
+    """
+
+    name: str
+    subject: str
+    target: str
+    params: str | None
+    links: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job.
+
+    Attributes:
+        error: why it failed, the last lines that were said; "" if it did not.
+        ran: the stages that ran, `configure` left out; the others came from the cache.
+        metrics: metrics.json; {} where there is none.
+        log: all that DVC and the stages said.
+    """
+
+    job: Job
+    error: str = ""
+    seconds: float = 0.0
+    host: str = ""
+    ran: tuple[str, ...] = ()
+    metrics: Mapping[str, Any] | None = None
+    log: str = ""
+
+    @property
+    def state(self) -> str:
+        """ "failed", "done" or "cached"."""
+        return "failed" if self.error else "done" if self.ran else "cached"
+
+
+_at_work: dict[str, list[subprocess.Popen[str]]] = {}
+"""Run -> the DVCs of this worker, so that an interrupted run ends them."""
+
+
+def do(job: Job, run: str) -> Outcome:
+    """Do a job on this worker. Whatever the stages do wrong is an outcome, not an exception.
+
+    Args:
+        run: the name under which the project was handed to the workers (project.py).
+    """
+    worker = get_worker()
+    project = worker.plugins[run]
+    assert isinstance(project, Project)
+    start = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix=f"{job.name[:40]}-", dir=worker.local_directory) as temporary:
+        try:
+            root, pull = project.unfold(Path(temporary), dict(job.links), job.params)
+        except UserError as error:
+            return Outcome(job, str(error), host=socket.gethostname())
+
+        def tell(line: str) -> None:
+            if found := RUNNING.match(line):
+                worker.log_event(run, {"job": job.name, "stage": found[1], "host": socket.gethostname()})
+
+        threads = str(max(1, dask.system.CPU_COUNT // worker.state.nthreads))
+        environment = {**dict.fromkeys(THREADS, threads), **os.environ, "PYTHONUNBUFFERED": "1"}
+        environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
+        status, log = _dvc(run, root, environment, ["repro", *(["--pull"] if pull else []), job.target], tell)
+        if pull:  # of a job that failed, too: what its first stages made
+            pushed, said = _dvc(run, root, environment, ["push", "--run-cache", "--with-deps", job.target])
+            if pushed and not status:
+                status, log = pushed, log + said
+        metrics = root / "data" / job.subject / "metrics.json"
+        return Outcome(
+            job,
+            error=_last_lines(log) if status else "",
+            seconds=time.perf_counter() - start,
+            host=socket.gethostname(),
+            ran=tuple(stage for stage in RUNNING.findall(log) if stage != "configure"),
+            metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
+            log=log,
+        )
+
+
+def _dvc(run: str, root: Path, environment: dict[str, str], command: list[str], tell: Any = None) -> tuple[int, str]:
+    """Exit status of a DVC command and what it said; each line goes to `tell` at once."""
+    lines = []
+    with subprocess.Popen(
+        [sys.executable, "-m", "facefolds_core.cluster.dvc", *command],
+        cwd=root,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+        start_new_session=True,  # so that its stages can be ended with it
+    ) as process:
+        _at_work.setdefault(run, []).append(process)
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            if tell is not None:
+                tell(line)
+        status = process.wait()
+        _at_work[run].remove(process)
+    return status, "".join(lines)
+
+
+def end_all(run: str) -> None:
+    """End what this worker does for an interrupted run, DVC and its stages."""
+    for process in _at_work.get(run, []):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGTERM)
+
+
+def _last_lines(log: str) -> str:
+    """The end of what a failed job said, without DVC's advice."""
+    lines = [line.rstrip() for line in log.splitlines() if line.strip()]
+    return "\n".join(lines[-LAST_LINES:]) or "it said nothing"
+
+
+LAST_LINES = 12
+"""Of a failed job's log: what a stage's message has."""

@@ -1,0 +1,110 @@
+"""Which jobs there are: one a subject, or one a subject and cell of a grid; and their results put together again."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from facefolds_core.cluster.job import RUNNING, Job
+from facefolds_core.cluster.project import CODE
+from facefolds_core.errors import UserError
+from facefolds_core.params_file import Params
+from facefolds_core.parsing import brief, parse_yaml
+from facefolds_core.sweeps.edit import set_for_subject
+
+BUSY = "is busy, it is being blocked by"
+"""DVC says so when another DVC in the folder runs a stage."""
+
+LOOK = 5.0
+"""Seconds between two tries then."""
+
+
+def subject_jobs(params: Params, root: Path, subjects: Sequence[str], stage: str) -> list[Job]:
+    """A job a subject, as params.yaml has it.
+
+    Raises:
+        UserError: if there is no such subject.
+    """
+    return [Job(name, name, f"{stage}@{name}", None, links_of(params, root, name)) for name in subjects]
+
+
+def links_of(params: Params, root: Path, subject: str) -> tuple[tuple[str, str], ...]:
+    """Its capture, where a relative path leads to it and it is no part of the code."""
+    path = Path(params.subject(subject).path)
+    if path.is_absolute() or path.parts[:1] in [(name,) for name in CODE]:
+        return ()
+    return ((str(path), str((root / path).resolve())),)
+
+
+def read_grid(path: Path) -> list[dict[str, Any]]:
+    """The cells of a sweep's file: a mapping of keys, "section.key", to lists of values; every combination is a cell.
+
+    Raises:
+        UserError: if it is none.
+    """
+    remedy = "write a line a key, `decimate.resolution: [16, 32, 64]` (docs/guide/sweeps.md)"
+    try:
+        grid = parse_yaml(path.read_text(encoding="utf-8"), path, remedy)
+    except FileNotFoundError:
+        raise UserError("file not found", file=path, remedy=remedy) from None
+    wrong = not isinstance(grid, dict) or not grid
+    if wrong or not all(isinstance(key, str) and isinstance(values, list) and values for key, values in grid.items()):
+        raise UserError(
+            "not a sweep", file=path, expected="keys with lists of values", found=brief(grid), remedy=remedy
+        )
+    return [dict(zip(grid, values, strict=True)) for values in itertools.product(*grid.values())]
+
+
+def sweep_jobs(
+    params: Params, root: Path, subjects: Sequence[str], stage: str, cells: Sequence[Mapping[str, Any]]
+) -> dict[Job, Mapping[str, Any]]:
+    """A job a subject and cell -> the cell's values, which are overrides of the subject in a params.yaml of its own.
+
+    Raises:
+        UserError: if a key or value does not fit.
+    """
+    jobs: dict[Job, Mapping[str, Any]] = {}
+    text = (root / "params.yaml").read_text(encoding="utf-8")
+    for subject in subjects:
+        for number, cell in enumerate(cells):
+            with tempfile.TemporaryDirectory() as temporary:
+                changed = Path(temporary) / "params.yaml"
+                changed.write_text(text, encoding="utf-8")
+                set_for_subject(changed, subject, cell)
+                name = f"{subject}-{number:03d}"
+                new = changed.read_text(encoding="utf-8")
+            jobs[Job(name, subject, f"{stage}@{subject}", new, links_of(params, root, subject))] = cell
+    return jobs
+
+
+def record(root: Path, targets: Sequence[str], pull: bool) -> tuple[list[str], str]:
+    """`dvc repro` of what is all in the cache: files into the project's folder, one dvc.lock.
+
+    It waits for another DVC that is at work in the folder.
+
+    Args:
+        pull: the results came through DVC's default remote.
+
+    Returns:
+        stages that ran nevertheless, and an error, or "".
+    """
+    command = [sys.executable, "-m", "dvc", "--wait-for-lock", "repro", *targets]
+    if pull:
+        command.insert(-len(targets), "--pull")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    while True:
+        done = subprocess.run(
+            command, cwd=root, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+        )
+        said = done.stdout + done.stderr
+        if done.returncode and BUSY in said:
+            time.sleep(LOOK)
+            continue
+        return RUNNING.findall(said), said.strip()[-2000:] if done.returncode else ""

@@ -1,0 +1,169 @@
+"""One frame laid over another: points of a surface with what cameras saw there, and Gauss-Newton on their pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import turn_of
+from facefolds_core.params import RegistrationParams
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Points:
+    """What one camera saw of the subject's surface in the reference frame.
+
+    Attributes:
+        positions, normals: (P, 3), in the world.
+        pixels: (P, 2) x, y.
+    """
+
+    positions: Array
+    normals: Array
+    pixels: Array
+
+
+def features(image: NDArray[np.uint8], sigma: float) -> Picture:
+    """(H, W, 3): a picture's grey levels at a scale, locally normalised, and their slopes along x and y."""
+    grey = cv2.GaussianBlur(image.astype(np.float32).mean(-1), (0, 0), sigma)
+    mean = cv2.GaussianBlur(grey, (0, 0), 4 * sigma)
+    contrast = np.sqrt(cv2.GaussianBlur((grey - mean) ** 2, (0, 0), 4 * sigma) + 1.0)
+    value = (grey - mean) / contrast
+    slopes = np.gradient(value)
+    return np.stack([value, slopes[1], slopes[0]], -1).astype(np.float32)
+
+
+def look_up(picture: Picture, pixels: Array) -> Array:
+    """(P, C) at continuous coordinates (P, 2), bilinear."""
+    at = (pixels - 0.5).astype(np.float32)[None]
+    found = cv2.remap(picture, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(found[0], np.float64)
+
+
+def refined(
+    pose: Similarity,
+    cameras: Sequence[Camera],
+    points: Sequence[Points],
+    shown: Sequence[Picture],
+    seen: Sequence[Array],
+    params: RegistrationParams,
+) -> tuple[Similarity, float]:
+    """Gauss-Newton steps at one scale; the pose and the correlation there.
+
+    Args:
+        shown: of each camera, `features` of the frame.
+        seen: of each camera (P,), features of its points in the reference frame.
+    """
+    likeness = 0.0
+    for _ in range(params.steps):
+        equations = Equations.of(pose, cameras, points, shown, seen, params)
+        if len(equations.residual) < params.min_points:
+            return pose, 0.0
+        pull = equations.slopes.T @ (equations.weight * equations.residual)
+        move: Array = -np.linalg.solve(equations.normal(params), pull).astype(np.float64)
+        turned = Similarity(1.0, turn_of(move[:3]), np.zeros(3))
+        shift = equations.middle + move[3:] - turned.apply(equations.middle)
+        pose = Similarity(1.0, turned.rotation, shift).after(pose)
+        likeness = float(np.corrcoef(equations.value, equations.value - equations.residual)[0, 1])
+        if np.abs(move).max() < params.enough:
+            break
+    return pose, likeness
+
+
+@dataclass(frozen=True)
+class Equations:
+    """One frame's, linearised at a pose; P points of all cameras.
+
+    Attributes:
+        middle: (3,) that turns are about.
+        slopes: (P, 6) of the residuals in turn and shift; depth: (P,) in a move of the points along their rays.
+        residual, value: (P,) difference from the reference, and what the frame shows.
+        weight: (P,) Cauchy's.
+    """
+
+    middle: Array
+    slopes: Array
+    depth: Array
+    residual: Array
+    value: Array
+    weight: Array
+
+    @classmethod
+    def of(
+        cls,
+        pose: Similarity,
+        cameras: Sequence[Camera],
+        points: Sequence[Points],
+        shown: Sequence[Picture],
+        seen: Sequence[Array],
+        params: RegistrationParams,
+    ) -> Equations:
+        middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
+        rows = [_rows(pose, middle, *one, params) for one in zip(cameras, points, shown, seen, strict=True)]
+        slopes, depth, residual, value = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+        typical = float(np.median(np.abs(residual))) if len(residual) else 0.0
+        weight = 1 / (1 + (residual / (params.outlier * typical + 1e-9)) ** 2)
+        return cls(middle, slopes, depth, residual, value, weight)
+
+    def normal(self, params: RegistrationParams) -> Array:
+        """(6, 6)."""
+        normal = self.slopes.T @ (self.weight[:, None] * self.slopes)
+        return np.asarray(normal + np.diag(params.damping * np.diag(normal) + 1e-9))
+
+    def along_rays(self, params: RegistrationParams) -> tuple[float, float]:
+        """Curvature and slope of the squared error in a move along the rays, with the pose following (Schur)."""
+        weighted = self.weight * self.depth
+        cross = self.slopes.T @ weighted
+        follows = np.linalg.solve(self.normal(params), cross)
+        pull = self.slopes.T @ (self.weight * self.residual)
+        return float(weighted @ self.depth - cross @ follows), float(weighted @ self.residual - follows @ pull)
+
+
+def _rows(
+    pose: Similarity,
+    middle: Array,
+    camera: Camera,
+    points: Points,
+    shown: Picture,
+    seen: Array,
+    params: RegistrationParams,
+) -> tuple[Array, Array, Array, Array]:
+    """Slopes (P, 6), depth, residual and value (P,) of the points that this camera sees."""
+    use, pixels, there = _visible(pose, camera, points, params)
+    depth = camera.project(there)[1]
+    values = look_up(shown, pixels)
+    fx, fy = camera.K[0, 0], camera.K[1, 1]
+    centred = (pixels - camera.K[:2, 2]) / [fx, fy]
+    # d value / d point in the camera's axes, then in the world's.
+    gx, gy = values[:, 1] * fx / depth, values[:, 2] * fy / depth
+    slope = np.stack([gx, gy, -(gx * centred[:, 0] + gy * centred[:, 1])], -1) @ camera.rotation
+    along = unit(points.positions[use] - camera.centre) @ pose.rotation.T
+    slopes = np.concatenate([np.cross(there - middle, slope), slope], 1)
+    return slopes, (slope * along).sum(1), values[:, 0] - seen[use], values[:, 0]
+
+
+def unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
+
+
+def _visible(
+    pose: Similarity, camera: Camera, points: Points, params: RegistrationParams
+) -> tuple[NDArray[np.intp], Array, Array]:
+    """Which of the moved points a camera sees; their pixels (P, 2) and places (P, 3)."""
+    there = pose.apply(points.positions)
+    normals = points.normals @ pose.rotation.T
+    towards = camera.centre - there
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    pixels, depth = camera.project(there)
+    inside = ((pixels >= 1) & (pixels <= [camera.width - 1, camera.height - 1])).all(1) & (depth > 0)
+    use = np.flatnonzero(inside & ((normals * towards).sum(1) > params.min_cosine))
+    return use, pixels[use], there[use]

@@ -1,0 +1,235 @@
+"""Poses of a head found from the pictures alone: each frame is laid over the volume of one.
+
+The volume of the reference frame (all cameras, one moment: nothing need be known of motion) gives points of the
+subject's surface, with what each camera saw there. A pose of another frame moves the points; in the same camera's
+picture of that frame they should look alike. The six numbers of a frame follow by Gauss-Newton from coarse to fine,
+started from where its neighbour's motion leads; then one number more, how deep the points lie behind what the volume
+says, follows from all frames together. Pictures are compared after local normalisation, with Cauchy's
+weights: light that is fixed to the room, and a face that performs, count little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from facefolds_core.captures.motion import in_head
+from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.errors import UserError
+from facefolds_core.facts import Fact, fact
+from facefolds_core.files import atomic_file
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import Track, own_track
+from facefolds_core.params import ExplicitParams, NormalizeParams, RegistrationParams
+from facefolds_core.progress import progress
+from facefolds_core.training.alignment import Equations, Picture, Points, features, look_up, refined, unit
+from facefolds_core.training.volume.fit import Volume, iterations
+from facefolds_core.training.volume.search import find_subject
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Attributes:
+    track: the head's own frame -> world.
+    degrees, shift: the largest turn, and the largest shift in shares of the subject's extent.
+    likeness: (K,) correlation of each frame's pictures with the reference's at the pose found.
+    facts: what is to be said.
+    """
+
+    track: Track
+    degrees: float
+    shift: float
+    likeness: Array
+    facts: tuple[Fact, ...]
+
+
+def find_track(scene: Scene, params: RegistrationParams) -> Found:
+    """Poses of all frames of a scene in which the head is taken to stand still.
+
+    Raises:
+        UserError: if the cameras do not look at one place, or nothing stands out from the background.
+    """
+    training = ExplicitParams()
+    with progress(total=iterations(training.volume), desc="volume", unit="it") as bar:
+        volume, _ = find_subject(scene, training, bar)
+    cameras = [scene.cameras[i] for i in scene.indices("train")]
+    points = [surface_points(volume, camera, params) for camera in cameras]
+    frames = scene.num_frames
+    with progress(total=frames * (1 + params.rounds) - 1, desc="poses", unit="frame") as bar:
+        poses, likeness = _all_frames(scene, cameras, points, volume.frame, params, bar)
+        for _ in range(params.rounds):
+            points, poses, likeness = _deepened(scene, cameras, points, poses, volume.frame, params, bar)
+    refused = _refused(poses, likeness, volume.frame, params)
+    poses = _bridged(poses, refused)
+    cloud = np.concatenate([one.positions for one in points])
+    middle = cloud.mean(0)
+    track = own_track(poses, np.array([pose.apply(middle) for pose in poses]))
+    size = float(np.ptp(np.quantile(cloud, [0.01, 0.99], axis=0), axis=0).max())
+    shift = max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track))) / size
+    facts = (fact("poses_refused", frames=[scene.frame_ids[k] for k in refused]),) if refused else ()
+    return Found(track, float(track.degrees().max()), shift, likeness, facts)
+
+
+def surface_points(volume: Volume, camera: Camera, params: RegistrationParams) -> Points:
+    """Where a camera's rays meet the volume, with normals; what is thin, torn or seen from aside is left out."""
+    x = np.arange(params.stride // 2, camera.width, params.stride) + 0.5
+    y = np.arange(params.stride // 2, camera.height, params.stride) + 0.5
+    pixels = np.stack(np.meshgrid(x, y), -1)
+    origins, directions = camera.rays(pixels)
+    flat = [np.broadcast_to(a, directions.shape).reshape(-1, 3).astype(np.float32) for a in (origins, directions)]
+    _, alpha, depth = volume.render(*flat)
+    alpha, depth = alpha.reshape(pixels.shape[:2]), depth.reshape(pixels.shape[:2]).astype(np.float64)
+    there = origins + depth[..., None] * directions
+    across, down = np.gradient(there, axis=1), np.gradient(there, axis=0)
+    normals = np.cross(across, down)
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    normals *= -np.sign((normals * directions).sum(-1, keepdims=True))
+    solid = (alpha > params.min_opacity) & (depth > 0)
+    solid = cv2.erode(solid.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
+    kept = solid & (-(normals * directions).sum(-1) > params.min_cosine)
+    return Points(there[kept], normals[kept], pixels[kept])
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Attributes:
+    sigma: pixels.
+    seen: of each camera (P,), what its points looked like in the reference frame.
+    """
+
+    sigma: float
+    seen: list[Array]
+
+
+def _all_frames(
+    scene: Scene,
+    cameras: Sequence[Camera],
+    points: Sequence[Points],
+    reference: int,
+    params: RegistrationParams,
+    bar: tqdm,
+) -> tuple[list[Similarity], Array]:
+    """Poses of all frames against the reference, from it outwards; and their likeness to it."""
+    store, indices = scene.open_frames(), scene.indices("train")
+    scales = []
+    for share in params.scales:
+        sigma = share * min(scene.width, scene.height)
+        first = [features(store.image(i, reference), sigma) for i in indices]
+        scales.append(_Scale(sigma, [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]))
+    poses = [Similarity.identity()] * scene.num_frames
+    likeness = np.ones(scene.num_frames)
+    for step in (1, -1):
+        last = before = Similarity.identity()
+        for k in range(reference + step, scene.num_frames if step > 0 else -1, step):
+            pose = last.after(before.inverse()).after(last)  # as fast as before
+            images = [store.image(i, k) for i in indices]
+            for scale in scales:
+                shown = [features(image, scale.sigma) for image in images]
+                pose, likeness[k] = refined(pose, cameras, points, shown, scale.seen, params)
+            poses[k], before, last = pose, last, pose
+            bar.update()
+    return poses, likeness
+
+
+def _deepened(
+    scene: Scene,
+    cameras: Sequence[Camera],
+    points: Sequence[Points],
+    poses: Sequence[Similarity],
+    reference: int,
+    params: RegistrationParams,
+    bar: tqdm,
+) -> tuple[list[Points], list[Similarity], Array]:
+    """Points moved along their rays by one number for all, as fits all frames best; and the poses with them.
+
+    Half of a volume's opacity is reached before or behind the surface: a head taken to be smaller turns farther.
+    """
+    store, indices = scene.open_frames(), scene.indices("train")
+    sigma = params.scales[-1] * min(scene.width, scene.height)
+    first = [features(store.image(i, reference), sigma) for i in indices]
+    seen = [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
+    found, likeness = list(poses), np.ones(len(poses))
+
+    def shown(k: int) -> list[Picture]:
+        return [features(store.image(i, k), sigma) for i in indices]
+
+    curvature, slope = 1e-9, 0.0
+    for k, pose in enumerate(poses):
+        equations = Equations.of(pose, cameras, points, shown(k), seen, params)
+        gain, pull = equations.along_rays(params)
+        curvature, slope = curvature + gain, slope + pull
+    deeper = float(np.clip(-slope / curvature, -params.max_deeper, params.max_deeper))
+    moved = [
+        replace(one, positions=one.positions + deeper * unit(one.positions - camera.centre))
+        for camera, one in zip(cameras, points, strict=True)
+    ]
+    for k in range(len(poses)):
+        if k != reference:
+            found[k], likeness[k] = refined(found[k], cameras, moved, shown(k), seen, params)
+        bar.update()
+    return moved, found, likeness
+
+
+def _refused(poses: Sequence[Similarity], likeness: Array, reference: int, params: RegistrationParams) -> list[int]:
+    """Frames whose pictures are too unlike the reference's at the pose found, or that leap out of the motion."""
+    typical = float(np.median(likeness))
+    refused = []
+    for k, pose in enumerate(poses):
+        leaps = False
+        if 0 < k < len(poses) - 1:
+            between = Track.of(
+                [poses[k - 1].rotation, poses[k + 1].rotation], [poses[k - 1].translation, poses[k + 1].translation]
+            ).at(0.5)
+            off = Track.of([between.inverse().after(pose).rotation], [np.zeros(3)])
+            leaps = float(off.degrees()[0]) > params.max_leap
+        if k != reference and (likeness[k] < params.min_likeness * typical or leaps):
+            refused.append(k)
+    return refused
+
+
+def _bridged(poses: Sequence[Similarity], refused: Sequence[int]) -> list[Similarity]:
+    """Refused frames between their neighbours; beyond the last that is left, held."""
+    kept = [k for k in range(len(poses)) if k not in refused]
+    track = Track.of([poses[k].rotation for k in kept], [poses[k].translation for k in kept])
+    return [track.at(float(np.interp(k, kept, np.arange(len(kept))))) for k in range(len(poses))]
+
+
+def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
+    """The scene with poses found from its pictures, written, where `stabilize` asks for them: "found" always, "auto"
+    where the capture has nothing to know them from, and the motion that is found is much.
+
+    Args:
+        scene: as it was written; one that has poses stays as it is.
+
+    Raises:
+        UserError: see `find_track`; of "found" only.
+    """
+    surface = scene.load_surface()
+    asked = params.stabilize == "found"
+    if scene.poses is not None or scene.num_frames < 2 or not (asked or (params.stabilize == "auto" and not surface)):
+        return scene
+    try:
+        found = find_track(scene, params.registration)
+    except UserError:
+        if asked:
+            raise
+        return scene  # `train` will say what is wrong with the pictures
+    much = found.degrees > params.motion.degrees or found.shift > params.motion.shift
+    if not (asked or much):
+        return scene
+    turns = fact("head_turns", degrees=found.degrees, shift=found.shift, source="found in the pictures")
+    scene = replace(scene, poses=found.track, left_out=(*scene.left_out, turns, *found.facts))
+    if surface is not None:
+        vertices = in_head(surface[0].astype(np.float64), found.track).astype(np.float32)
+        with atomic_file(scene.folder / "surface.npz") as temporary, temporary.open("wb") as file:
+            np.savez(file, vertices=vertices, faces=surface[1])
+    write_scene(scene, scene.folder)
+    return scene

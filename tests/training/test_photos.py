@@ -1,0 +1,46 @@
+"""What a capture knows beside its pictures: clean plates and mattes in the starting volume."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.frame_store import write_frames
+from facefolds_core.params import BackgroundParams, ExplicitParams
+from facefolds_core.training.explicit.views import Images
+from facefolds_core.training.photos import Photo, photos_of
+from facefolds_core.training.volume.optimise import rays_of
+from tests.scenes import look_at_origin, make_scene
+
+PARAMS = ExplicitParams()
+
+
+def test_plates_and_mattes_are_found_where_they_are(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, size=16)
+    first, second = scene.indices("train")[:2]
+    shape = (scene.height, scene.width)
+    write_frames(scene.folder / "plates.arrow", (*shape, 3), [(first, 0, np.full((*shape, 3), 7, np.uint8))])
+    write_frames(scene.folder / "mattes.arrow", (*shape, 1), [(second, 0, np.full((*shape, 1), 9, np.uint8))])
+    one, two = photos_of(scene, [first, second], 0)
+    assert one.plate is not None and (one.plate == 7).all() and one.matte is None
+    assert two.matte is not None and (two.matte == 9).all() and two.plate is None
+    plates = Images(scene).plates()
+    assert plates[0] is not None and (plates[0] == 7).all() and plates[1] is None
+    assert BackgroundParams().rate > 0
+
+
+def test_rays_know_what_is_behind_them_and_what_is_not() -> None:
+    camera = look_at_origin("c", 0, 0, 8)
+    grey = np.full((8, 8, 3), 102, np.uint8)
+    matte = np.full((8, 8, 1), 51, np.uint8)
+    rays = rays_of([camera, camera], [Photo(grey, plate=grey), Photo(grey, matte=matte)], 0.01, 0.7)
+    half = len(rays.camera) // 2
+    behind, unknown = rays.over(np.zeros_like(rays.colours))
+    assert not unknown[:half].any() and unknown[half:].all()
+    np.testing.assert_allclose(behind[:half], 0.4, atol=1e-6)
+    assert (behind[half:] == 0).all()
+    assert (rays.matte[:half] == -1).all()
+    np.testing.assert_allclose(rays.matte[half:], 0.2, atol=1e-6)
+    part = rays.choose(np.array([0, half]))
+    assert part.camera.tolist() == [0, 1] and np.isnan(part.plate[1]).all()
