@@ -12,7 +12,7 @@ from facefolds_core.params.base import Count, Pixels, Section, Share, Weight
 class ReflectionParams(Section):
     """The shared reflection: gloss(s, t) times an environment in the reflected direction."""
 
-    enabled: bool = False
+    enabled: bool = True
     """Try it; it is left out all the same where it does not help (`min_gain`)."""
 
     begin: Literal["rounds", "full", "end"] = "rounds"
