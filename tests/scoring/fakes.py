@@ -100,9 +100,6 @@ class FlatAsset:
     def windows(self) -> tuple[()]:
         return ()
 
-    def reflection(self) -> None:
-        return None
-
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         for frame in self.frames_:
             yield np.concatenate([frame, np.full((*frame.shape[:2], 1), 255, np.uint8)], -1)[None]
