@@ -86,6 +86,9 @@ class FlatAsset:
     def camera_in_head(self, camera: Camera, time: float) -> Camera:
         return camera if self.track is None else self.track.camera(camera, time)
 
+    def reflection(self) -> None:
+        return None
+
     def effects(self) -> None:
         return None
 
@@ -96,9 +99,6 @@ class FlatAsset:
     @property
     def windows(self) -> tuple[()]:
         return ()
-
-    def reflection(self) -> None:
-        return None
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         for frame in self.frames_:
