@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.actor import write_capture
-from facefolds_core.captures.sources import is_generated
+from facefolds_core.captures.generated import is_generated
 from facefolds_core.config import read_stage, read_subject
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from facefolds_core.captures.sources import is_generated
+from facefolds_core.captures.generated import is_generated
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import STAGE_SECTIONS
 from facefolds_core.params_file import idle_keys, load_params, write_configs

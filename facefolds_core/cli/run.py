@@ -13,15 +13,15 @@ from dvc.config import Config
 
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
-from facefolds_core.cluster.jobs import read_grid, record, subject_jobs, sweep_jobs
+from facefolds_core.cluster.jobs import how_to_repeat, read_grid, record, subject_jobs, sweep_jobs
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_text
 from facefolds_core.params_file import load_params
-from facefolds_core.reporting.summary import Row, row_of, write_summary
 from facefolds_core.sweeps.experiments import figures_of
 from facefolds_core.sweeps.table import Run, write_runs
 
 LOGS = Path(".dvc", "tmp", "jobs", "logs")
+CELLS = LOGS.with_name("cells")
 
 
 def command(
@@ -46,19 +46,24 @@ def command(
             needs = {"memory": float(parse_bytes(memory)), "gpu": float(gpu)}
         except ValueError as error:
             raise UserError("not an amount of memory", place="--memory", found=memory, expected="14GB") from error
-        outcomes = _run_all(root, todo, scheduler, jobs or default_jobs(), needs, remote)
+        outcomes = _run_all(root, todo, cells, scheduler, jobs or default_jobs(), needs, remote)
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
             _record(root, outcomes, remote or (scheduler is not None and _has_remote(root)))
-            write_summary(Path("data"), [_row(outcome) for outcome in outcomes])
         _print_table(outcomes)
         if any(outcome.error for outcome in outcomes):
             raise typer.Exit(1)
 
 
 def _run_all(
-    root: Path, todo: Sequence[Job], scheduler: str | None, jobs: int, needs: Mapping[str, float], remote: bool
+    root: Path,
+    todo: Sequence[Job],
+    cells: Mapping[Job, Mapping[str, object]],
+    scheduler: str | None,
+    jobs: int,
+    needs: Mapping[str, float],
+    remote: bool,
 ) -> list[Outcome]:
     """Outcomes in the order of `todo`; each is told of when it comes."""
 
@@ -77,8 +82,9 @@ def _run_all(
             write_text(log, outcome.log)
             typer.echo(f"run: {outcome.job.name}: {outcome.state} after {outcome.seconds:.0f} s")
             if outcome.error:
-                remedy = f"all of it in {log}; to repeat it: dvc repro {outcome.job.target}"
-                typer.echo("  " + outcome.error.replace("\n", "\n  ") + f"\n  {remedy}")
+                told = outcome.error.replace("\n", "\n  ")
+                again = how_to_repeat(outcome.job, cells.get(outcome.job), CELLS)
+                typer.echo(f"  {told}\n  all of it in {log}; to repeat it: {again}")
     return [found[job] for job in todo]
 
 
@@ -104,10 +110,6 @@ def _keep_sweep(out: Path, outcomes: Sequence[Outcome], cells: Mapping[Job, Mapp
         [Run(o.job.name, o.job.subject, "", cells[o.job], figures_of(o.metrics or {}), o.error) for o in outcomes],
     )
     typer.echo(f"run: {out}; `facefolds recommend {out}` takes the best of it")
-
-
-def _row(outcome: Outcome) -> Row:
-    return row_of(Path("data"), outcome.job.subject, outcome.state, outcome.seconds, outcome.error)
 
 
 def _print_table(outcomes: Sequence[Outcome]) -> None:

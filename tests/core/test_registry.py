@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from facefolds_core.asset import codecs
 from facefolds_core.asset.codecs import CODECS
-from facefolds_core.captures.sources import is_generated
+from facefolds_core.captures.generated import is_generated
 from facefolds_core.cli import app
 from facefolds_core.params import Subject, compress, subject
 from facefolds_core.registry import EXPORTERS, SOURCES, Registry

@@ -4,8 +4,8 @@ A module has
 
     def read(root: Path, subject: Subject, params: CaptureParams) -> Capture
 
-which reads everything but the pixels, or raises `UserError`. `params` are the embedded actor's. A module that says
-`GENERATED = True` reads what the stage `capture` has made; all others read the folder or file that `path` names, and
+which reads everything but the pixels, or raises `UserError`. `params` are the embedded actor's. Those of
+`captures.generated` read what the stage `capture` has made; all others read the folder or file that `path` names, and
 have
 
     def recognise(root: Path) -> Recognised | None
@@ -17,15 +17,11 @@ source). The first line of a module's docstring names the layout.
 from __future__ import annotations
 
 from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.generated import is_generated
 from facefolds_core.captures.looking import check_layout
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.paths import SubjectFolders, check_capture_place
 from facefolds_core.registry import SOURCES
-
-
-def is_generated(source: str) -> bool:
-    """Whether the stage `capture` makes the capture."""
-    return bool(getattr(SOURCES[source], "GENERATED", False))
 
 
 def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParams) -> Capture:

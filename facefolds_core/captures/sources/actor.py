@@ -8,8 +8,6 @@ from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.params import CaptureParams, Subject
 
-GENERATED = True
-
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
     """As `read_multiface`, at the rate that the actor was filmed with."""
