@@ -197,8 +197,7 @@ def readme_table(data: Path) -> str:
     for path in files:
         metrics = read_json(path)
         asset, cost = metrics["asset"], metrics["cost"]
-        lpips, st_lpips = asset.get("lpips"), asset.get("st_lpips")
-        known = {"LPIPS": lpips, "ST-LPIPS": st_lpips}
+        known = {"LPIPS": asset.get("lpips"), "ST-LPIPS": asset.get("st_lpips")}
         perceptual = next((f"{name} {value:.3f}" for name, value in known.items() if value is not None), "")
         preset = read_json(path.parent / "model" / "training.json")["preset"]
         rows.append(
