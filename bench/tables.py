@@ -17,13 +17,9 @@ from bench.hazard_rows import FILM, ROWS, Hazard, Loss, loss_of
 from bench.results import ROOT, Cell, Row
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json, write_text
+from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 README = ("<!-- results: written by bench/tables.py -->", "<!-- end of results -->")
-# FaceFolds, comparisons (row 1) and mesh resolution, R^m = 32 (row 2). It gives no training time.
-README_ROWS = [
-    "| paper, 5 Multiface subjects, 768x500 | | | | | 118 MiB | V100 | 25.49 | 0.788 | LPIPS 0.356 |",
-    "| paper, 002914589, R^m = 32 | | | | 9 962 | 170 KB + 5.9 MB | V100 | 29.12 | 0.831 | LPIPS 0.291 |",
-]
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
 """Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
 meshes) and R^t (disk: video), 120 images of subject 002914589. `other_bytes` is what `disk` leaves out."""
@@ -186,39 +182,53 @@ def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | No
 
 
 def readme_table(data: Path) -> str:
-    """Asset, diffuse model and model over the subject, what it took, and last the asset over the whole frame, which
-    rewards whoever paints the room: it is there for the paper's sake, which has nothing else."""
+    """What was filmed and held out, what `headline` says of asset and model, and what the asset costs; one line a
+    subject, each from its metrics.json, scene/scene.json and model/training.json."""
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = ["", "PSNR of the subject: asset", "diffuse", "model", "triangles", "mesh + video", "trained on, for"]
-    head += ["whole frame: PSNR", "SSIM", "perceptual"]
-    rows = []
-    for path in files:
-        metrics = read_json(path)
-        asset, cost = metrics["asset"], metrics["cost"]
-        known = {"LPIPS": asset.get("lpips"), "ST-LPIPS": asset.get("st_lpips")}
-        perceptual = next((f"{name} {value:.3f}" for name, value in known.items() if value is not None), "")
-        preset = read_json(path.parent / "model" / "training.json")["preset"]
-        rows.append(
-            [
-                f"ours, `{path.parent.name}`, preset `{preset}`",
-                *(number(metrics[variant].get("psnr_subject"), 2) for variant in ("asset", "diffuse", "model")),
-                spaced(cost["triangles"]),
-                f"{size(cost['mesh_bytes'])} + {size(cost['texture_bytes'])}",
-                f"{cost['device']}, {cost['train_seconds']:.0f} s",
-                *(number(asset["psnr"], 2), number(asset["ssim"], 3), perceptual),
-            ]
-        )
-    whole = markdown(head, rows).splitlines()
-    return "\n".join([*whole[:2], *README_ROWS, *whole[2:]])
+    head = ["subject", "PSNR, dB", "taken", "model", "SSIM", "cameras, frames, pixels", "held out (degrees from front)"]
+    return markdown([*head, "triangles", "meshes + video", "training"], [_readme_row(path) for path in files])
+
+
+def _readme_row(path: Path) -> list[str]:
+    metrics, scene = read_json(path), read_json(path.parent / "scene" / "scene.json")
+    key, cost, preset = (
+        metrics["headline"],
+        metrics["cost"],
+        read_json(path.parent / "model" / "training.json")["preset"],
+    )
+    held = {c["name"]: _from_front(c["w2c"]) for c in scene["cameras"] if c["split"] == "holdout"}
+    largest = max(scene["cameras"], key=lambda camera: camera["width"] * camera["height"])
+    filmed = [len(scene["cameras"]), len(scene["frame_ids"]), f"{largest['height']} x {largest['width']}"]
+    names = ", ".join(f"{name} ({angle:.0f})" for name, angle in held.items())
+    angles = [f"{value:.0f}" for value in (min(held.values()), max(held.values()))] if held else []
+    return [
+        f"`{path.parent.name}`" + ("" if preset == "fast" else f", {preset}"),
+        f"**{number(metrics['asset'][key], 2)}**",
+        HEADLINE_WORDS[key],
+        number(metrics["model"][key], 2),
+        number(metrics["asset"].get(key.replace("psnr", "ssim")), 3),
+        ", ".join(map(str, filmed)),
+        names if len(held) < 4 else f"{len(held)} ({' to '.join(angles)})",
+        spaced(cost["triangles"]),
+        f"{size(cost['mesh_bytes'])} + {size(cost['texture_bytes'])}",
+        f"{cost['train_seconds']:.0f} s",
+    ]
+
+
+def _from_front(w2c: Sequence[Sequence[float]]) -> float:
+    """Degrees between the direction in which a camera stands and the front, +x."""
+    matrix = np.array(w2c)
+    centre = -matrix[:, :3].T @ matrix[:, 3]
+    return float(np.degrees(np.arccos(centre[0] / np.linalg.norm(centre))))
 
 
 def main(
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
     write: Annotated[bool, typer.Option("--write", help="Replace the table in README.md.")] = False,
 ) -> None:
-    """Print (or write into README.md) the table of scores and costs, ours beside the paper's."""
+    """Print (or write into README.md) the table of scores and costs."""
     with report_user_errors("tables"):
         text = readme_table(data)
         if write:

@@ -195,6 +195,10 @@ class Asset:
         """As `AssetLevel.effects`."""
         return self.full.effects()
 
+    def reflection(self) -> ReflectionMaps | None:
+        """As `AssetLevel.reflection`."""
+        return self.full.reflection()
+
     def frames(self) -> Iterator[Frame]:
         """As `AssetLevel.frames`."""
         return self.full.frames()

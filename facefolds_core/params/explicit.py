@@ -123,6 +123,10 @@ class MovingParams(Section):
     """The rays of a frame are dealt into shares of as many as a step takes; so many of them are used, in each frame
     others. Tracing them takes longer than the steps themselves: more cost time, and win little."""
 
+    volume_frames: Count = 5
+    """Frames that the starting volume is fitted to: the mean pose, and others in which the cameras see the head from
+    elsewhere."""
+
     sample: Count = 64
     """One ray in so many is looked at to know how many meet the subject,"""
 

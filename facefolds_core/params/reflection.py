@@ -12,10 +12,10 @@ from facefolds_core.params.base import Count, Pixels, Section, Share, Weight
 class ReflectionParams(Section):
     """The shared reflection: gloss(s, t) times an environment in the reflected direction."""
 
-    enabled: bool = False
+    enabled: bool = True
     """Try it; it is left out all the same where it does not help (`min_gain`)."""
 
-    begin: Literal["rounds", "full", "end"] = "rounds"
+    begin: Literal["rounds", "full", "end"] = "end"
     """When it is fitted first: in the first round of geometry, at full resolution, or once the textures are done, which
     then are those of a model without it."""
 

@@ -38,7 +38,7 @@ class PosedView:
     ) -> None:
         self._poses, self._model, self._asset, self._caster = scene.poses, model, asset, caster
         self._camera, self._step = camera, step
-        self._maps, self._reflection = asset.effects(), asset.full.reflection()
+        self._maps, self._reflection = asset.effects(), asset.reflection()
         self._turn_model(0)
         self._turn_asset(0)
 
@@ -58,7 +58,8 @@ class PosedView:
     def _turn_asset(self, frame: int) -> None:
         self.seen_by = self._asset.camera_in_head(self._camera, frame * self._step)
         self.hits = self._caster.cast(self.seen_by)
-        windows = self._asset.full.windows
         maps = self._reflection
-        self.glossy = None if maps is None else reflected_colours(self.hits, self.seen_by, windows, maps)
+        self.glossy = None
+        if maps is not None:
+            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps)
         self.added = None if self._maps is None else added_colours(self.hits, to_eye(self.seen_by), self._maps)

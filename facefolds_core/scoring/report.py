@@ -158,7 +158,7 @@ def asset_cost(manifest: Manifest) -> dict[str, int]:
         "mesh_bytes": sum(x.bytes for x in level.layers),
         "texture_bytes": video,
         "video_bits_per_second": round(8 * video * level.texture.fps / level.texture.frames),
-        "view_effects_bytes": level.view_effects.bytes if level.view_effects else 0,
+        "view_effects_bytes": sum(one.bytes for one in (level.view_effects, level.reflection) if one),
         "gpu_bytes": VERTEX_BYTES * vertices + 3 * INDEX_BYTES * triangles + PIXEL_BYTES * picture,
     }
 

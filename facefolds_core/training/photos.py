@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
 
 Image = NDArray[np.uint8]
 
@@ -26,6 +27,31 @@ class Photo:
     image: Image
     plate: Image | None = None
     matte: Image | None = None
+
+
+@dataclass(frozen=True)
+class PosedPhoto:
+    """A photo, and where its camera stands.
+
+    Attributes:
+        camera: in the head's own frame.
+        in_room: in the frame that the room has in the volume; the same of a head that stands still.
+        number: of the camera among the training cameras.
+    """
+
+    photo: Photo
+    camera: Camera
+    in_room: Camera
+    number: int
+
+
+def posed_photos(scene: Scene, cameras: Sequence[int], frames: Sequence[int]) -> list[PosedPhoto]:
+    """Photos of several frames; the room's frame is the head's in the first of them."""
+    return [
+        PosedPhoto(photo, scene.camera_in_head(c, k), scene.camera_in_head(c, frames[0]), number)
+        for k in frames
+        for number, (c, photo) in enumerate(zip(cameras, photos_of(scene, cameras, k), strict=True))
+    ]
 
 
 def photos_of(scene: Scene, cameras: Sequence[int], frame: int) -> list[Photo]:

@@ -64,7 +64,7 @@ def test_documents_that_are_named(project_root: Path) -> None:
     """Code and documents name documents and their pictures by their path from the top."""
     missing: dict[str, list[str]] = {}
     for file in found(project_root, CODE):
-        names = re.findall(r"(?<![\w/.])(docs/[\w./-]+\.(?:md|jpg|png|svg))\b", file.read_text(encoding="utf-8"))
+        names = re.findall(r"(?<![\w/.])(docs/[\w./-]+\.(?:md|jpg|png|svg|webp))\b", file.read_text(encoding="utf-8"))
         gone = [name for name in names if not (project_root / name).exists()]
         if gone and file != Path(__file__):
             missing[str(file.relative_to(project_root))] = gone

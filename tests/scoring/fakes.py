@@ -86,8 +86,19 @@ class FlatAsset:
     def camera_in_head(self, camera: Camera, time: float) -> Camera:
         return camera if self.track is None else self.track.camera(camera, time)
 
+    def reflection(self) -> None:
+        return None
+
     def effects(self) -> None:
         return None
+
+    @property
+    def full(self) -> FlatAsset:
+        return self
+
+    @property
+    def windows(self) -> tuple[()]:
+        return ()
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
         for frame in self.frames_:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.track import Track, rotation
 from facefolds_core.params import BackgroundParams, ExplicitParams
 from facefolds_core.training.explicit.views import Images
-from facefolds_core.training.photos import Photo, photos_of
+from facefolds_core.training.photos import Photo, PosedPhoto, photos_of, posed_photos
 from facefolds_core.training.volume.optimise import rays_of
 from tests.scenes import look_at_origin, make_scene
 
@@ -34,7 +36,14 @@ def test_rays_know_what_is_behind_them_and_what_is_not() -> None:
     camera = look_at_origin("c", 0, 0, 8)
     grey = np.full((8, 8, 3), 102, np.uint8)
     matte = np.full((8, 8, 1), 51, np.uint8)
-    rays = rays_of([camera, camera], [Photo(grey, plate=grey), Photo(grey, matte=matte)], 0.01, 0.7)
+    rays = rays_of(
+        [
+            PosedPhoto(Photo(grey, plate=grey), camera, camera, 0),
+            PosedPhoto(Photo(grey, matte=matte), camera, camera, 1),
+        ],
+        0.01,
+        0.7,
+    )
     half = len(rays.camera) // 2
     behind, unknown = rays.over(np.zeros_like(rays.colours))
     assert not unknown[:half].any() and unknown[half:].all()
@@ -44,3 +53,17 @@ def test_rays_know_what_is_behind_them_and_what_is_not() -> None:
     np.testing.assert_allclose(rays.matte[half:], 0.2, atol=1e-6)
     part = rays.choose(np.array([0, half]))
     assert part.camera.tolist() == [0, 1] and np.isnan(part.plate[1]).all()
+
+
+def test_the_room_stays_where_the_head_turns(tmp_path: Path) -> None:
+    """In every frame the room's rays are those of the first one; the head's turn with it."""
+    still = make_scene(tmp_path, size=16, frames=3)
+    turn = [rotation(np.array([np.cos(a / 2), 0, 0, np.sin(a / 2)])) for a in (0.0, 0.2, 0.4)]
+    scene = replace(still, poses=Track.of(turn, np.zeros((3, 3))))
+    first, second = scene.indices("train")[:2]
+    views = posed_photos(scene, [first, second], [1, 2])
+    assert [view.number for view in views] == [0, 1, 0, 1]
+    np.testing.assert_allclose(views[0].camera.w2c, views[0].in_room.w2c)
+    np.testing.assert_allclose(views[2].in_room.w2c, views[0].in_room.w2c)
+    turned = np.arctan2(*views[2].camera.centre[1::-1]) - np.arctan2(*views[0].camera.centre[1::-1])
+    assert abs(turned + 0.2) < 1e-6

@@ -64,11 +64,11 @@ class GlossFit:
             return None
         found = self.decide(state, source, images)
         if self.on and self.params.begin == "end":
-            self.fit(state, source, images)
+            self.fit(state, source, images, done=True)
         return found
 
-    def fit(self, state: TextureState, source: Rays, images: Images) -> None:
-        """Fit to what the textures leave over now."""
+    def fit(self, state: TextureState, source: Rays, images: Images, done: bool) -> None:
+        """Fit to what the textures leave over now; `done` if they are trained no more."""
         seen = self._look(state, source, images)
         used = self._used(seen)
         first = self.maps is None
@@ -78,7 +78,7 @@ class GlossFit:
         rounds = self.params.first_rounds if first else self.params.rounds
         maps = grounded(fit_maps(used, start, rounds, self.params))
         # Textures that are still trained would follow an offset that takes up what they leave over.
-        self.maps = maps if self.params.begin == "end" else centred(maps, used, self.params)
+        self.maps = maps if done else centred(maps, used, self.params)
         self._shine(state, seen)
 
     def decide(self, state: TextureState, source: Rays, images: Images) -> Fact:

@@ -218,7 +218,8 @@ class _Trainer:
             if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
                 return False
             if self.gloss.due(i, level):
-                self.gloss.fit(self.state, self.views, self.images)
+                done = level.last and i == level.iterations - 1
+                self.gloss.fit(self.state, self.views, self.images, done)
             self.iteration += 1
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(recent, 1e-12)))

@@ -16,7 +16,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, VolumeParams
-from facefolds_core.training.photos import photos_of
+from facefolds_core.training.photos import posed_photos
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.optimise import Rays, clear, rays_of, train
@@ -106,7 +106,8 @@ def bounding_box(cameras: list[Camera], params: VolumeParams) -> tuple[NDArray[n
 
 
 class VolumeFit:
-    """A fit to the middle frame (of a head that turns, to the one nearest its mean pose), level by level.
+    """A fit to the middle frame, level by level; of a head that turns, to the frame nearest its mean pose and some
+    others (`train.moving.volume_frames`): in each of them the cameras see it from elsewhere.
 
     Args:
         scene, params: of the training.
@@ -123,17 +124,24 @@ class VolumeFit:
         indices = scene.indices("train")
         self.params, self.outer = params, outer
         self.frame = scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
-        self.cameras = [scene.camera_in_head(i, self.frame) for i in indices]
-        self.photos = photos_of(scene, indices, self.frame)
+        self.views = posed_photos(scene, indices, self._frames(scene))
+        self.cameras = [view.camera for view in self.views]
         self.lower, self.upper = bounding_box(self.cameras, params.volume)
         self.random = np.random.default_rng(params.seed)
-        self.mean = np.mean([photo.image.mean((0, 1)) for photo in self.photos], 0) / 255
+        self.mean = np.mean([view.photo.image.mean((0, 1)) for view in self.views], 0) / 255
         farthest = max(float(np.linalg.norm(c.centre)) for c in self.cameras)
         self.room = Room(self.mean.astype(np.float32), farthest, params.volume.reach, params.room, params.environment)
         self.grid: Array | None = None
         self.voxel = self.psnr = 0.0
-        self.found = CameraFit.alike(len(self.cameras), params.cameras)
+        self.found = CameraFit.alike(len(indices), params.cameras)
         self.rays: Rays | None = None
+
+    def _frames(self, scene: Scene) -> list[int]:
+        """`frame`, and of a head that turns others, spread over the take."""
+        if scene.poses is None:
+            return [self.frame]
+        spread = np.linspace(0, scene.num_frames - 1, self.params.moving.volume_frames - 1)
+        return list(dict.fromkeys([self.frame, *(round(k) for k in spread)]))
 
     def run(self, number: int, bar: tqdm) -> None:
         """One level; `bar` is advanced by one an iteration.
@@ -148,7 +156,7 @@ class VolumeFit:
         coarser = self.grid
         grid = _fog(share, self.mean, wanted) if coarser is None else _resample(coarser, self.voxel, shape, finer)
         grid[share == 0, 0] = -kernel.LIMIT
-        rays = rays_of(self.cameras, self.photos, finer, wanted.pixel)
+        rays = rays_of(self.views, finer, wanted.pixel)
         corrected = self.found.corrected
         colours, plate = corrected(rays.colours, rays.camera), corrected(rays.plate, rays.camera)
         rays = replace(rays, colours=colours, plate=plate)
@@ -173,7 +181,7 @@ class VolumeFit:
         rays = self.rays
         step = self.params.volume.step * self.voxel
         _, alpha, _ = kernel.render(rays.origins, rays.directions, self.grid, self.lower, self.voxel, step)
-        self.room.forget_unseen(rays.origins, rays.directions, 1 - alpha)
+        self.room.forget_unseen(rays.room_origins, rays.room_directions, 1 - alpha)
         return self.volume()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import cv2
@@ -15,7 +16,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VolumeLevel, VolumeParams
 from facefolds_core.training.adam import corrections, decays
-from facefolds_core.training.photos import Photo
+from facefolds_core.training.photos import PosedPhoto
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.room import Room
 
@@ -27,12 +28,15 @@ class Rays:
     """R rays: origins, directions and colours (R, 3), numbers of their cameras (R,), and what is known beside.
 
     Attributes:
+        room_origins, room_directions: (R, 3) the same rays in the room's frame: a head may turn in it.
         plate: (R, 3) what is behind the subject, NaN where it is not known.
         matte: (R,) opacity of the subject, -1 where it is not known.
     """
 
     origins: Array
     directions: Array
+    room_origins: Array
+    room_directions: Array
     colours: Array
     camera: NDArray[np.int32]
     plate: Array
@@ -47,15 +51,19 @@ class Rays:
         return np.where(unknown[:, None], behind, self.plate).astype(np.float32), unknown
 
 
-def rays_of(cameras: list[Camera], photos: list[Photo], voxel: float, reduced: float) -> Rays:
+def rays_of(views: Sequence[PosedPhoto], voxel: float, reduced: float) -> Rays:
     """One ray for each pixel of the photos, reduced until one covers so many voxels."""
+    cameras = [view.camera for view in views]
     pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
     factor = max(1, round(reduced * voxel / pixel))
     parts = list[Rays]()
-    for number, (camera, photo) in enumerate(zip(cameras, photos, strict=True)):
+    for view in views:
+        camera, photo = view.camera, view.photo
         height, width = max(1, camera.height // factor), max(1, camera.width // factor)
         x, y = np.meshgrid((np.arange(width) + 0.5) * factor, (np.arange(height) + 0.5) * factor)
-        origin, direction = camera.rays(np.stack([x, y], -1).reshape(-1, 2))
+        pixels = np.stack([x, y], -1).reshape(-1, 2)
+        origins, directions = _rays(camera, pixels)
+        room_origins, room_directions = _rays(view.in_room, pixels)
 
         def small(image: NDArray[np.uint8] | None, height: int = height, width: int = width) -> Array | None:
             if image is None:
@@ -68,15 +76,22 @@ def rays_of(cameras: list[Camera], photos: list[Photo], voxel: float, reduced: f
         assert colours is not None
         parts.append(
             Rays(
-                origins=np.broadcast_to(origin, direction.shape).astype(np.float32),
-                directions=direction.astype(np.float32),
+                origins=origins,
+                directions=directions,
+                room_origins=room_origins,
+                room_directions=room_directions,
                 colours=colours,
-                camera=np.full(len(colours), number, np.int32),
+                camera=np.full(len(colours), view.number, np.int32),
                 plate=np.full_like(colours, np.nan) if plate is None else plate,
                 matte=np.full(len(colours), -1, np.float32) if matte is None else matte[:, 0],
             )
         )
     return Rays(**{field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Rays)})
+
+
+def _rays(camera: Camera, pixels: NDArray[np.float64]) -> tuple[Array, Array]:
+    origins, directions = camera.rays(pixels)
+    return np.broadcast_to(origins, directions.shape).astype(np.float32), directions.astype(np.float32)
 
 
 def _occupied(density: Array, empty_depth: float) -> NDArray[np.bool_]:
@@ -143,7 +158,7 @@ def clear(
     """Empty the voxels without `min_contrast`, in place: the mean over rays, by their weights there, of how far what
     they see in the volume is from the room behind it. What no ray reaches stays."""
     gradient, touched = kernel.empty_gradient(grid.shape)
-    background, _ = rays.over(room.look_up(rays.origins, rays.directions))
+    background, _ = rays.over(room.look_up(rays.room_origins, rays.room_directions))
     rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
     # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
@@ -184,7 +199,7 @@ def train(
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         part = rays.choose(chosen)
         jitter = random.random(count, np.float32)
-        behind = room.look(part.origins, part.directions, jitter)
+        behind = room.look(part.room_origins, part.room_directions, jitter)
         background, unknown = part.over(behind.colours)
         squares, residual, transmittance = _shade(
             grid[0],

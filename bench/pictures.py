@@ -1,0 +1,157 @@
+"""The documents' pictures of a subject, and whether they are still what would be made today.
+
+python -m bench.pictures              makes docs/images/face.webp, actor.jpg, report.jpg from data/actor
+python -m bench.pictures --check      refuses pictures that are not of this asset, these options, or were edited
+
+What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from PIL import Image
+
+from bench.results import ROOT, commit_name
+from facefolds_core.asset import read_asset
+from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
+from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
+from facefolds_core.rendering.opengl import OpenGLRenderer
+
+IMAGES = ROOT / "docs" / "images"
+RECORD = "made.json"
+FILM: dict[str, Any] = {"size": [384, 480], "pictures": 48, "milliseconds": 90, "sweep": 40, "quality": 72}
+FILM |= {"field_of_view": 18.5, "target": [-0.1, 0.0, -0.035], "background": [22, 24, 29], "samples": 2}
+"""A turntable in which the film plays over and over, slower than it was filmed: 11 frames a second, not 30."""
+SHEET: dict[str, Any] = {"quality": 88}
+PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patience": 2000, "quality": 82}
+"""CSS pixels: a desktop, and a phone beside it; milliseconds until the page's films are decoded."""
+
+
+class Picture(NamedTuple):
+    """One file of `IMAGES`: from which file of the subject it is known to be old, and how it is made."""
+
+    source: str
+    options: dict[str, Any]
+    make: Callable[[Path, Path], None]
+
+
+def film(subject: Path, out: Path) -> None:
+    """The asset turns and plays: animated WebP, an endless loop."""
+    shown, (width, height) = read_asset(subject / "asset").full, FILM["size"]
+    start, samples = Eye(distance=1.0, target=tuple(FILM["target"])), FILM["samples"]
+    background = tuple(value / 255 for value in FILM["background"])
+    pictures = []
+    with OpenGLRenderer(shown) as renderer:
+        for index, eye in enumerate(turntable(start, FILM["pictures"], FILM["sweep"])):
+            camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
+            rgb = renderer.render(camera, index % shown.num_frames, background)[0]
+            means = rgb.reshape(height, samples, width, samples, 3).mean((1, 3))
+            pictures.append(Image.fromarray(np.rint(np.clip(means, 0, 1) * 255).astype(np.uint8)))
+    timing = {"duration": FILM["milliseconds"], "loop": 0}
+    pictures[0].save(
+        out, "WEBP", save_all=True, append_images=pictures[1:], quality=FILM["quality"], method=6, **timing
+    )
+
+
+def sheet(subject: Path, out: Path) -> None:
+    """Truth, model, asset and error, as `evaluate` draws them."""
+    with Image.open(subject / "evaluation" / "contact_sheet.png") as picture:
+        picture.convert("RGB").save(out, "JPEG", quality=SHEET["quality"], optimize=True)
+
+
+def page(subject: Path, out: Path) -> None:
+    """The top of the subject's report, as a desktop and a phone show it.
+
+    Raises:
+        UserError: if there is no report, or no Chromium.
+    """
+    from playwright.sync_api import sync_playwright
+
+    report = subject / "report.html"
+    if not report.exists():
+        raise UserError("no report", file=report, remedy=f"run `facefolds report {subject}` first")
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        raise UserError("no browser", expected="chromium or google-chrome", remedy="apt-get install chromium")
+    shots = []
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        for width in PAGE["widths"]:
+            tab = chromium.new_page(viewport={"width": width, "height": PAGE["height"]})
+            tab.goto(report.resolve().as_uri())
+            tab.wait_for_timeout(PAGE["patience"])
+            shots.append(Image.open(io.BytesIO(tab.screenshot())).convert("RGB"))
+        chromium.close()
+    whole = Image.new("RGB", (sum(shot.width + PAGE["gap"] for shot in shots) - PAGE["gap"], PAGE["height"]), "white")
+    for index, shot in enumerate(shots):
+        whole.paste(shot, (sum(before.width + PAGE["gap"] for before in shots[:index]), 0))
+    whole.save(out, "JPEG", quality=PAGE["quality"], optimize=True)
+
+
+PICTURES = {
+    "face.webp": Picture("asset/manifest.json", FILM, film),
+    "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
+    "report.jpg": Picture("metrics.json", PAGE, page),
+}
+
+
+def stale(subject: Path, images: Path = IMAGES) -> list[str]:
+    """What is wrong with the pictures in words; without the subject's files only what the record itself shows."""
+    record, found = read_json(images / RECORD), []
+    for name, picture in PICTURES.items():
+        made, source = record.get(name), subject / picture.source
+        if made is None or not (images / name).exists():
+            found.append(f"{name}: not made by this command")
+        elif made["sha256"] != file_sha256(images / name):
+            found.append(f"{name}: changed since it was made")
+        elif made["options"] != picture.options:
+            found.append(f"{name}: made with other options")
+        elif source.exists() and made["source"] != file_sha256(source):
+            found.append(f"{name}: made from another {picture.source}")
+    return found
+
+
+def make(name: str, subject: Path, images: Path = IMAGES) -> None:
+    """One picture, and its line in the record.
+
+    Raises:
+        UserError: if the subject lacks what it is made from.
+    """
+    picture = PICTURES[name]
+    if not (subject / picture.source).exists():
+        raise UserError("nothing to make a picture from", file=subject / picture.source, remedy="run `make repro`")
+    with atomic_file(images / name) as temporary:
+        picture.make(subject, temporary)
+    record = read_json(images / RECORD) if (images / RECORD).exists() else {}
+    digests = {"sha256": file_sha256(images / name), "source": file_sha256(subject / picture.source)}
+    record[name] = {"commit": commit_name(), **digests, "options": picture.options}
+    write_json(images / RECORD, dict(sorted(record.items())))
+
+
+def main(
+    names: Annotated[list[str] | None, typer.Argument(help=f"Of {', '.join(PICTURES)}; all if left out.")] = None,
+    subject: Annotated[Path, typer.Option(help="Folder of the embedded actor's results.")] = Path("data/actor"),
+    check: Annotated[bool, typer.Option("--check", help="Make nothing; refuse pictures that are stale.")] = False,
+) -> None:
+    """Make the documents' pictures of the embedded actor, or say which of them are stale."""
+    with report_user_errors("pictures"):
+        if check and (found := stale(subject)):
+            raise UserError("; ".join(found), file=IMAGES / RECORD, remedy="run `python -m bench.pictures`")
+        if unknown := set(names or []) - set(PICTURES):
+            expected = ", ".join(PICTURES)
+            raise UserError("no such picture", expected=expected, found=", ".join(unknown), remedy="name one of these")
+        for name in [] if check else names or PICTURES:
+            make(name, subject)
+            typer.echo(f"pictures: {IMAGES / name} ({(IMAGES / name).stat().st_size / 1000:.0f} kB)")
+
+
+if __name__ == "__main__":
+    typer.run(main)
