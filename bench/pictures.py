@@ -24,6 +24,7 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
+from facefolds_core.rendering.opengl_reflection import Glossy
 
 IMAGES = ROOT / "docs" / "images"
 RECORD = "made.json"
@@ -48,8 +49,9 @@ def film(subject: Path, out: Path) -> None:
     shown, (width, height) = read_asset(subject / "asset").full, FILM["size"]
     start, samples = Eye(distance=1.0, target=tuple(FILM["target"])), FILM["samples"]
     background = tuple(value / 255 for value in FILM["background"])
-    pictures = []
-    with OpenGLRenderer(shown) as renderer:
+    maps, pictures = shown.reflection(), []
+    glossy = None if maps is None else Glossy(maps, shown.windows)
+    with OpenGLRenderer(shown, shown.effects(), glossy) as renderer:
         for index, eye in enumerate(turntable(start, FILM["pictures"], FILM["sweep"])):
             camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
             rgb = renderer.render(camera, index % shown.num_frames, background)[0]

@@ -181,14 +181,27 @@ def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | No
     return float(np.interp(at, [x for x, _ in ordered], [y for _, y in ordered]))
 
 
+BYTES = ("mesh_bytes", "texture_bytes", "view_effects_bytes")
+
+
 def readme_table(data: Path) -> str:
     """What was filmed and held out, what `headline` says of asset and model, and what the asset costs; one line a
     subject, each from its metrics.json, scene/scene.json and model/training.json."""
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = ["subject", "PSNR, dB", "taken", "model", "SSIM", "cameras, frames, pixels", "held out (degrees from front)"]
-    return markdown([*head, "triangles", "meshes + video", "training"], [_readme_row(path) for path in files])
+    head = [
+        "subject",
+        "PSNR, dB",
+        "region",
+        "model",
+        "SSIM",
+        "cameras, frames, pixels",
+        "held out (degrees from front)",
+    ]
+    return markdown(
+        [*head, "triangles", "meshes + video (+ reflection)", "training"], [_readme_row(path) for path in files]
+    )
 
 
 def _readme_row(path: Path) -> list[str]:
@@ -212,7 +225,7 @@ def _readme_row(path: Path) -> list[str]:
         ", ".join(map(str, filmed)),
         names if len(held) < 4 else f"{len(held)} ({' to '.join(angles)})",
         spaced(cost["triangles"]),
-        f"{size(cost['mesh_bytes'])} + {size(cost['texture_bytes'])}",
+        " + ".join(size(cost[name]) for name in BYTES if cost.get(name)),
         f"{cost['train_seconds']:.0f} s",
     ]
 
