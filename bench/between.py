@@ -87,26 +87,14 @@ METHODS: dict[str, Callable[[FrameStore, int], Frames]] = {
 
 
 def truth_of(folders: SubjectFolders, scene: Scene, camera: int, factor: int) -> Truth:
-    """At all frames of the asset up to the capture's last.
-
-    Raises:
-        UserError: if the scene does not hold the actor's pictures as they were rendered.
-    """
+    """At all frames of the asset up to the capture's last."""
     params = read_stage(CaptureParams, folders.config)
     view = {view.name: view for view in make_rig(params).cameras}[scene.cameras[camera].name]
     times = frame_times(params.model_copy(update={"frames": factor * params.frames}))
     wanted = times[: factor * (scene.num_frames - 1) + 1]
     found = [render(view, float(t), seed=params.seed) for t in progress(wanted, desc=view.name, unit="picture")]
     opacity = [np.rint(255 * picture.opacity).astype(np.uint8) for picture in found]
-    truth = Truth(np.stack([picture.rgb for picture in found]), np.stack(opacity))
-    if scene.poses is not None or not np.array_equal(truth.pictures[0], scene.open_frames().image(camera, 0)):
-        raise UserError(
-            "the scene does not show what the actor's renderer shows",
-            file=scene.folder,
-            expected="the actor's pictures at their own size, its head still",
-            remedy="use a subject of source actor with default `normalize`",
-        )
-    return truth
+    return Truth(np.stack([picture.rgb for picture in found]), np.stack(opacity))
 
 
 def score(frame: int, picture: NDArray[np.float32], truth: Truth, at: int, factor: int) -> Sums:
@@ -146,20 +134,23 @@ def measure(folders: SubjectFolders, factor: int) -> dict[str, Sums]:
     """Of all times between frames, by METHODS; the bound is scored in both intervals beside a frame.
 
     Raises:
-        UserError: if the subject is not the actor.
+        UserError: if the scene does not hold the actor's pictures as they were rendered.
     """
+    wrong = UserError(
+        "there is no truth between the frames of this capture",
+        file=folders.scene,
+        expected="what the actor's renderer shows: its pictures at their own size, its head still",
+        remedy="give the folder of a subject of source actor with default `normalize`, e.g. data/actor",
+    )
     if read_subject(folders.config).source != "actor":
-        raise UserError(
-            "there is no truth between the frames of this capture",
-            file=folders.config / "subject.json",
-            expected="a subject of source actor, which can be rendered at any time",
-            remedy="give the folder of one, e.g. data/actor",
-        )
+        raise wrong
     scene = read_scene(folders.scene)
     store, meshes = FrameStore(folders.textures / "textures.arrow"), read_meshes(folders.meshes / "meshes.npz")
     found = {method: np.zeros((scene.num_frames - 1, 4)) for method in METHODS}
     for camera in scene.indices(scene.choice_split):
         truth, hits = truth_of(folders, scene, camera, factor), cast_layers(scene.cameras[camera], meshes)
+        if scene.poses is not None or not np.array_equal(truth.pictures[0], scene.open_frames().image(camera, 0)):
+            raise wrong
         for method, fill in METHODS.items():
             for at, textures in fill(store, factor):
                 picture = composite(hits, textures)[0]

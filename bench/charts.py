@@ -190,7 +190,7 @@ PAPER_NAME = "the paper's rows (other data)"
 COSTS = {
     "bytes": "bytes of meshes and texture video",
     "triangles": "triangles of all layers",
-    "pictures": "pictures a second at 1280 x 720 (fewer to the right)",
+    "pictures_a_second": "pictures a second at 1280 x 720 (fewer to the right)",
 }
 SWEEP_NOTE = (
     "Ours: the exported asset on held-out cameras, subject only; one value of the subject's own configuration changed "
@@ -203,13 +203,8 @@ def own_spots(rows: Sequence[Row], cost: str) -> dict[str, list[tuple[int, float
     """Sweep -> (value, cost, PSNR) of a subject's measured cells, by value."""
     found: dict[str, list[tuple[int, float, float]]] = {sweep: [] for sweep in SWEEPS}
     for row in sorted(rows, key=lambda row: row.value):
-        if not row.failure:
-            x = {
-                "bytes": row.bytes,
-                "triangles": row.figures["triangles"],
-                "pictures": row.figures.get("pictures_a_second"),
-            }[cost]
-            found[row.sweep] += [(row.value, x, row.psnr)] if x else []
+        if x := row.bytes if cost == "bytes" else row.figures.get(cost):
+            found[row.sweep].append((row.value, x, row.psnr))
     return found
 
 
@@ -243,13 +238,13 @@ def sweeps(rows: Sequence[Row], path: Path) -> None:
 def _sweep_panel(axes: Axes, cost: str, own: Mapping[str, Sequence[tuple[int, float, float]]]) -> None:
     text: dict[str, Any] = {"fontsize": 6.5, "ha": "center", "textcoords": "offset points"}
     grey: dict[str, Any] = {"color": "#a3a3ad", "lw": 0.8, "ms": 3, "label": PAPER_NAME}
-    for sweep, points in PAPER.items() if cost != "pictures" else ():
+    for sweep, points in PAPER.items() if cost != "pictures_a_second" else ():
         whole = cost == "bytes"
         xs = [p["disk_bytes"] + p["other_bytes"] if whole else p["triangles"] for p in reversed(points)]
         line = list(zip(xs, [p["psnr"] for p in reversed(points)], strict=True))
         axes.plot(*zip(*line, strict=True), "D-", **grey)
         axes.annotate(f"{sweep} {points[-1]['value']}", line[0], (0, -10), color="#a3a3ad", **text)
-    _front(axes, [spot[1:] for line in own.values() for spot in line], falling=cost == "pictures")
+    _front(axes, [spot[1:] for line in own.values() for spot in line], falling=cost == "pictures_a_second")
     for sweep, (name, colour, offset) in SWEEPS.items():
         if own[sweep]:
             _, costs, heights = zip(*own[sweep], strict=True)
@@ -257,7 +252,7 @@ def _sweep_panel(axes: Axes, cost: str, own: Mapping[str, Sequence[tuple[int, fl
         for value, x, psnr in own[sweep]:
             axes.annotate(str(value), (x, psnr), offset, color=colour, **text)
     axes.set_xscale("log")
-    if cost == "pictures":
+    if cost == "pictures_a_second":
         axes.set_xlim(*sorted(axes.get_xlim(), reverse=True))  # shared by a column: to invert would undo itself
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,11 +80,9 @@ def shoot(film: Film, cache: Path) -> Shots:
 def read_shots(folder: Path) -> Shots:
     """A scene's folder, whole in memory."""
     scene = read_scene(folder)
-    frames, masks = scene.open_frames(), scene.open_masks()
-    images = {key: frames.image(*key).copy() for key in frames}
-    return Shots(
-        scene, images, {key: masks.image(*key).copy() for key in masks or ()} if masks else {}, scene.load_surface()
-    )
+    stores = (scene.open_frames(), scene.open_masks())
+    images, masks = ({key: store.image(*key).copy() for key in store} if store else {} for store in stores)
+    return Shots(scene, images, masks, scene.load_surface())
 
 
 def write_shots(shots: Shots, folder: Path) -> Scene:
@@ -100,19 +99,20 @@ def write_shots(shots: Shots, folder: Path) -> Scene:
     return read_scene(folder)
 
 
+def _renumbered(shots: Shots, axis: int, kept: list[int]) -> dict[str, Any]:
+    """Images and masks of the cameras (axis 0) or frames (1) that are kept, by their new numbers."""
+    pairs = {"images": shots.images, "masks": shots.masks}.items()
+    return {
+        name: {(*key[:axis], kept.index(key[axis]), *key[axis + 1 :]): p[key] for key in p if key[axis] in kept}
+        for name, p in pairs
+    }
+
+
 def keep_cameras(shots: Shots, kept: list[int]) -> Shots:
     """Only these cameras, in their order."""
-    place = {camera: position for position, camera in enumerate(kept)}
-    scene = replace(
-        shots.scene,
-        cameras=tuple(shots.scene.cameras[i] for i in kept),
-        splits=tuple(shots.scene.splits[i] for i in kept),
-    )
-    images, masks = (
-        {(place[c], k): image for (c, k), image in pictures.items() if c in place}
-        for pictures in (shots.images, shots.masks)
-    )
-    return replace(shots, scene=scene, images=images, masks=masks)
+    at = shots.scene
+    scene = replace(at, cameras=tuple(at.cameras[i] for i in kept), splits=tuple(at.splits[i] for i in kept))
+    return replace(shots, scene=scene, **_renumbered(shots, 0, kept))
 
 
 def of_split(shots: Shots, split: Split) -> Shots:
@@ -122,14 +122,9 @@ def of_split(shots: Shots, split: Split) -> Shots:
 
 def keep_frames(shots: Shots, kept: list[int]) -> Shots:
     """Only these frames; they keep their times."""
-    place = {frame: position for position, frame in enumerate(kept)}
     scene = replace(shots.scene, frame_ids=tuple(shots.scene.frame_ids[k] for k in kept), times=shots.scene.times[kept])
-    images, masks = (
-        {(c, place[k]): image for (c, k), image in pictures.items() if k in place}
-        for pictures in (shots.images, shots.masks)
-    )
     surface = None if shots.surface is None else (shots.surface[0][kept], shots.surface[1])
-    return replace(shots, scene=scene, images=images, masks=masks, surface=surface)
+    return replace(shots, scene=scene, surface=surface, **_renumbered(shots, 1, kept))
 
 
 def map_cameras(shots: Shots, change: Callable[[int, Camera], Camera]) -> Shots:

@@ -111,14 +111,12 @@ def missing_frames(shots: Shots, count: float, random: Random) -> Shots:
 def _moved_world(shots: Shots, factor: float, shift: NDArray[np.float64]) -> Shots:
     """Points x of the world move to factor x + shift; every picture stays what it is."""
 
-    def moved(camera: Camera) -> Camera:
+    def moved(_: int, camera: Camera) -> Camera:
         centre = factor * camera.centre + shift
         return replace(camera, w2c=np.concatenate([camera.rotation, -(camera.rotation @ centre)[:, None]], 1))
 
-    surface = shots.surface
-    if surface is not None:
-        surface = ((factor * surface[0] + shift).astype(np.float32), surface[1])
-    return replace(map_cameras(shots, lambda _, camera: moved(camera)), surface=surface)
+    surface = shots.surface and ((factor * shots.surface[0] + shift).astype(np.float32), shots.surface[1])
+    return replace(map_cameras(shots, moved), surface=surface)
 
 
 def wrong_centre(shots: Shots, distance: float, random: Random) -> Shots:

@@ -166,7 +166,7 @@ def flat(truth: Scene, names: Sequence[str]) -> float:
     pictures, masks = truth.open_frames(), truth.open_masks()
     found: list[float | None] = []
     for index, k in masks or ():
-        if masks is not None and truth.cameras[index].name in names:
+        if masks and truth.cameras[index].name in names:
             wanted, mask = pictures.image(index, k) / 255.0, masks.image(index, k)[..., 0] / 255.0
             colour = (wanted * mask[..., None]).sum((0, 1)) / max(float(mask.sum()), 1e-9)
             found.append(psnr(np.broadcast_to(colour, wanted.shape), wanted, mask))

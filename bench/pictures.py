@@ -8,7 +8,6 @@ What each was made from stands in docs/images/made.json; report.jpg needs `facef
 
 from __future__ import annotations
 
-import io
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +21,7 @@ from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
+from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
@@ -65,8 +65,8 @@ def film(subject: Path, out: Path) -> None:
 
 def sheet(subject: Path, out: Path) -> None:
     """Truth, model, asset and error, as `evaluate` draws them."""
-    with Image.open(subject / "evaluation" / "contact_sheet.png") as picture:
-        picture.convert("RGB").save(out, "JPEG", quality=SHEET["quality"], optimize=True)
+    picture = open_picture(subject / "evaluation" / "contact_sheet.png")
+    picture.convert("RGB").save(out, "JPEG", quality=SHEET["quality"], optimize=True)
 
 
 def page(subject: Path, out: Path) -> None:
@@ -90,7 +90,7 @@ def page(subject: Path, out: Path) -> None:
             tab = chromium.new_page(viewport={"width": width, "height": PAGE["height"]})
             tab.goto(report.resolve().as_uri())
             tab.wait_for_timeout(PAGE["patience"])
-            shots.append(Image.open(io.BytesIO(tab.screenshot())).convert("RGB"))
+            shots.append(open_picture(tab.screenshot()).convert("RGB"))
         chromium.close()
     whole = Image.new("RGB", (sum(shot.width + PAGE["gap"] for shot in shots) - PAGE["gap"], PAGE["height"]), "white")
     for index, shot in enumerate(shots):

@@ -175,17 +175,14 @@ def timing_table(timings: Sequence[Mapping[str, Any]]) -> str:
     """Milliseconds a picture, pictures a second, processor milliseconds, and how many times the first row's."""
     sizes = list(dict.fromkeys(t["size"] for t in timings))
     found = {(t["row"], t["size"]): t for t in timings}
-    head, rows = [""], []
-    for size in sizes:
-        head += [f"{size}: ms", "pictures a second", "processor ms", "x floor"]
-    for name in dict.fromkeys(t["row"] for t in timings):
-        row = [name]
+    head = [text for size in sizes for text in (f"{size}: ms", "pictures a second", "processor ms", "x floor")]
+    rows = {t["row"]: [t["row"]] for t in timings}
+    for name, row in rows.items():
         for size in sizes:
             t, floor = found[name, size], found[timings[0]["row"], size]
             ms, spent = t["milliseconds"], t["processor"]
             row += [f"{ms:.0f}", f"{1000 / ms:.1f}", f"{spent:.0f}", f"{spent / floor['processor']:.1f}"]
-        rows.append(row)
-    return markdown(head, rows)
+    return markdown(["", *head], list(rows.values()))
 
 
 def main(

@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Generic, Literal, TypeVar
+from typing import Annotated, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -30,12 +30,13 @@ class Record(BaseModel):
 class Entry(Record):
     """One measurement; those of equal `key` replace each other. `failure`: an error's first line, or ""."""
 
+    KEY: ClassVar[tuple[str, ...]] = ()
     failure: str = ""
     date: str = ""
 
     @property
     def key(self) -> tuple[object, ...]:
-        raise NotImplementedError
+        return tuple(getattr(self, name) for name in self.KEY)
 
 
 class Conditions(Record):
@@ -91,6 +92,7 @@ class Cell(Entry):
         seconds: processor time of training.
     """
 
+    KEY = ("subject", "hazard", "strength", "preset", "seed")
     subject: str = "film"
     hazard: str
     strength: float
@@ -107,10 +109,6 @@ class Cell(Entry):
     commit: str = ""
 
     @property
-    def key(self) -> tuple[object, ...]:
-        return self.subject, self.hazard, self.strength, self.preset, self.seed
-
-    @property
     def converged(self) -> bool:
         """It ended without an error or a new start, and shows more than a flat silhouette would."""
         return not self.failure and not self.restarts and self.psnr is not None and self.psnr > self.flat
@@ -125,6 +123,7 @@ class Row(Entry):
             draws; empty if it failed.
     """
 
+    KEY = ("sweep", "subject", "value")
     sweep: str
     subject: str
     value: Annotated[int, Field(ge=1)]
@@ -133,10 +132,6 @@ class Row(Entry):
     machine: str
     figures: dict[str, float] = {}
     renderer: str = ""
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        return self.sweep, self.subject, self.value
 
     @property
     def bytes(self) -> int:

@@ -8,22 +8,23 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import torch
 import yaml
 
 from bench.results import ROOT, Means
+from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.files import read_json, write_text
+from facefolds_core.model import load_model
 from facefolds_core.params import merged
 from facefolds_core.paths import SubjectFolders
-
-if TYPE_CHECKING:
-    import torch
-
-    from facefolds_core.captures.scene import Scene
-    from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.images import score_images
+from facefolds_core.scoring.metrics import shown
+from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.perceptual import Perceptual
 
 Sections = Mapping[str, Mapping[str, Any]]
 
@@ -99,11 +100,6 @@ def score_model(
     Yields:
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
-    from facefolds_core.model import load_model
-    from facefolds_core.scoring.images import score_images
-    from facefolds_core.scoring.metrics import shown
-    from facefolds_core.scoring.model_view import ModelView
-
     model = load_model(folder, device)
     truths, masks = scene.open_frames(), scene.open_masks()
     for index in scene.indices(scene.choice_split):

@@ -106,14 +106,11 @@ def queue_cell(name: str, value: int, subject: str) -> None:
     Raises:
         UserError: with DVC's own words, if it refuses.
     """
-    options = [
-        f"++subjects.{subject}.{key}={json.dumps(given)}" for key, given in changes(name, value, subject).items()
-    ]
-    overrides = [part for option in options for part in ("-S", option)]
-    command = ["exp", "run", "--quiet", "--queue", "--name", f"{name}-{subject}-{value}", *overrides]
-    done = subprocess.run(
-        [sys.executable, "-m", "dvc", *command, f"evaluate@{subject}"], capture_output=True, text=True, check=False
-    )
+    command = ["exp", "run", "--quiet", "--queue", "--name", f"{name}-{subject}-{value}"]
+    for key, given in changes(name, value, subject).items():
+        command += ["-S", f"++subjects.{subject}.{key}={json.dumps(given)}"]
+    command = [sys.executable, "-m", "dvc", *command, f"evaluate@{subject}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         remedy = "forget experiments of this name with `dvc exp remove NAME`"
         raise UserError("`dvc exp run --queue` failed", found=done.stderr.strip()[-500:], remedy=remedy)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from distributed import Client, Future, LocalCluster, as_completed
 
 from facefolds_core.cluster.job import Job, Outcome, do, end_all
 from facefolds_core.cluster.project import snapshot
+from facefolds_core.cluster.run_cache import SETTLED, drop_empty_runs
 from facefolds_core.errors import UserError
 
 QUEUES = ("slurm", "pbs", "sge", "lsf", "oar", "moab", "htcondor")
@@ -120,8 +123,11 @@ def run_jobs(
             for future in as_completed(list(futures)):
                 yield _outcome(future, futures[future])
         except BaseException:
+            logging.getLogger("distributed.worker.state_machine").setLevel(logging.ERROR)  # it warns of what is ended
             client.cancel(list(futures))
             client.run(end_all, run)
+            time.sleep(2 * SETTLED)
+            drop_empty_runs(project.cache)
             raise
         finally:
             client.unsubscribe_topic(run)

@@ -12,6 +12,7 @@ from configobj import ConfigObj
 from distributed import WorkerPlugin
 from dvc.config import Config
 
+from facefolds_core.cluster.run_cache import drop_empty_runs
 from facefolds_core.errors import UserError
 from facefolds_core.reading import is_regular
 
@@ -95,7 +96,9 @@ class Project(WorkerPlugin):
             path = Path(os.path.normpath(root / name))
             path.parent.mkdir(parents=True, exist_ok=True)
             path.symlink_to(target)
-        self._settle(root, place, self.cache if shared else self.code.with_name("cache"))
+        cache = self.cache if shared else self.code.with_name("cache")
+        drop_empty_runs(cache)
+        self._settle(root, place, cache)
         return root, not shared
 
     def _settle(self, root: Path, place: Path, cache: Path) -> None:

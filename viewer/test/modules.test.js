@@ -126,7 +126,16 @@ const manifest = () => ({
     {
       name: "full",
       bytes: 20,
-      layers: [{ mesh: "full_00.drc", ...file, vertices: 4, triangles: 2, texture_rect: [2, 2, 8, 6] }],
+      layers: [
+        {
+          mesh: "full_00.drc",
+          ...file,
+          vertices: 4,
+          triangles: 2,
+          texture_rect: [2, 2, 8, 6],
+          uv_window: [-1, 1, -1, 1],
+        },
+      ],
       texture: {
         ...{ width: 16, height: 32, colour_rect: [0, 0, 16, 16], alpha_rect: [0, 16, 16, 16], frames: 2, fps: 30 },
         videos: [{ file: "full.mp4", codec: "h264", mime: 'video/mp4; codecs="avc1.42"', ...file }],
