@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from facefolds_core.asset.manifest import MANIFEST_NAME, Coordinates, Level, Manifest, Photo, seal_is_whole
+from facefolds_core.asset.manifest import Coordinates, Level, Manifest, Photo
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.geometry.meshes import TexturedMesh
 

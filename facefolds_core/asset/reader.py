@@ -17,14 +17,8 @@ from numpy.typing import NDArray
 from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.effects import Map, read_effects
-from facefolds_core.asset.manifest import (
-    MANIFEST_NAME,
-    REMEDY,
-    Layer,
-    Level,
-    Manifest,
-    parse_manifest,
-)
+from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest, StoredFile
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
@@ -75,9 +69,7 @@ class AssetLevel:
         Raises:
             UserError: if their picture is damaged.
         """
-        effects = self.entry.view_effects
-        if effects is not None:
-            refuse_changed(self.folder / effects.file, effects.bytes, effects.sha256, REMEDY)
+        self._refuse_changed(self.entry.view_effects)
         return read_effects(self.folder, self.entry)
 
     def reflection(self) -> ReflectionMaps | None:
@@ -86,10 +78,13 @@ class AssetLevel:
         Raises:
             UserError: if its picture is damaged.
         """
-        entry = self.entry.reflection
+        self._refuse_changed(self.entry.reflection)
+        return read_reflection(self.folder, self.entry)
+
+    def _refuse_changed(self, entry: StoredFile | None) -> None:
+        """Raise UserError if a file that the level may have is not as the manifest says."""
         if entry is not None:
             refuse_changed(self.folder / entry.file, entry.bytes, entry.sha256, REMEDY)
-        return read_reflection(self.folder, self.entry)
 
     @property
     def windows(self) -> list[Window]:

@@ -7,7 +7,8 @@ import html
 from collections.abc import Iterator
 from pathlib import Path
 
-from facefolds_core.asset.manifest import MANIFEST_NAME, Level, Manifest, sealed
+from facefolds_core.asset.manifest import Level, Manifest
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, sealed
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 

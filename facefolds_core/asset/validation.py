@@ -10,18 +10,8 @@ import numpy as np
 from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
-from facefolds_core.asset.manifest import (
-    MANIFEST_NAME,
-    Layer,
-    Level,
-    Manifest,
-    Poster,
-    Reflection,
-    Texture,
-    Video,
-    ViewEffects,
-    parse_manifest,
-)
+from facefolds_core.asset.manifest import Layer, Level, Manifest, Poster, Reflection, Texture, Video, ViewEffects
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.stored import check_file, is_folder, leads_out
 from facefolds_core.asset.video import Picture, decode_video, probe_video

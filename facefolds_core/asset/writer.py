@@ -17,18 +17,8 @@ from facefolds_core import __version__
 from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
 from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
 from facefolds_core.asset.draco import MeshSettings, encode_mesh
-from facefolds_core.asset.manifest import (
-    MANIFEST_NAME,
-    Coordinates,
-    Layer,
-    Level,
-    Manifest,
-    Pose,
-    Texture,
-    Transform,
-    Video,
-    write_manifest,
-)
+from facefolds_core.asset.manifest import Coordinates, Layer, Level, Manifest, Pose, Texture, Transform, Video
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
 from facefolds_core.asset.video import encode_video, pack_frame, probe_video
 from facefolds_core.errors import UserError

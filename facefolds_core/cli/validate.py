@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.validation import summary, validate_asset
 from facefolds_core.errors import report_user_errors
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from facefolds_core.asset.manifest import MANIFEST_NAME, parse_manifest
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.stored import is_folder
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.player import find_player

@@ -18,17 +18,8 @@ from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.manifest import (
-    MANIFEST_NAME,
-    Level,
-    Manifest,
-    Photo,
-    Poster,
-    Quality,
-    StoredFile,
-    ViewEffects,
-    write_manifest,
-)
+from facefolds_core.asset.manifest import Level, Manifest, Photo, Poster, Quality, StoredFile, ViewEffects
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.video import decode_video, unpack_picture

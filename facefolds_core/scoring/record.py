@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from facefolds_core.asset import Asset
-from facefolds_core.asset.manifest import MANIFEST_NAME
+from facefolds_core.asset.manifest_file import MANIFEST_NAME
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.pictures import DamagedPictureError, open_picture

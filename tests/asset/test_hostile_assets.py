@@ -18,7 +18,7 @@ from PIL import Image
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.checks import mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
-from facefolds_core.asset.manifest import parse_manifest
+from facefolds_core.asset.manifest_file import parse_manifest
 from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.validation import validate_asset

@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 from facefolds_core import __version__
-from facefolds_core.asset.manifest import SCHEMA_PATH, manifest_schema, parse_manifest, seal_is_whole
+from facefolds_core.asset.manifest_file import SCHEMA_PATH, manifest_schema, parse_manifest, seal_is_whole
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 

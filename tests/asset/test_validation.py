@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from facefolds_core.asset.manifest import Manifest, write_manifest
+from facefolds_core.asset.manifest import Manifest
+from facefolds_core.asset.manifest_file import write_manifest
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.files import file_sha256

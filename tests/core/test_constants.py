@@ -18,6 +18,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/effects.py": ALL,
         "asset/glb.py": ALL,
         "asset/manifest.py": ALL,
+        "asset/manifest_file.py": ALL,
         "asset/packing.py": ALL,
         "asset/validation.py": ALL,
         "asset/video.py": ALL,

@@ -9,13 +9,10 @@ import numpy as np
 
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.track import Track, rotation
-from facefolds_core.params import BackgroundParams, ExplicitParams
 from facefolds_core.training.explicit.views import Images
 from facefolds_core.training.photos import Photo, PosedPhoto, photos_of, posed_photos
 from facefolds_core.training.volume.optimise import rays_of
 from tests.scenes import look_at_origin, make_scene
-
-PARAMS = ExplicitParams()
 
 
 def test_plates_and_mattes_are_found_where_they_are(tmp_path: Path) -> None:
@@ -29,7 +26,6 @@ def test_plates_and_mattes_are_found_where_they_are(tmp_path: Path) -> None:
     assert two.matte is not None and (two.matte == 9).all() and two.plate is None
     plates = Images(scene).plates()
     assert plates[0] is not None and (plates[0] == 7).all() and plates[1] is None
-    assert BackgroundParams().rate > 0
 
 
 def test_rays_know_what_is_behind_them_and_what_is_not() -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest import Manifest, parse_manifest, write_manifest
+from facefolds_core.asset.manifest import Manifest
+from facefolds_core.asset.manifest_file import parse_manifest, write_manifest
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
