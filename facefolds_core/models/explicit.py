@@ -1,4 +1,4 @@
-"""Radius maps and texels, fitted from a volume on: docs/reference/explicit.md."""
+"""Radius maps and texels, fitted from a volume on: docs/reference/method.md."""
 
 from __future__ import annotations
 
