@@ -125,6 +125,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/audio.py": ("AAC_BITS_A_SECOND",),
         "cli/render.py": ALL,
         "engines/godot.py": ("QUALITY",),
+        "engines/usd.py": ("QUALITY",),
         "rendering/reference.py": ("BLACK",),
         "captures/appraisal.py": ALL,
         "captures/front.py": ("WELL_BESIDE",),
