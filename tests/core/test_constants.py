@@ -15,7 +15,6 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/codecs/": ALL,
         "asset/colour.py": ALL,
         "asset/cropping.py": ("ALPHA_BOUND",),
-        "asset/effects.py": ALL,
         "asset/glb.py": ALL,
         "asset/manifest.py": ALL,
         "asset/manifest_file.py": ALL,
