@@ -77,4 +77,5 @@ def _cell(camera: Camera, image: Image, radius: float) -> Image:
 
 def _drawable(places: NDArray[np.float64]) -> NDArray[np.int32]:
     """Whole pixels, bounded: OpenCV has 16 bits for those beyond the picture."""
-    return np.rint(places.clip(-10_000, 10_000)).astype(np.int32)
+    whole: NDArray[np.int32] = np.rint(places.clip(-10_000, 10_000)).astype(np.int32)
+    return whole
