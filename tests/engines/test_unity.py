@@ -1,4 +1,4 @@
-"""The Unity package where there is no Unity: it compiles against stubs, and its plain part agrees with the reference."""
+"""The Unity package, without Unity: it compiles against stubs, and its plain part agrees with the reference."""
 
 from __future__ import annotations
 
