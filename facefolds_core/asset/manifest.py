@@ -85,7 +85,6 @@ class Layer(Part):
     Attributes:
         texture_rect: of its colour, within the colour image; its alpha has the same place within the alpha image.
         uv_window: (u0, u1, v0, v1), what its texture covers of the hemisphere's (u, v).
-        effects_rect: within each plane of the level's view effects; absent where there are none.
     """
 
     mesh: FileName
@@ -95,14 +94,6 @@ class Layer(Part):
     sha256: Sha256
     texture_rect: Rect
     uv_window: tuple[UV, UV, UV, UV]
-    effects_rect: Annotated[Rect | None, Field(exclude_if=lambda rect: rect is None)] = None
-
-    @field_validator("effects_rect")
-    @classmethod
-    def _absent_or_whole(cls, value: Rect | None) -> Rect:
-        if value is None:
-            raise ValueError("a rectangle, or no such key")
-        return value
 
 
 class Video(StoredFile):
@@ -139,23 +130,6 @@ class Texture(Part):
     colour_range: Literal["tv"] = "tv"
     chroma_location: Literal["left"] = "left"
     videos: Annotated[tuple[Video, ...], Field(min_length=1)]
-
-
-class ViewEffects(StoredFile):
-    """A static residual that depends on the direction to the eye; players may ignore it.
-
-    Attributes:
-        basis: "sh1": planes for the x, y and z of the direction.
-        scale: what code 255 means, code 0 being its negative.
-        width, height: of the PNG.
-        planes: of x, y and z, in pixels of the PNG; of one size.
-    """
-
-    basis: Literal["sh1"] = "sh1"
-    scale: Annotated[float, Field(gt=0)]
-    width: Count
-    height: Count
-    planes: tuple[Rect, Rect, Rect]
 
 
 class Reflection(StoredFile):
@@ -206,7 +180,6 @@ class Level(Part):
     name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$")]
     layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
     texture: Texture
-    view_effects: ViewEffects | None = None
     reflection: Annotated[Reflection | None, Field(exclude_if=lambda one: one is None)] = None
     bytes: Count
     quality: Quality | None = None
@@ -221,8 +194,7 @@ class Level(Part):
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of each of its files, the meshes first."""
         found = [(layer.mesh, layer.bytes, layer.sha256) for layer in self.layers]
-        extras = [one for one in (self.view_effects, self.reflection) if one is not None]
-        others: list[StoredFile] = [*self.texture.videos, *extras]
+        others: list[StoredFile] = [*self.texture.videos, *([self.reflection] if self.reflection else [])]
         return found + [(other.file, other.bytes, other.sha256) for other in others]
 
 

@@ -31,11 +31,9 @@ _SEAL = re.compile(rb'"manifest_sha256"\s*:\s*"([0-9a-f]{64})"')
 def manifest_schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of `Manifest`; keys with a default are required all the same in a file."""
     schema = Manifest.model_json_schema(mode="serialization")
-    layer = schema["$defs"]["Layer"]
     level, reflection = schema["$defs"]["Level"], {"$ref": "#/$defs/Reflection"}
     level["properties"]["reflection"] = reflection
     level["required"] = [key for key in level["required"] if key != "reflection"]
-    layer["properties"]["effects_rect"] = layer["properties"]["texture_rect"] | {"title": "Effects Rect"}
     poses = schema["properties"]["track"]["anyOf"][0]
     schema["properties"]["track"] = poses | {"title": "Track"}
     schema["properties"]["view"] = {"$ref": "#/$defs/FilmedView"}
@@ -97,8 +95,9 @@ def parse_manifest(path: Path) -> Manifest:
             found=_shown(value.get("version")),
             remedy="make the asset again with this version of facefolds, or read it with the one that made it",
         )
+    value = _without_view_effects(value)
     try:
-        manifest = Manifest.model_validate_json(path.read_bytes())
+        manifest = Manifest.model_validate_json(json.dumps(value))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -114,6 +113,31 @@ def parse_manifest(path: Path) -> Manifest:
     if missing:
         raise UserError("the manifest lacks keys", file=path, place=", ".join(missing), remedy=REMEDY)
     return manifest
+
+
+def _without_view_effects(value: dict[str, Any]) -> dict[str, Any]:
+    """A manifest as it would be without what early writers of version 2 had in each level: `view_effects`, null or a
+    picture with a place in it for each layer, which a player was always free to ignore."""
+    levels = value.get("levels")
+    return value | {"levels": [_level_without(one) for one in levels]} if isinstance(levels, list) else value
+
+
+def _level_without(level: Any) -> Any:
+    if not isinstance(level, dict) or "view_effects" not in level:
+        return level
+    kept = {key: part for key, part in level.items() if key != "view_effects"}
+    effects, layers = level["view_effects"], level.get("layers")
+    if isinstance(effects, dict) and isinstance(layers, list):
+        kept["bytes"] = _difference(level.get("bytes"), effects.get("bytes"))
+        kept["layers"] = [
+            {key: part for key, part in layer.items() if key != "effects_rect"} if isinstance(layer, dict) else layer
+            for layer in layers
+        ]
+    return kept
+
+
+def _difference(whole: Any, part: Any) -> Any:
+    return whole - part if isinstance(whole, int) and isinstance(part, int) else whole
 
 
 def _shown(value: object) -> object:
