@@ -208,7 +208,7 @@ def _level_problems(level: Level) -> list[str]:
     problems += _mesh_file_problems(level)
     if level.bytes != (total := sum(size for _, size, _ in level.files())):
         problems.append(f"bytes are {level.bytes}, those of its files are {total}")
-    return problems + _effects_problems(level) + _reflection_problems(level)
+    return problems + _reflection_problems(level)
 
 
 def _mesh_file_problems(level: Level) -> list[str]:
@@ -223,34 +223,11 @@ def _mesh_file_problems(level: Level) -> list[str]:
     return problems + [f"{name} holds no layer's mesh" for name in unused]
 
 
-def _effects_problems(level: Level) -> list[str]:
-    effects = level.view_effects
-    rects = [layer.effects_rect for layer in level.layers if layer.effects_rect is not None]
-    if effects is None:
-        return ["effects_rects without view_effects"] * bool(rects)
-    problems = _size_problems(effects.width, effects.height)
-    if len(rects) != len(level.layers):
-        problems.append("view_effects, but a layer without effects_rect")
-    if effects.scale > FARTHEST:
-        problems.append(f"view_effects.scale is {effects.scale:g}")
-    planes = effects.planes
-    if any(plane[2:] != planes[0][2:] for plane in planes):
-        problems.append("the planes of view_effects differ in size")
-    problems += [
-        f"plane {list(p)} is not inside the effects picture"
-        for p in planes
-        if not inside(p, (effects.width, effects.height))
-    ]
-    problems += [f"effects_rect {list(r)} is not inside its plane" for r in rects if not inside(r, planes[0][2:])]
-    return problems
-
-
 def _reflection_problems(level: Level) -> list[str]:
     one = level.reflection
     if one is None:
         return []
     problems = _size_problems(one.width, one.height)
-    problems += ["view effects and a reflection"] * (level.view_effects is not None)
     u0, u1, v0, v1 = one.uv_window
     if not (u0 < u1 and v0 < v1):
         problems.append(f"uv_window {[u0, u1, v0, v1]} of the reflection is empty")

@@ -66,7 +66,7 @@ class Builder:
 
     def primitive(self, mesh: TexturedMesh, draco: bytes | None) -> dict[str, Any]:
         """A layer's triangles, plain or as the asset's own Draco bytes."""
-        indices = _back_to_front(mesh).astype("<u4").ravel()
+        indices = back_to_front(mesh).astype("<u4").ravel()
         arrays = (("POSITION", "VEC3", mesh.vertices), ("TEXCOORD_0", "VEC2", mesh.st))
         attributes = {}
         for name, kind, values in arrays:
@@ -154,7 +154,7 @@ def _material(name: str, texture: int) -> dict[str, Any]:
     }
 
 
-def _back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
+def back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
     """The faces, farthest from a viewer before the face (+x) first: nearer folds of a sheet are drawn over farther."""
     depth = mesh.vertices[mesh.faces, 0].mean(1)
     return mesh.faces[np.argsort(depth, kind="stable")]

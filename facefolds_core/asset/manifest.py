@@ -73,7 +73,6 @@ class Layer(Part):
     Attributes:
         texture_rect: of its colour, within the colour image; its alpha has the same place within the alpha image.
         uv_window: (u0, u1, v0, v1), what its texture covers of the hemisphere's (u, v).
-        effects_rect: within each plane of the level's view effects; absent where there are none.
         mesh, offset, bytes, sha256: the file among the level's `meshes`, and the bytes in it that are this Draco mesh.
     """
 
@@ -85,7 +84,6 @@ class Layer(Part):
     sha256: Sha256
     texture_rect: Rect
     uv_window: tuple[UV, UV, UV, UV]
-    effects_rect: Maybe[Rect] = None
 
 
 class Video(StoredFile):
@@ -144,23 +142,6 @@ class Texture(Part):
         return float(self.rate)
 
 
-class ViewEffects(StoredFile):
-    """A static residual that depends on the direction to the eye; players may ignore it.
-
-    Attributes:
-        basis: "sh1": planes for the x, y and z of the direction.
-        scale: what code 255 means, code 0 being its negative.
-        width, height: of the PNG.
-        planes: of x, y and z, in pixels of the PNG; of one size.
-    """
-
-    basis: Literal["sh1"] = "sh1"
-    scale: Annotated[float, Field(gt=0)]
-    width: Count
-    height: Count
-    planes: tuple[Rect, Rect, Rect]
-
-
 class Reflection(StoredFile):
     """What gloss adds to the colours by the direction; players may ignore it.
 
@@ -213,15 +194,14 @@ class Level(Part):
     meshes: Annotated[tuple[StoredFile, ...], Field(min_length=1)]
     layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
     texture: Texture
-    view_effects: ViewEffects | None = None
     reflection: Maybe[Reflection] = None
     bytes: Count
     quality: Quality | None = None
 
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of each of its files, the meshes first."""
-        extras = [one for one in (self.view_effects, self.reflection) if one is not None]
-        files: list[StoredFile] = [*self.meshes, *self.texture.videos, *extras]
+        files: list[StoredFile] = [*self.meshes, *self.texture.videos]
+        files += [] if self.reflection is None else [self.reflection]
         return [(entry.file, entry.bytes, entry.sha256) for entry in files]
 
 

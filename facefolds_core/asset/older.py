@@ -1,7 +1,8 @@
 """Manifests of older format versions, brought into the form of this one when they are read.
 
 Version 1 (facefolds 0.1): one level without a name, one video, no MIME type, no sound, no pictures. Version 2: a file a
-mesh, frames a second as a decimal number.
+mesh, frames a second as a decimal number; early ones had `view_effects` in each level, null or a picture with a place
+in it for each layer, which a player was always free to ignore: it is left out.
 """
 
 from __future__ import annotations
@@ -52,4 +53,8 @@ def _level(level: dict[str, Any]) -> dict[str, Any]:
     texture |= {"frame_rate": [rate.numerator, rate.denominator], "keyframes": [0]}
     meshes = [{"file": layer["mesh"], "bytes": layer["bytes"], "sha256": layer["sha256"]} for layer in level["layers"]]
     layers = [layer | {"offset": 0} for layer in level["layers"]]
-    return {"view_effects": None} | level | {"texture": texture, "meshes": meshes, "layers": layers}
+    kept = {key: part for key, part in level.items() if key != "view_effects"}
+    if level.get("view_effects") is not None:
+        kept["bytes"] -= level["view_effects"]["bytes"]
+        layers = [{key: part for key, part in layer.items() if key != "effects_rect"} for layer in layers]
+    return kept | {"texture": texture, "meshes": meshes, "layers": layers}

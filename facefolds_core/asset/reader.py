@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
-from facefolds_core.asset.effects import Map, read_effects
 from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
@@ -62,15 +61,6 @@ class AssetLevel:
     def camera_in_head(self, camera: Camera, time: float) -> Camera:
         """A camera of the world as the meshes' own frame has it at a time in frames."""
         return camera if self.track is None else self.track.camera(camera, time)
-
-    def effects(self) -> tuple[Map, ...] | None:
-        """The view effects, one map (h, w, 3, 3) a layer; None where the level has none.
-
-        Raises:
-            UserError: if their picture is damaged.
-        """
-        self._refuse_changed(self.entry.view_effects)
-        return read_effects(self.folder, self.entry)
 
     def reflection(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share; None where the level has none.
@@ -185,10 +175,6 @@ class Asset:
     def camera_in_head(self, camera: Camera, time: float) -> Camera:
         """As `AssetLevel.camera_in_head`."""
         return self.full.camera_in_head(camera, time)
-
-    def effects(self) -> tuple[Map, ...] | None:
-        """As `AssetLevel.effects`."""
-        return self.full.effects()
 
     def reflection(self) -> ReflectionMaps | None:
         """As `AssetLevel.reflection`."""

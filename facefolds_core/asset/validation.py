@@ -10,7 +10,7 @@ import numpy as np
 from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
-from facefolds_core.asset.manifest import Layer, Level, Manifest, Reflection, Texture, Video, ViewEffects
+from facefolds_core.asset.manifest import Layer, Level, Manifest, Reflection, Texture, Video
 from facefolds_core.asset.manifest_extras import Picture as StoredPicture
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.nesting import lies_within
@@ -77,11 +77,10 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
             if video.file in whole:
                 found = _video_problems(folder / video.file, video, level.texture)
                 yield from (f"{video.file}: {problem}" for problem in found)
-    pictures: list[StoredPicture | ViewEffects | Reflection] = [
+    pictures: list[StoredPicture | Reflection] = [
         *manifest.photos,
         *([manifest.poster] if manifest.poster else []),
     ]
-    pictures += [level.view_effects for level in manifest.levels if level.view_effects]
     pictures += [level.reflection for level in manifest.levels if level.reflection]
     for picture in pictures:
         if picture.file in whole:
@@ -178,7 +177,7 @@ def _colourful(picture: Picture, texture: Texture) -> bool:
     return bool((np.abs(chroma.astype(np.int16) - 128) > _COLOURFUL).any(0).mean() > 0.01)
 
 
-def _picture_problems(path: Path, said: StoredPicture | ViewEffects | Reflection) -> list[str]:
+def _picture_problems(path: Path, said: StoredPicture | Reflection) -> list[str]:
     try:
         size = picture_size(path)
         if size != (said.width, said.height):

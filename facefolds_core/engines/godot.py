@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
-from facefolds_core.asset.manifest import REMEDY, Texture
+from facefolds_core.asset.manifest import REMEDY
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
-from facefolds_core.asset.video import Picture
+from facefolds_core.engines._picture import rgb_picture
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -103,14 +102,3 @@ def mesh_bytes(mesh: TexturedMesh) -> bytes:
     """A layer as the add-on reads it."""
     vertices = y_up(mesh.vertices).astype("<f4").tobytes()
     return vertices + mesh.st.astype("<f4").tobytes() + mesh.faces.astype("<u4").tobytes()
-
-
-def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
-    """A decoded picture -> (height, width, 3) RGB: colour in its half, alpha as grey in its own."""
-    height, width = texture.height, texture.width
-    y = picture[:height]
-    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
-    rgb = yuv420_to_rgb(y, cb, cr)
-    x0, y0, w, h = texture.alpha_rect
-    rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
-    return rgb

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,9 +16,8 @@ from PIL import Image
 from facefolds_core.asset.audio import encode_sound
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
-from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.manifest import Level, Manifest, Quality, ViewEffects
+from facefolds_core.asset.manifest import Level, Manifest, Quality
 from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
@@ -42,7 +41,6 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.packaging.effects import fit_effects
 from facefolds_core.packaging.levels import coarse_content, level_params
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
@@ -109,16 +107,14 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
             levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
         level = _level(temporary, FULL, full, params, meter, cameras)
-        if params.view_effects and export.reflection is None:
-            photographed = replace(full, textures=export.textures, frames=frames)
-            allowed = params.effects.share * level.bytes
-            level = _with_effects(temporary, level, fit_effects(photographed, scene, allowed, params.effects))
         if export.reflection is not None:
             picture = ReflectionPicture.of(export.reflection)
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality)
+        manifest = _with_extras(
+            temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality
+        )
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -166,21 +162,6 @@ def _level(
     psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
     asked = None if crfs is None else video.target_psnr
     return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3), target_psnr=asked)})
-
-
-def _with_effects(folder: Path, level: Level, picture: EffectsPicture | None) -> Level:
-    """Add view effects to a level, where there are any."""
-    if picture is None:
-        return level
-    path = folder / f"{level.name}_effects.png"
-    path.write_bytes(picture.png())
-    height, width = picture.codes.shape[:2]
-    effects = ViewEffects(**_stored(path), scale=picture.scale, width=width, height=height, planes=picture.planes)
-    layers = [
-        layer.model_copy(update={"effects_rect": rect}) for layer, rect in zip(level.layers, picture.rects, strict=True)
-    ]
-    update = {"layers": tuple(layers), "view_effects": effects, "bytes": level.bytes + effects.bytes}
-    return level.model_copy(update=update)
 
 
 def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:

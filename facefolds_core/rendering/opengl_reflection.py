@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.reflections import ReflectionMaps, window_to_window
 from facefolds_core.geometry.sphere_uv import Window
 
@@ -43,6 +44,12 @@ class Glossy:
 
     maps: ReflectionMaps
     windows: Sequence[Window]
+
+    @classmethod
+    def of(cls, level: AssetLevel) -> Glossy | None:
+        """That of a level of an asset; None where it has none."""
+        maps = level.reflection()
+        return None if maps is None else cls(maps, level.windows)
 
     def to_maps(self, layer: int) -> NDArray[np.float32]:
         """(4,) the uniform `to_maps` of a layer."""

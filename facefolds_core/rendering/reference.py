@@ -131,7 +131,7 @@ def composite(
         hits: of one camera.
         textures: N textures (h, w, 4) uint8, one frame of all layers.
         background: RGB in [0, 1], (3,) or (H, W, 3).
-        added: for each layer (M, 3), what to add to the colours of its M hits before blending: view effects.
+        added: for each layer (M, 3), what to add to the colours of its M hits before blending: the reflection.
 
     Returns:
         rgb (H, W, 3) and alpha (H, W), float32 in [0, 1].

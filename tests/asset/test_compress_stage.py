@@ -13,7 +13,6 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.draco import encode_mesh
-from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
@@ -106,22 +105,6 @@ def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
             assert np.linalg.norm(ours[:, None] - theirs[None], axis=-1).min(1).max() <= 0.05
     exact = sum(len(encode_mesh(crop.mesh, MeshCodec())[0]) for crop in cap_crops(3, 2, 64))
     assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
-
-
-def test_view_effects_ship_and_are_scored_apart(folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch) -> None:
-    maps = [np.full((4, 3, 3, 3), 0.01 * (i + 1), np.float32) for i in range(3)]
-    monkeypatch.setattr("facefolds_core.packaging.package.fit_effects", lambda *_: EffectsPicture.of(maps))
-    rig(folders, view_effects=True)
-    compress(folders)
-    assert validate_asset(folders.asset) == []
-    asset = read_asset(folders.asset)
-    found = asset.effects()
-    assert found is not None
-    for table, given in zip(found, maps, strict=True):
-        np.testing.assert_allclose(table, given, atol=0.001)
-    assert asset.manifest.full.bytes == sum(size for _, size, _ in asset.manifest.full.files())
-    (folders.asset / "full_effects.png").write_bytes(b"")
-    assert any(problem.startswith("full_effects.png:") for problem in validate_asset(folders.asset))
 
 
 def test_levels_of_detail(folders: SubjectFolders) -> None:

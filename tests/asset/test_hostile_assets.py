@@ -75,8 +75,8 @@ ABSURD = {
     "vertices": (put(*LAYER, "vertices", to=10**12), "too many"),
     "width": (put(*TEXTURE, "width", to=10**9), "pixels"),
     "poster": (put("poster", "height", to=10**9), "poster.png"),
-    "effects": (put("levels", 1, "view_effects", "width", to=10**9), "pixels"),
-    "effects' scale": (put("levels", 1, "view_effects", "scale", to=1e300), "view_effects.scale"),
+    "reflection": (put("levels", 1, "reflection", "width", to=10**9), "pixels"),
+    "reflection's scale": (put("levels", 1, "reflection", "gloss_scale", to=1e300), "gloss_scale"),
     "name": (put(*LAYER, "mesh", to="a" * 5000), "mesh"),
     "subject": (put("subject", to="\x1b[31mred"), "text"),
     "focal length": (put("photos", 0, "K", to=[[1e300, 0, 1], [0, 1, 1], [0, 0, 1]]), "K is no camera's"),
@@ -243,16 +243,16 @@ def test_a_sound_that_is_none(asset: Path) -> None:
     assert [problem[:22] for problem in validate_asset(asset)] == ["audio.wav: not a sound"]
 
 
-@pytest.mark.parametrize("name", ["full.mp4", "full_effects.png"])
+@pytest.mark.parametrize("name", ["full.mp4", "full_reflection.png"])
 def test_what_changes_after_the_check_is_not_decoded(asset: Path, name: str) -> None:
     found = read_asset(asset)
-    found.frame(0), found.effects()
+    found.frame(0), found.reflection()
     data = bytearray((asset / name).read_bytes())
     data[len(data) // 2] ^= 1
     (asset / name).write_bytes(data)
     os.utime(asset / name, (1, 1))
     with pytest.raises(UserError, match="damaged asset"):
-        found.frame(0), found.effects()
+        found.frame(0), found.reflection()
 
 
 def test_a_level_is_not_decoded_from_other_meshes(asset: Path) -> None:

@@ -35,15 +35,16 @@ def test_schema_is_valid_and_accepts_a_manifest(path: Path) -> None:
     jsonschema.Draft202012Validator(schema).validate(json.loads(path.read_text()))
 
 
-EFFECTS: dict[str, Any] = {
-    "file": "full_effects.png",
+RECTS = ("environment_rect", "gloss_rect", "offset_rect", "normals_rect")
+REFLECTION: dict[str, Any] = {
+    "file": "full_reflection.png",
     "bytes": 9,
     "sha256": "0" * 64,
-    "basis": "sh1",
-    "scale": 0.5,
     "width": 4,
-    "height": 12,
-    "planes": [[0, 0, 4, 4], [0, 4, 4, 4], [0, 8, 4, 4]],
+    "height": 16,
+    "uv_window": [-1.0, 1.0, -1.0, 1.0],
+    **{name: [0, 4 * i, 4, 4] for i, name in enumerate(RECTS)},
+    **{f"{name}_scale": 0.5 for name in ("environment", "gloss", "offset")},
 }
 
 
@@ -67,9 +68,9 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
         "culling": (["compositing", "culling"], "back"),
         "rotation": (["coordinates", "to_capture", "rotation"], [[1, 0], [0, 1]]),
         "scale": (["coordinates", "to_capture", "scale"], 0),
-        "no effects": (["levels", 0, "layers", 0, "effects_rect"], None),
-        "basis": (["levels", 0, "view_effects"], EFFECTS | {"basis": "sh9"}),
-        "planes": (["levels", 0, "view_effects"], EFFECTS | {"planes": [[0, 0, 4, 4]]}),
+        "no reflection": (["levels", 0, "reflection"], None),
+        "rectangles": (["levels", 0, "reflection"], REFLECTION | {"gloss_rect": [0, 0, 4]}),
+        "scales": (["levels", 0, "reflection"], REFLECTION | {"gloss_scale": 0}),
         "unknown key": (["levels", 0, "texture", "colour"], 1),
     }
     made = {}
@@ -85,7 +86,7 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
         ("audio",),
         ("photos",),
         ("compositing", "order"),
-        ("levels", 0, "view_effects"),
+        ("levels", 0, "quality"),
         ("levels", 0, "texture", "videos", 0, "codec"),
         ("coordinates", "to_capture"),
     )
@@ -115,12 +116,23 @@ def test_schema_and_models_accept_all_that_may_be_there(path: Path, tmp_path: Pa
     row = [1.0, 0.0, 0.0]
     photo = poster | {"camera": "a", "frame": 0, "K": [row] * 3, "w2c": [[*row, 0.0]] * 3}
     value |= {"audio": stored, "poster": poster, "photos": [photo]}
-    level = value["levels"][0] | {"view_effects": EFFECTS, "quality": {"psnr_to_model": 40.0}}
-    level["layers"] = [layer | {"effects_rect": [0, 0, 1, 1]} for layer in level["layers"]]
+    level = value["levels"][0] | {"reflection": REFLECTION, "quality": {"psnr_to_model": 40.0}}
     value["levels"] = [level]
     jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text())).validate(value)
     (tmp_path / "manifest.json").write_text(json.dumps(value))
     assert parse_manifest(tmp_path / "manifest.json").model_dump(mode="json") == value
+
+
+@pytest.mark.parametrize("effects", [None, {"file": "full_effects.png", "bytes": 9, "sha256": "0" * 64, "scale": 0.5}])
+def test_the_view_effects_of_older_assets_are_left_out(path: Path, tmp_path: Path, effects: Any) -> None:
+    value, today = json.loads(path.read_text()), parse_manifest(path)
+    level = value["levels"][0]
+    level["view_effects"] = effects
+    if effects:
+        level["bytes"] += effects["bytes"]
+        level["layers"] = [layer | {"effects_rect": [0, 0, 1, 1]} for layer in level["layers"]]
+    (tmp_path / "manifest.json").write_text(json.dumps(value))
+    assert parse_manifest(tmp_path / "manifest.json") == today
 
 
 def test_checksum_of_the_manifest(path: Path) -> None:

@@ -170,11 +170,6 @@ def test_two_levels_of_one_name(asset: Path) -> None:
     assert_found(asset, "manifest.json", "one name")
 
 
-def test_effects_rect_without_effects(asset: Path) -> None:
-    edit(asset, lambda value: value["levels"][0]["layers"][0].update(effects_rect=[0, 0, 4, 4]))
-    assert_found(asset, "manifest.json", "without view_effects")
-
-
 def test_wrong_mime_type(asset: Path) -> None:
     edit(asset, lambda value: video(value).update(mime='video/mp4; codecs="avc1.42001e"'))
     assert any("MIME type" in problem for problem in validate_asset(asset))

@@ -17,7 +17,6 @@ from facefolds_core.cli.render import parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
-from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.reflection import reflected_colours
@@ -52,18 +51,6 @@ def test_it_agrees_with_the_reference(caps: Asset) -> None:
                 # Seen: 58 dB and more; single pixels at the outline of a sheet may fall to its other side.
                 assert psnr(rgb, expected) > 45
                 assert psnr(alpha, opacity) > 45
-
-
-def test_view_effects_agree_with_the_reference(caps: Asset) -> None:
-    camera = look_at_origin("camera", 30, 10, 120)
-    maps = [np.random.default_rng(i).normal(0, 0.2, (5, 6, 3, 3)).astype(np.float32) for i in range(len(caps.layers))]
-    hits = AssetCaster(caps).cast(camera)
-    expected, _ = composite(hits, caps.frame(1), added=added_colours(hits, to_eye(camera), maps))
-    plain, _ = composite(hits, caps.frame(1))
-    with OpenGLRenderer(caps, maps) as renderer:
-        rgb, _ = renderer.render(camera, 1)
-    assert psnr(rgb, expected) > 45
-    assert psnr(plain, expected) < 35
 
 
 def test_reflections_agree_with_the_reference(caps: Asset) -> None:

@@ -38,7 +38,7 @@ COST_KEYS = [
     "mesh_bytes",
     "texture_bytes",
     "video_bits_per_second",
-    "view_effects_bytes",
+    "reflection_bytes",
     "gpu_bytes",
 ]
 TRAINING = {"seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "preset": "quick"}

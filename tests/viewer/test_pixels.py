@@ -13,7 +13,6 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.rendering import AssetCaster, composite, render_asset
-from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_track import TRACK
 from tests.assets import SOURCE, make_asset
@@ -95,23 +94,6 @@ def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_p
     plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
     assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
     assert psnr(plain, expected) < 25  # the reflection is strong enough to be seen in this test
-
-
-def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:
-    asset = read_asset(rich)
-    player = new_player({"asset": asset.folder})
-    player.open("asset")
-    player.wait("e.level === 'full'")
-    player.run("e.background = v", GREY)
-    camera = five_cameras(SIZE)[1]
-    maps, hits = asset.effects(), AssetCaster(asset).cast(camera)
-    assert maps is not None
-    expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added_colours(hits, to_eye(camera), maps))
-    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
-    player.run("e.effects = false")
-    plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
-    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
-    assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test
 
 
 def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:

@@ -7,12 +7,11 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
 /**
  * @typedef {[number, number, number, number]} Rect x, y, width, height in pixels, y down
  * @typedef {{name: string, bytes: number, sha256: string}} FileEntry
- * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, window: number[], effectsRect: Rect | null}} LayerEntry
+ * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, window: number[]}} LayerEntry
  * @typedef {FileEntry & {codec: string, mime: string}} VideoEntry
  * @typedef {{width: number, height: number, colourRect: Rect, alphaRect: Rect, frames: number, fps: number}} TextureEntry
- * @typedef {{file: FileEntry, scale: number, width: number, height: number, planes: Rect[]}} EffectsEntry
  * @typedef {{name: string, layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
- *   effects: EffectsEntry | null, reflection: ReflectionEntry | null, bytes: number}} Level
+ *   reflection: ReflectionEntry | null, bytes: number}} Level
  * @typedef {{file: FileEntry, window: number[], environment: Rect, gloss: Rect, offset: Rect, normals: Rect,
  *   scales: number[]}} ReflectionEntry `scales` of environment, gloss and offset
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
@@ -97,10 +96,7 @@ function readLevel(level, index) {
     mime: String(video.mime),
   }));
   check(videos.length > 0, `${place}.texture.videos is empty`);
-  const effects = level.view_effects ? readEffects(level.view_effects, `${place}.view_effects`) : null;
-  const layers = list(level.layers, `${place}.layers`).map((layer, i) =>
-    readLayer(layer, effects !== null, `${place}.layers[${i}]`),
-  );
+  const layers = list(level.layers, `${place}.layers`).map((layer, i) => readLayer(layer, `${place}.layers[${i}]`));
   check(layers.length > 0, `${place}.layers is empty`);
   const reflection = level.reflection ? readReflection(level.reflection, `${place}.reflection`) : null;
   return {
@@ -108,7 +104,6 @@ function readLevel(level, index) {
     layers,
     texture: readTexture(texture, `${place}.texture`),
     videos,
-    effects,
     reflection,
     bytes: count(level.bytes, `${place}.bytes`),
   };
@@ -127,26 +122,13 @@ function readTexture(texture, place) {
   };
 }
 
-function readLayer(layer, hasEffects, place) {
+function readLayer(layer, place) {
   return {
     mesh: readFile(layer, layer.mesh, place),
     vertices: count(layer.vertices, `${place}.vertices`),
     triangles: count(layer.triangles, `${place}.triangles`),
     rect: rectangle(layer.texture_rect, `${place}.texture_rect`),
     window: rectangle(layer.uv_window, `${place}.uv_window`),
-    effectsRect: hasEffects ? rectangle(layer.effects_rect, `${place}.effects_rect`) : null,
-  };
-}
-
-function readEffects(effects, place) {
-  if (effects.basis !== "sh1") return null; // optional by definition: what is not known is left out
-  check(effects.planes?.length === 3, `${place}.planes must be three`);
-  return {
-    file: readFile(effects, effects.file, place),
-    scale: Number(effects.scale),
-    width: count(effects.width, `${place}.width`),
-    height: count(effects.height, `${place}.height`),
-    planes: effects.planes.map((plane, i) => rectangle(plane, `${place}.planes[${i}]`)),
   };
 }
 

@@ -199,13 +199,11 @@ export class LayerRenderer {
     const { level, upload } = this;
     const { gl } = this.graphics;
     const head = "#version 300 es\n";
-    const defines = (upload.effects ? "#define EFFECTS 1\n" : "") + (upload.reflection ? "#define REFLECTION 1\n" : "");
+    const defines = upload.reflection ? "#define REFLECTION 1\n" : "";
     const colour = prepared(COLOUR_FRAGMENT.replace(head, head + defines));
     const { at } = colour;
-    gl.activeTexture(gl.TEXTURE2);
-    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, upload.effects);
+    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
@@ -213,13 +211,9 @@ export class LayerRenderer {
     const { centre, radius } = this.bounds();
     const away = Math.hypot(...centre.map((v, i) => v - eye[i]));
     gl.uniform2f(at.range, away - radius, away + radius);
-    if (upload.effects) {
-      gl.uniform1i(at.effects, 1);
-      gl.uniform1f(at.effectsScale, this.effectsOn ? level.info.effects.scale : 0);
-    }
     if (upload.reflection) {
       const { environment, gloss, offset, normals, scales } = level.info.reflection;
-      gl.uniform1i(at.reflection, 2);
+      gl.uniform1i(at.reflection, 1);
       gl.uniform4fv(at.environmentRect, environment);
       gl.uniform4fv(at.glossRect, gloss);
       gl.uniform4fv(at.offsetRect, offset);
@@ -237,12 +231,6 @@ export class LayerRenderer {
     gl.uniform4f(at.colourRect, cx + x, cy + y, w, h);
     gl.uniform2f(at.alphaOffset, ax - cx, ay - cy);
     if (info.reflection) gl.uniform4fv(at.toMaps, toWindow(info.layers[index].window, info.reflection.window));
-    if (!this.upload.effects) return;
-    const [ex, ey, ew, eh] = info.layers[index].effectsRect;
-    gl.uniform4fv(
-      at.planes,
-      info.effects.planes.flatMap(([px, py]) => [px + ex, py + ey, ew, eh]),
-    );
   }
 
   /**

@@ -34,11 +34,6 @@ uniform vec2 alphaOffset; // from its colour to its alpha
 uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 uniform int kind; // of KINDS
 uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
-#ifdef EFFECTS
-uniform sampler2D effects;
-uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
-uniform float effectsScale; // 0: off
-#endif
 #ifdef REFLECTION
 uniform sampler2D reflection;
 uniform vec4 environmentRect; // of the reflection's picture, pixels; so are the next three
@@ -77,15 +72,6 @@ vec3 reflected() {
 void main() {
   vec3 colour = look(picture, colourRect, vec2(0.0)).rgb;
   float alpha = look(picture, colourRect, alphaOffset).r;
-#ifdef EFFECTS
-  if (effectsScale > 0.0) {
-    vec3 toEye = normalize(eye - point);
-    for (int k = 0; k < 3; ++k) {
-      colour += toEye[k] * effectsScale * (look(effects, planes[k], vec2(0.0)).rgb * 2.0 - 1.0);
-    }
-    colour = clamp(colour, 0.0, 1.0);
-  }
-#endif
 #ifdef REFLECTION
   colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif

@@ -63,12 +63,12 @@ export const TEMPLATE = `<div class="stage">
       .join("")}<input type="color" name="background" aria-label="Other background colour" title="Other colour"></div></fieldset>
     <fieldset class="layers"><legend>Layers <small>outermost first</small></legend><div></div></fieldset>
     <label class="row"><span>Pull apart</span><input type="range" name="spread" min="0" max="1" step="0.01" value="0"></label>
-    ${toggle("wireframe", "Wireframe")}${toggle("effects", "View effects", true)}${toggle("stats", "Statistics")}
+    ${toggle("wireframe", "Wireframe")}${toggle("effects", "Reflection", true)}${toggle("stats", "Statistics")}
     <div class="row deeds">${worded("picture", "Save picture", "I")}${worded("embed", "Embed")}${worded("reset", "Reset", "0")}</div>
     <details><summary>Keys</summary><dl class="keys">
       <dt>Space</dt><dd>play, pause</dd><dt>← →</dt><dd>step</dd><dt>Home End</dt><dd>first, last frame</dd>
       <dt>&lt; &gt;</dt><dd>slower, faster</dd><dt>L</dt><dd>loop</dd><dt>Shift + arrows</dt><dd>turn</dd><dt>+ −</dt><dd>zoom</dd><dt>0</dt><dd>reset</dd>
-      <dt>W</dt><dd>wireframe</dd><dt>E</dt><dd>view effects</dd><dt>P</dt><dd>pull apart</dd><dt>1 … 9</dt><dd>layer on, off</dd><dt>C</dt><dd>compare</dd>
+      <dt>W</dt><dd>wireframe</dd><dt>E</dt><dd>reflection</dd><dt>P</dt><dd>pull apart</dd><dt>1 … 9</dt><dd>layer on, off</dd><dt>C</dt><dd>compare</dd>
       <dt>M</dt><dd>sound</dd><dt>S</dt><dd>statistics</dd><dt>F</dt><dd>full screen</dd><dt>I</dt><dd>save the picture</dd><dt>Esc</dt><dd>close</dd></dl></details>
   </aside>
   <div class="toast" role="status" aria-live="polite" hidden></div>
