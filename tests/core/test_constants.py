@@ -66,6 +66,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "scatter.py": ALL,
         "export/collapse_kernel.py": ("TERMS", "MOST_NEIGHBOURS"),
         "training/explicit/shading_kernel.py": ("_scatter",),
+        "training/explicit/kernels_gpu.py": ("_put", "LAYERS"),
         "training/explicit/state.py": ("UNSEEN_LOGIT",),
         "training/volume/kernel.py": ("PARTS", "BLOCK", "CLEAR", "OPAQUE", "LIMIT"),
     },
@@ -112,6 +113,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "serving.py": ALL,
     },
     "how much is done at a time: memory and speed, never the result": {
+        "gpu.py": ("THREADS",),
         "export/sampling.py": ("DIRECTIONS_AT_ONCE",),
         "captures/developing.py": ALL,
         "captures/picture.py": ("_HEAD",),
