@@ -29,7 +29,13 @@ _PACKED: dict[str, bytes] = {}
 
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,254}")
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
-_TYPES = {".js": "application/javascript", ".wasm": "application/wasm", ".webm": "video/webm", ".mp4": "video/mp4"}
+_TYPES = {
+    ".js": "application/javascript",
+    ".wasm": "application/wasm",
+    ".webm": "video/webm",
+    ".mp4": "video/mp4",
+    ".m4a": "audio/mp4",
+}
 """Of what the machine's own table may have otherwise: browsers refuse modules and wasm of another type."""
 
 
@@ -62,7 +68,7 @@ def named_files(folder: Path) -> set[str]:
     while waiting:
         value = waiting.pop()
         if isinstance(value, dict):
-            found |= {name for key in ("file", "mesh") if isinstance(name := value.get(key), str)}
+            found |= {name for key in ("file", "mesh", "video") if isinstance(name := value.get(key), str)}
             waiting += value.values()
         elif isinstance(value, list):
             waiting += value

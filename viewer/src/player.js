@@ -71,7 +71,7 @@ export class Player extends EventTarget {
 
   async #loadSound(entry) {
     try {
-      this.sound = new Sound(await this.files.bytes(entry));
+      this.sound = new Sound(await this.files.bytes(entry), entry.mime);
       this.say("change");
     } catch (error) {
       this.fail(error);
