@@ -100,7 +100,7 @@ def test_a_browser_that_cannot_record_says_what_does(new_player: NewPlayer, rich
     player.open("asset")
     player.button("Settings")
     player.button("Record a turn")
-    assert "facefolds render ASSET --kind turntable" in player.notice()
+    player.page.locator(".toast", has_text="facefolds render ASSET --kind turntable").wait_for()
 
 
 def test_the_code_to_embed_plays(player: Player) -> None:
