@@ -12,7 +12,7 @@ import yaml
 
 @pytest.fixture(scope="module")
 def parts(project_root: Path) -> dict[tuple[str, str], Any]:
-    text = (project_root / "docs" / "guide" / "kubernetes" / "facefolds.yaml").read_text()
+    text = (project_root / "docs" / "guide" / "kubernetes" / "dask.yaml").read_text()
     return {(part["kind"], part["metadata"]["name"]): part for part in yaml.safe_load_all(text)}
 
 
