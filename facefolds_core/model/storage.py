@@ -22,6 +22,7 @@ from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.reflection import Reflection, ReflectionShape
+from facefolds_core.model.segmented import SegmentedTextures, segment_file
 from facefolds_core.model.textures import MlpTextures
 from facefolds_core.reading import check_regular, no_memory
 
@@ -88,6 +89,7 @@ class ExplicitSpec(BaseModel):
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
         reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
+        segments: frames in each file of `segmented.py`; absent where all frames are in model.safetensors.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
     """
 
@@ -103,7 +105,16 @@ class ExplicitSpec(BaseModel):
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
     reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
+    segments: Annotated[
+        tuple[Annotated[int, Field(ge=1)], ...] | None, Field(min_length=1, exclude_if=lambda shape: shape is None)
+    ] = None
     fingerprint: str = ""
+
+    @model_validator(mode="after")
+    def _all_frames(self) -> ExplicitSpec:
+        if self.segments is not None and sum(self.segments) != self.num_frames:
+            raise ValueError(f"segments of {sum(self.segments)} frames, but num_frames is {self.num_frames}")
+        return self
 
 
 Spec = Annotated[ModelSpec | ExplicitSpec, Field(discriminator="kind")]
@@ -121,10 +132,13 @@ def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     if spec.reflection is not None:
         rows, columns, environment = spec.reflection
         reflection = Reflection(ReflectionShape((rows, columns), environment))
-    return RadianceManifolds(
-        RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
-        GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection),
-    )
+    textures: GridTextures
+    if spec.segments is None:
+        textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
+    else:
+        textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
+    manifolds = RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers)
+    return RadianceManifolds(manifolds, textures)
 
 
 def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
@@ -223,9 +237,24 @@ def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: P
 
 
 def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:
-    """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
+    """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place).
+
+    Segments are linked where their files are still there and the disk can, else written anew.
+    """
+    if isinstance(model.textures, SegmentedTextures):
+        _save_segments(model.textures, folder)
     write_tensors(folder / "model.safetensors", model.state_dict(), {"spec": spec.model_dump_json()})
     write_json(folder / "model.json", spec.model_dump(mode="json"))
+
+
+def _save_segments(textures: SegmentedTextures, folder: Path) -> None:
+    segment_file(folder, 0).parent.mkdir()
+    for number, path in enumerate(textures.paths):
+        target = segment_file(folder, number)
+        try:
+            os.link(path, target)
+        except OSError:
+            write_tensors(target, textures.segment(number), {})
 
 
 def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
@@ -281,4 +310,6 @@ def load_model(folder: str | Path, device: torch.device | str = "cpu") -> Radian
         model = build_model(spec)
     check_tensors(tensors, model.state_dict(), path, _REMEDY)
     model.load_state_dict(tensors)
+    if isinstance(model.textures, SegmentedTextures):
+        model.textures.attach([segment_file(folder, i) for i in range(len(model.textures.lengths))], _REMEDY)
     return model.to(device).eval()

@@ -8,20 +8,20 @@ from typing import Any
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import TrainParams
-from facefolds_core.training.explicit.loop import fit_explicit, train_explicit
 from facefolds_core.training.loop import fit_mlp
 from facefolds_core.training.loop import train as train_mlp
 from facefolds_core.training.report import TrainingReport
+from facefolds_core.training.segments.loop import fit_take, train_take
 from facefolds_core.training.trained import Trained
 
 FITTERS: dict[str, Callable[[Scene, Any, Path, Path], Trained]] = {
-    "explicit": lambda scene, params, checkpoints, log: fit_explicit(scene, params, log),
+    "explicit": fit_take,
     "mlp": fit_mlp,
 }
 """Model -> fit(scene, params, folder of checkpoints, folder of the log)."""
 
 TRAINERS: dict[str, Callable[[Scene, Any, Path, Path, Path], TrainingReport]] = {
-    "explicit": lambda scene, params, folder, checkpoints, log: train_explicit(scene, params, folder, log),
+    "explicit": train_take,
     "mlp": train_mlp,
 }
 """Model -> the same, with the model's folder, which is written whole, before the others."""
