@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
-from torch import Tensor
 
-from facefolds_core.errors import UserError, disk_error, is_disk_error
-from facefolds_core.files import atomic_file, read_json, write_json
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json, write_json
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.model.segmented import SegmentedTextures, segment_file
+from facefolds_core.model.tensor_files import check_tensors, read_tensors, write_tensors
 from facefolds_core.model.textures import MlpTextures
-from facefolds_core.reading import check_regular, no_memory
+from facefolds_core.reading import check_regular
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 
@@ -167,73 +163,6 @@ def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
 
 BUILDERS: dict[str, Callable[[Any], RadianceManifolds]] = {"explicit": _build_explicit, "mlp": _build_mlp}
 """Kind of a model -> what builds it of its spec."""
-
-
-def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:
-    """Write a safetensors file, whole or not at all.
-
-    Raises:
-        OSError: where the disk fails, as for every other file; safetensors has an error of its own for it.
-    """
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    with atomic_file(path) as temporary:
-        try:
-            save_file(tensors, str(temporary), metadata=metadata)
-        except SafetensorError as error:
-            number = re.search(r"os error (\d+)", str(error))
-            if number is None:
-                raise
-            code = int(number[1])
-            raise OSError(code, os.strerror(code)) from None
-
-
-def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Tensors and metadata of a safetensors file, on the CPU.
-
-    Raises:
-        UserError: if the file is missing or damaged.
-    """
-    check_regular(path, remedy)
-    try:
-        with safe_open(str(path), "pt") as file:
-            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
-    except MemoryError:
-        raise no_memory(path) from None
-    except (SafetensorError, OSError, ValueError, OverflowError, RuntimeError) as error:
-        if is_disk_error(error):
-            raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
-        raise UserError(
-            "damaged file", file=path, expected="a whole safetensors file", found=str(error), remedy=remedy
-        ) from None
-
-
-def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: Path, remedy: str) -> None:
-    """Compare names, shapes and finiteness.
-
-    Raises:
-        UserError: at the first difference, naming the tensor.
-    """
-    for name in sorted(set(found) ^ set(expected)):
-        raise UserError(
-            "the file does not belong to this configuration",
-            file=path,
-            place=name,
-            expected="this tensor" if name in expected else "no such tensor",
-            found="no such tensor" if name in expected else "this tensor",
-            remedy=remedy,
-        )
-    for name, tensor in found.items():
-        if tensor.shape != expected[name].shape:
-            raise UserError(
-                "the file does not belong to this configuration",
-                file=path,
-                place=name,
-                expected=f"shape {tuple(expected[name].shape)}",
-                found=f"shape {tuple(tensor.shape)}",
-                remedy=remedy,
-            )
-        if tensor.is_floating_point() and not tensor.isfinite().all():
-            raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
 
 
 def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:

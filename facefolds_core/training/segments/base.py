@@ -21,7 +21,8 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.model import load_model
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.model.storage import ExplicitSpec, read_spec, read_tensors, write_tensors
+from facefolds_core.model.storage import ExplicitSpec, read_spec
+from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams
 from facefolds_core.source_code import digest_of_file
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings

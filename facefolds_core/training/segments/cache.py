@@ -12,7 +12,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
-from facefolds_core.model.storage import write_tensors
+from facefolds_core.model.tensor_files import write_tensors
 from facefolds_core.training.patience import patiently
 
 NAMES = ("frame_colour", "frame_alpha")

@@ -87,7 +87,7 @@ def _apart(keys: Float) -> float:
 
 
 def mixture(row: Float, keys: Float, params: SegmentParams) -> NDArray[np.float64]:
-    """(n,) shares of key frames (n, D) that make up a frame (D,), their sum 1; but for the `neighbours` nearest they are 0.
+    """(n,) shares of key frames (n, D) that make up a frame (D,), their sum 1; 0 but for the `neighbours` nearest.
 
     ((d_far - d_i) / (d_far d_i))^2 with d_far the distance of the next one (modified Shepard weights; Franke and
     Nielson 1980): they change without a leap when another key frame becomes one of the nearest.
