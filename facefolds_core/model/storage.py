@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Union
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -21,11 +21,13 @@ from facefolds_core.model.segmented import SegmentedTextures, segment_file
 from facefolds_core.model.tensor_files import check_tensors, read_tensors, write_tensors
 from facefolds_core.model.textures import MlpTextures
 from facefolds_core.reading import check_regular
+from facefolds_core.registry import MODELS
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 
-
 Count = Annotated[int, Field(ge=2)]
+Spec = BaseModel
+"""What is written of a model: its `kind`, and its own fields."""
 
 
 SCALES_1 = {"input_scale": 6.0, "output_scale": 1.0}
@@ -113,16 +115,20 @@ class ExplicitSpec(BaseModel):
         return self
 
 
-Spec = Annotated[ModelSpec | ExplicitSpec, Field(discriminator="kind")]
-_SPEC: TypeAdapter[ModelSpec | ExplicitSpec] = TypeAdapter(Spec)
+@cache
+def _specs() -> TypeAdapter[Spec]:
+    """Of all models (facefolds_core/models), told apart by `kind`."""
+    kinds: Any = Union[tuple(MODELS[name].spec() for name in MODELS.names)]  # noqa: UP007
+    return TypeAdapter(Annotated[kinds, Field(discriminator="kind")])
 
 
-def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
+def build_model(spec: Spec) -> RadianceManifolds:
     """An untrained model; its random numbers come from torch's global generator."""
-    return BUILDERS[spec.kind](spec)
+    model: RadianceManifolds = MODELS[spec.model_dump()["kind"]].build(spec)
+    return model
 
 
-def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
+def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     blank = torch.ones(spec.nodes)
     reflection = None
     if spec.reflection is not None:
@@ -137,7 +143,7 @@ def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     return RadianceManifolds(manifolds, textures)
 
 
-def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
+def build_mlp(spec: ModelSpec) -> RadianceManifolds:
     manifolds = MlpManifolds(
         spec.centre,
         spec.levels,
@@ -161,11 +167,7 @@ def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
     return RadianceManifolds(manifolds, textures)
 
 
-BUILDERS: dict[str, Callable[[Any], RadianceManifolds]] = {"explicit": _build_explicit, "mlp": _build_mlp}
-"""Kind of a model -> what builds it of its spec."""
-
-
-def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:
+def save_model(model: RadianceManifolds, spec: Spec, folder: Path) -> None:
     """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place).
 
     Segments are linked where their files are still there and the disk can, else written anew.
@@ -186,7 +188,7 @@ def _save_segments(textures: SegmentedTextures, folder: Path) -> None:
             write_tensors(target, textures.segment(number), {})
 
 
-def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
+def read_spec(folder: Path) -> Spec:
     """`model.json`.
 
     Raises:
@@ -196,7 +198,7 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
     check_regular(path, _REMEDY)
     value: Any = read_json(path, remedy=_REMEDY)
     try:
-        return _SPEC.validate_python(value)
+        return _specs().validate_python(value)
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(
@@ -209,10 +211,10 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
         ) from None
 
 
-def _describes(description: str, spec: ModelSpec | ExplicitSpec) -> bool:
+def _describes(description: str, spec: Spec) -> bool:
     """Whether a description in JSON, of this version or an older one, says the same as `spec`."""
     try:
-        return _SPEC.validate_json(description) == spec
+        return _specs().validate_json(description) == spec
     except ValidationError:
         return False
 

@@ -16,7 +16,6 @@ from facefolds_core.params.compress import (
     MeshCodec,
     MeterParams,
     VideoCodec,
-    ViewEffectParams,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
@@ -109,7 +108,6 @@ __all__ = [
     "TrainParams",
     "TrainSection",
     "VideoCodec",
-    "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
     "WallParams",
