@@ -1,10 +1,11 @@
-"""Images of one size in one Arrow file, memory-mapped: never one file a picture.
+"""Images of one size in one Arrow file, memory-mapped: never one file a picture. Plain, or packed without loss.
 
 Keyed by (index, frame): what the index counts is the caller's, cameras of a scene or layers of an asset.
 
 Columns: `camera` int32 (the index, whatever it counts), `frame` int32, `pixels` fixed-size binary of H*W*C bytes
 (row-major, RGB or one channel). Height, width and channels stand in the schema's metadata. Rows may come in any order
-and need not be complete (masks exist for some images only).
+and need not be complete (masks exist for some images only). In a packed file `pixels` is binary of any size, Zstandard
+of each byte's difference from that of the pixel before in its row.
 """
 
 from __future__ import annotations
@@ -25,16 +26,26 @@ from facefolds_core.reading import check_regular, no_memory, remake
 Image = NDArray[np.uint8]
 
 
-def write_frames(path: str | Path, shape: tuple[int, int, int], rows: Iterable[tuple[int, int, Image]]) -> None:
+PACKING = "zstd"
+"""Of packed files, in their metadata."""
+
+
+def write_frames(
+    path: str | Path, shape: tuple[int, int, int], rows: Iterable[tuple[int, int, Image]], packed: bool = False
+) -> None:
     """Write images, streaming: one at a time is held in memory.
 
     Args:
         shape: (height, width, channels) of every image.
         rows: (index, frame, image uint8 of `shape`).
+        packed: smaller, without loss; each look at an image unpacks it anew.
     """
     size = shape[0] * shape[1] * shape[2]
     metadata = {name: str(n) for name, n in zip(("height", "width", "channels"), shape, strict=True)}
-    fields = [("camera", pa.int32()), ("frame", pa.int32()), ("pixels", pa.binary(size))]
+    if packed:
+        metadata["packing"] = PACKING
+    kind = pa.binary() if packed else pa.binary(size)
+    fields = [("camera", pa.int32()), ("frame", pa.int32()), ("pixels", kind)]
     schema = pa.schema(fields, metadata=metadata)
     with (
         atomic_file(path) as temporary,
@@ -44,11 +55,26 @@ def write_frames(path: str | Path, shape: tuple[int, int, int], rows: Iterable[t
         for index, frame, image in rows:
             if image.shape != shape or image.dtype != np.uint8:
                 raise ValueError(f"image of {image.dtype} {image.shape}, expected uint8 {shape}")
-            pixels = pa.FixedSizeBinaryArray.from_buffers(
-                pa.binary(size), 1, [None, pa.py_buffer(np.ascontiguousarray(image))]
-            )
+            if packed:
+                pixels = pa.array([_pack(image)], kind)
+            else:
+                pixels = pa.FixedSizeBinaryArray.from_buffers(
+                    kind, 1, [None, pa.py_buffer(np.ascontiguousarray(image))]
+                )
             columns = [pa.array([index], pa.int32()), pa.array([frame], pa.int32()), pixels]
             writer.write_batch(pa.record_batch(columns, schema=schema))
+
+
+def _pack(image: Image) -> bytes:
+    difference = image.copy()
+    difference[:, 1:] -= image[:, :-1]  # wraps around, as the sum does
+    packed: bytes = pa.compress(difference.tobytes(), PACKING, asbytes=True)
+    return packed
+
+
+def _unpack(packed: pa.Buffer, shape: tuple[int, int, int]) -> Image:
+    flat = pa.decompress(packed, shape[0] * shape[1] * shape[2], PACKING)
+    return np.cumsum(np.frombuffer(flat, np.uint8).reshape(shape), axis=1, dtype=np.uint8)
 
 
 class FrameStore:
@@ -66,9 +92,12 @@ class FrameStore:
         check_regular(self.path, remake(path))
         try:
             table = pa.ipc.open_file(pa.memory_map(str(path), "r")).read_all()
-            meta = {k.decode(): int(v) for k, v in (table.schema.metadata or {}).items()}
-            shape = (meta["height"], meta["width"], meta["channels"])
-            self._images = _views(table, shape)
+            meta = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
+            shape = (int(meta["height"]), int(meta["width"]), int(meta["channels"]))
+            self.packed = meta.get("packing") is not None
+            if meta.get("packing", PACKING) != PACKING:
+                raise ValueError(f"packed by {meta['packing']!r}")
+            self._images = _views(table, shape, self.packed)
         except MemoryError:  # Arrow's own too
             raise no_memory(path) from None
         except (pa.ArrowException, KeyError, ValueError, TypeError, OverflowError, OSError) as error:
@@ -97,10 +126,10 @@ class FrameStore:
         return found
 
     def image(self, index: int, frame: int) -> Image:
-        """(height, width, channels) uint8, a view of the mapped file.
+        """(height, width, channels) uint8: of a plain file a view of it.
 
         Raises:
-            UserError: if the file does not hold it.
+            UserError: if the file does not hold it, or it is damaged.
         """
         found = self._images.get((index, frame))
         if found is None:
@@ -108,19 +137,30 @@ class FrameStore:
             raise UserError(
                 "an image is missing in a frame store", file=self.path, place=place, remedy=remake(self.path)
             )
+        if not isinstance(found, np.ndarray):
+            try:
+                return _unpack(found, (self.height, self.width, self.channels))
+            except (pa.ArrowException, ValueError, OSError) as error:
+                raise UserError(
+                    "damaged frame store",
+                    file=self.path,
+                    place=f"index {index}, frame {frame}",
+                    found=str(error),
+                    remedy=remake(self.path),
+                ) from None
         return found
 
 
-def _views(table: pa.Table, shape: tuple[int, int, int]) -> dict[tuple[int, int], Image]:
-    """(index, frame) -> the image's bytes in the mapped file.
+def _views(table: pa.Table, shape: tuple[int, int, int], packed: bool) -> dict[tuple[int, int], Image | pa.Buffer]:
+    """(index, frame) -> the image, or what is packed of it, in the mapped file.
 
     Raises:
         ValueError, ArrowException: if the table is not what `write_frames` writes.
     """
     size = shape[0] * shape[1] * shape[2]
-    if min(shape) < 1 or table.schema.types != [pa.int32(), pa.int32(), pa.binary(size)]:
+    if min(shape) < 1 or table.schema.types != [pa.int32(), pa.int32(), pa.binary() if packed else pa.binary(size)]:
         raise ValueError(f"columns {table.schema.types} are no images of {shape}")
-    images: dict[tuple[int, int], Image] = {}
+    images: dict[tuple[int, int], Image | pa.Buffer] = {}
     for batch in table.to_batches():
         batch.validate(full=True)
         pixels = batch.column("pixels")
@@ -129,5 +169,8 @@ def _views(table: pa.Table, shape: tuple[int, int, int]) -> dict[tuple[int, int]
         key = (batch.column("camera")[0].as_py(), batch.column("frame")[0].as_py())
         if min(key) < 0 or key in images:
             raise ValueError(f"image {key} twice, or none")
-        images[key] = np.frombuffer(pixels.buffers()[1], np.uint8, count=size).reshape(shape)
+        if packed:
+            images[key] = pixels[0].as_buffer()
+        else:
+            images[key] = np.frombuffer(pixels.buffers()[1], np.uint8, count=size).reshape(shape)
     return images

@@ -118,7 +118,8 @@ def bake(
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
         weights = texel_weights(rays, baked, len(cameras), params)
-        write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
+        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20)
+        write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
         baked.path.unlink()
     return len(rays)
 
@@ -138,7 +139,7 @@ def _fit(
     rays = gather_rays(cameras, meshes, sheets)
     baker = Baker(meshes, sheets, rays, textures.height, params)
     shape = (textures.height, textures.width, 4)
-    write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
+    write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations), packed=True)
     return rays.shipped
 
 

@@ -67,7 +67,7 @@ class SegmentParams(Section):
     """Learning rate of a frame's parts against that of the training at once; it falls to `textures.final_rate` of
     itself."""
 
-    ray_nanoseconds: Factor = 700.0
+    ray_nanoseconds: Factor = 1500.0
     """Of one core, a ray and step, of twelve layers: what the time is foretold by. Measured."""
 
     free_share: Annotated[Share, Field(gt=0)] = 0.9
