@@ -28,14 +28,13 @@ from bench.takes import watched
 from facefolds_core.errors import UserError, report_user_errors
 
 PARAMS: dict[str, Any] = {
-    "capture": {"cameras": 6, "frames": 24, "height": 48, "width": 32},
+    "capture": {"cameras": 8, "frames": 24, "height": 48, "width": 32},
     "normalize": {},
     "train": {
         "preset": "fast",
-        "layers": 4,
+        "layers": 3,
         "iterations": 60,
-        "volume": {"levels": [{"resolution": 24, "iterations": 40}]},
-        "geometry": {"round_iterations": 10},
+        "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
         "textures": {"steps_per_frame": 8},
         "segments": {"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60},
     },
@@ -132,7 +131,7 @@ def main(
     """Kill trainings of a long take."""
     with report_user_errors("take_kills"):
         project = Project(folder, "take")
-        subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 3}}
+        subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}
         project.write({"subjects": {"take": subject}, **PARAMS})
         for stage in ("configure", "capture", "normalize"):
             watched(project, stage)

@@ -47,6 +47,9 @@ class SegmentParams(Section):
     thumbnail: Annotated[int, Field(ge=2, le=256)] = 32
     """Rows of the small grey pictures that are compared."""
 
+    vertices: Count = 512
+    """Of a tracked mesh that are compared, at most."""
+
     neighbours: Annotated[int, Field(ge=1, le=100)] = 3
     """A frame starts from the mean of so many key frames, the ones most like it, weighted by likeness: without a leap
     when another key frame comes near."""

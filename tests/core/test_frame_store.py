@@ -70,6 +70,22 @@ def smooth(k: int) -> Image:
     return np.cumsum(np.full((64, 64, 4), 1 + k, np.uint8), axis=1, dtype=np.uint8)
 
 
+def test_packed_images_are_what_they_were_in_any_order(tmp_path: Path) -> None:
+    images = {(n, k): image(n + 3 * k) for n in range(2) for k in range(30)}
+    write_frames(tmp_path / "f.arrow", SHAPE, [(n, k, images[n, k]) for k in range(30) for n in range(2)], packed=True)
+    store = FrameStore(tmp_path / "f.arrow")
+    for key in [*images, *reversed(images), (0, 17), (0, 17), (1, 3), (0, 29), (0, 1)]:
+        assert np.array_equal(store.image(*key), images[key])
+
+
+def test_what_hardly_changes_takes_hardly_any_space(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (64, 64, 4), dtype=np.uint8)
+    for packed in (False, True):
+        write_frames(tmp_path / f"{packed}.arrow", (64, 64, 4), [(0, k, noise) for k in range(24)], packed)
+    plain, small = ((tmp_path / f"{packed}.arrow").stat().st_size for packed in (False, True))
+    assert small < plain / 8
+
+
 def test_what_is_smooth_is_packed_small(tmp_path: Path) -> None:
     for packed in (False, True):
         write_frames(tmp_path / f"{packed}.arrow", (64, 64, 4), [(0, k, smooth(k)) for k in range(4)], packed)
