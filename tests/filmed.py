@@ -74,7 +74,7 @@ def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -
     assert not any(plate.opacity.any() for plate in plates)
     return Film(
         cameras=rig,
-        fps=params.fps,
+        fps=params.frame_rate,
         images=np.array([[p.rgb for p in row] for row in pictures]),
         mattes=np.array([[np.rint(255 * p.opacity).astype(np.uint8) for p in row] for row in pictures]),
         plates=np.array([plate.rgb for plate in plates]),
