@@ -49,9 +49,8 @@ def film(subject: Path, out: Path) -> None:
     shown, (width, height) = read_asset(subject / "asset").full, FILM["size"]
     start, samples = Eye(distance=1.0, target=tuple(FILM["target"])), FILM["samples"]
     background = tuple(value / 255 for value in FILM["background"])
-    maps, pictures = shown.reflection(), []
-    glossy = None if maps is None else Glossy(maps, shown.windows)
-    with OpenGLRenderer(shown, shown.effects(), glossy) as renderer:
+    pictures = []
+    with OpenGLRenderer(shown, Glossy.of(shown)) as renderer:
         for index, eye in enumerate(turntable(start, FILM["pictures"], FILM["sweep"])):
             camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
             rgb = renderer.render(camera, index % shown.num_frames, background)[0]

@@ -181,7 +181,7 @@ def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | No
     return float(np.interp(at, [x for x, _ in ordered], [y for _, y in ordered]))
 
 
-BYTES = ("mesh_bytes", "texture_bytes", "view_effects_bytes")
+BYTES = ("mesh_bytes", "texture_bytes", "reflection_bytes")
 
 
 def readme_table(data: Path) -> str:

@@ -64,6 +64,12 @@ def inlined(function: Code) -> Code:
     return cast(Code, numba.njit(error_model="numpy", inline="always")(function))
 
 
+@inlined
+def add(array, at, value):  # type: ignore[no-untyped-def]
+    """Add to a sum that others add to: plainly here, where each has its own; atomically on a GPU (`gpu.py`)."""
+    array[at] += value
+
+
 def fingerprint(function: Any) -> str:
     """SHA-256 of what compiling a kernel builds in: bytecode, constants, options, of itself and of all that it calls.
 
@@ -116,7 +122,7 @@ def _parts(value: Any, names: tuple[str, ...], seen: set[Any]) -> Iterator[bytes
 def _function_parts(function: types.FunctionType, seen: set[Any]) -> Iterator[bytes]:
     """Bytecode, defaults and closure of a Python function, and the globals that it names."""
     code = function.__code__
-    names = tuple(sorted(set(_names(code))))
+    names = tuple(sorted(set(names_of(code))))
     yield from _code_parts(code, seen)
     yield from _parts(function.__defaults__ or (), names, seen)
     for cell in function.__closure__ or ():
@@ -134,12 +140,12 @@ def _code_parts(code: types.CodeType, seen: set[Any]) -> Iterator[bytes]:
         yield from _parts(constant, (), seen)
 
 
-def _names(code: types.CodeType) -> Iterator[str]:
+def names_of(code: types.CodeType) -> Iterator[str]:
     """Globals and attributes that a function names, functions inside it included."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
+            yield from names_of(constant)
 
 
 def _ours(module: str | None) -> bool:

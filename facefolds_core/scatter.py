@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.jit import compiled, inlined
+from facefolds_core.jit import add, compiled, inlined
 
 CHUNK = 32768
 """Rays whose wishes are noted at once: few enough for the cache."""
@@ -28,26 +28,39 @@ def spread(task, tasks):  # type: ignore[no-untyped-def]
     return group * size + min(group, tasks % 4) + task // 4
 
 
-def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
-    """A compiled function that adds what R rays want of one layer to its sums (H, W, values), bilinear.
+def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
+    """A compiled function that adds what ray k wants of one layer to its sums (H, W, values), bilinear.
 
-    Its arguments: index (R,), the texel before each ray's crossing as row width + column, or -1; wish (R, 2 + values),
-    fractions of row and column and what is to be added; the sums.
+    Its arguments: the texel before the ray's crossing as row width + column; wish (R, 2 + values), fractions of row and
+    column and what is to be added; k; the sums.
     """
+
+    @inlined
+    def put(texel: Any, wish: Any, k: Any, sums: Any) -> None:
+        width = sums.shape[1]
+        one = np.float32(1.0)
+        i, j = texel // width, texel % width
+        a, b = wish[k, 0], wish[k, 1]
+        for tap in range(4):
+            di, dj = tap >> 1, tap & 1
+            w = (a if di else one - a) * (b if dj else one - b)
+            for q in range(values):
+                add(sums, (i + di, j + dj, q), w * wish[k, 2 + q])
+
+    return put
+
+
+def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
+    """A compiled function that puts what R rays want of one layer.
+
+    Its arguments: index (R,), the texel before each ray's crossing, or -1; wish and sums as of `put_of`.
+    """
+    put = put_of(values)
 
     @compiled
     def scatter(index: Any, wish: Any, sums: Any) -> None:
-        width = sums.shape[1]
-        one = np.float32(1.0)
         for k in range(index.shape[0]):
-            if index[k] < 0:
-                continue
-            i, j = index[k] // width, index[k] % width
-            a, b = wish[k, 0], wish[k, 1]
-            for tap in range(4):
-                di, dj = tap >> 1, tap & 1
-                w = (a if di else one - a) * (b if dj else one - b)
-                for q in range(values):
-                    sums[i + di, j + dj, q] += w * wish[k, 2 + q]
+            if index[k] >= 0:
+                put(index[k], wish, k, sums)
 
     return scatter

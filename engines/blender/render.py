@@ -1,9 +1,9 @@
-"""Renders an asset's GLB in Blender (5.0; Cycles, on the processor), its layers blended as the format asks.
+"""Renders an asset's GLB or USD in Blender (5.0; Cycles, on the processor), its layers blended as the format asks.
 
     blender -b -P engines/blender/render.py -- data/actor/asset.glb --out face.png --azimuth 25
     .venv-blender/bin/python engines/blender/render.py data/actor/asset.glb --out face.png      # bpy from pip
 
-Blender's importer turns the GLB's y up into z up, so that the subject looks to -y and its left is +x. What it makes of
+Blender's importers turn y up into z up, so that the subject looks to -y and its left is +x. What it makes of
 the materials shows the layers, but in linear light and through its view transform. `prepare` sets them right: the
 textures' stored values go through unchanged, are blended as they are and written as they are (view transform Raw).
 
@@ -32,15 +32,19 @@ CROSSINGS = 8
 """Of one layer by one ray at most, for the number of transparent bounces."""
 
 
-def prepare(glb: Path, background: tuple[float, float, float], samples: int) -> None:
+def prepare(file: Path, background: tuple[float, float, float], samples: int) -> None:
     """An empty scene with the asset's layers as they are to be blended.
 
     Args:
+        file: what `facefolds export glb` or `usd` wrote; of USD, the first frame is shown.
         background: stored (sRGB) values in [0, 1]; behind the layers.
         samples: x samples a pixel; with 1, a pixel is what the ray through its centre sees.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.import_scene.gltf(filepath=str(glb))
+    if file.suffix.startswith(".usd"):
+        bpy.ops.wm.usd_import(filepath=str(file.resolve()))
+    else:
+        bpy.ops.import_scene.gltf(filepath=str(file))
     layers = [thing for thing in bpy.data.objects if thing.type == "MESH"]
     for layer in layers:
         for slot in layer.material_slots:
@@ -73,19 +77,18 @@ def blend_as_stored(material: Any) -> None:
     a ray comes out through a fold of the sheet, they are what would count twice.
     """
     tree = material.node_tree
-    image = next(node.image for node in tree.nodes if node.type == "TEX_IMAGE")
-    image.colorspace_settings.name = "Non-Color"
-    image.alpha_mode = "CHANNEL_PACKED"  # colour and alpha are interpolated each by itself
+    images = sorted(images_of(tree))
     tree.nodes.clear()
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.extension, texture.interpolation = image, "EXTEND", "Linear"
+    nodes = [texture_node(tree, *one) for one in images]
+    colour = nodes[0].outputs["Color"]
+    alpha = nodes[0].outputs["Alpha"] if len(nodes) == 1 else nodes[1].outputs["Color"]  # grey
     emission, clear = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeBsdfTransparent")
     mix, out = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
+    tree.links.new(colour, emission.inputs["Color"])
     geometry, front = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeMath")
     front.operation = "SUBTRACT"
     front.use_clamp = True
-    tree.links.new(texture.outputs["Alpha"], front.inputs[0])
+    tree.links.new(alpha, front.inputs[0])
     tree.links.new(geometry.outputs["Backfacing"], front.inputs[1])
     tree.links.new(front.outputs[0], mix.inputs[0])
     tree.links.new(clear.outputs[0], mix.inputs[1])
@@ -94,6 +97,29 @@ def blend_as_stored(material: Any) -> None:
     material.cycles.emission_sampling = "NONE"  # nothing else is lit
     material.use_backface_culling = False
     material.surface_render_method = "BLENDED"
+
+
+def images_of(tree: Any) -> list[tuple[str, str]]:
+    """The UV map and the image of each texture: one with alpha of its own in a GLB; in USD "st" and "st_alpha"."""
+    found = []
+    for node in (node for node in tree.nodes if node.type == "TEX_IMAGE"):
+        places = [link.from_node for link in tree.links if link.to_node == node]
+        found.append((next((one.uv_map for one in places if one.type == "UVMAP"), ""), node.image.name))
+    return found
+
+
+def texture_node(tree: Any, uv_map: str, name: str) -> Any:
+    """A look-up of stored values."""
+    image = bpy.data.images[name]
+    image.colorspace_settings.name = "Non-Color"
+    image.alpha_mode = "CHANNEL_PACKED"  # colour and alpha are interpolated each by itself
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image, texture.extension, texture.interpolation = image, "EXTEND", "Linear"
+    if uv_map:
+        place = tree.nodes.new("ShaderNodeUVMap")
+        place.uv_map = uv_map
+        tree.links.new(place.outputs["UV"], texture.inputs["Vector"])
+    return texture
 
 
 def render(view: dict[str, Any]) -> None:
@@ -142,8 +168,8 @@ def orbit(
 
 
 def main(arguments: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="render.py", description="Render an asset's GLB in Blender.")
-    parser.add_argument("glb", type=Path)
+    parser = argparse.ArgumentParser(prog="render.py", description="Render an asset's GLB or USD in Blender.")
+    parser.add_argument("file", type=Path, metavar="FILE", help=".glb, .usdc or .usdz")
     parser.add_argument("--out", type=Path, help="PNG to write")
     parser.add_argument("--size", default="640x640", help="WIDTHxHEIGHT in pixels")
     parser.add_argument("--azimuth", type=float, default=0.0, help="degrees to the subject's left")
@@ -154,8 +180,8 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--samples", type=int, default=2, help="anti-aliasing: samples x samples a pixel")
     parser.add_argument("--views", type=Path, help="JSON list of cameras with their files, instead of --out")
     given = parser.parse_args(arguments)
-    if not given.glb.is_file():
-        parser.error(f"no such file: {given.glb}")
+    if not given.file.is_file():
+        parser.error(f"no such file: {given.file}")
     if (given.out is None) == (given.views is None):
         parser.error("give --out, or --views")
     if given.views:
@@ -164,7 +190,7 @@ def main(arguments: list[str]) -> None:
         width, height = (int(part) for part in given.size.split("x"))
         view = orbit(given.azimuth, given.elevation, given.distance, (width, height), given.field_of_view)
         views = [view | {"file": str(given.out.resolve())}]
-    prepare(given.glb, tuple(given.background), given.samples)
+    prepare(given.file, tuple(given.background), given.samples)
     for view in views:
         render(view)
 

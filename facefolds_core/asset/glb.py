@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.draco import attribute_ids
-from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -66,7 +66,7 @@ class Builder:
 
     def primitive(self, mesh: TexturedMesh, draco: bytes | None) -> dict[str, Any]:
         """A layer's triangles, plain or as the asset's own Draco bytes."""
-        indices = _back_to_front(mesh).astype("<u4").ravel()
+        indices = back_to_front(mesh).astype("<u4").ravel()
         arrays = (("POSITION", "VEC3", mesh.vertices), ("TEXCOORD_0", "VEC2", mesh.st))
         attributes = {}
         for name, kind, values in arrays:
@@ -107,7 +107,7 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
     textures = level.frame(frame)
     for place, index in enumerate(reversed(range(level.num_layers))):
         label = f"layer_{index:02d}"
-        data = (level.folder / level.entry.layers[index].mesh).read_bytes() if draco else None
+        data = layer_bytes(level.folder, level.entry.layers[index]) if draco else None
         primitive = builder.primitive(level.layers[index], data) | {"material": place}
         meshes.append({"name": label, "primitives": [primitive]})
         images.append({"name": label, "mimeType": "image/png", "bufferView": builder.view(_png(textures[index]))})
@@ -154,7 +154,7 @@ def _material(name: str, texture: int) -> dict[str, Any]:
     }
 
 
-def _back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
+def back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
     """The faces, farthest from a viewer before the face (+x) first: nearer folds of a sheet are drawn over farther."""
     depth = mesh.vertices[mesh.faces, 0].mean(1)
     return mesh.faces[np.argsort(depth, kind="stable")]

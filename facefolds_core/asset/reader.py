@@ -5,7 +5,6 @@ Nothing is decoded whose bytes are not the manifest's: a file that is changed af
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -16,11 +15,11 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
-from facefolds_core.asset.effects import Map, read_effects
-from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest, StoredFile
+from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest
+from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
-from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
+from facefolds_core.asset.stored import check_file, is_folder, read_slice, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
@@ -62,15 +61,6 @@ class AssetLevel:
     def camera_in_head(self, camera: Camera, time: float) -> Camera:
         """A camera of the world as the meshes' own frame has it at a time in frames."""
         return camera if self.track is None else self.track.camera(camera, time)
-
-    def effects(self) -> tuple[Map, ...] | None:
-        """The view effects, one map (h, w, 3, 3) a layer; None where the level has none.
-
-        Raises:
-            UserError: if their picture is damaged.
-        """
-        self._refuse_changed(self.entry.view_effects)
-        return read_effects(self.folder, self.entry)
 
     def reflection(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share; None where the level has none.
@@ -186,10 +176,6 @@ class Asset:
         """As `AssetLevel.camera_in_head`."""
         return self.full.camera_in_head(camera, time)
 
-    def effects(self) -> tuple[Map, ...] | None:
-        """As `AssetLevel.effects`."""
-        return self.full.effects()
-
     def reflection(self) -> ReflectionMaps | None:
         """As `AssetLevel.reflection`."""
         return self.full.reflection()
@@ -234,20 +220,28 @@ def read_level(folder: Path, level: Level, track: Track | None = None) -> AssetL
     Raises:
         UserError: if a mesh is damaged.
     """
-    return AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers), track=track)
+    for file in level.meshes:
+        refuse_changed(folder / file.file, file.bytes, file.sha256, REMEDY)
+    layers = tuple(_read_layer(folder, layer, f"layer {index}") for index, layer in enumerate(level.layers))
+    return AssetLevel(folder, level, layers, track=track)
 
 
-def _read_layer(folder: Path, layer: Layer) -> TexturedMesh:
+def layer_bytes(folder: Path, layer: Layer) -> bytes:
+    """The Draco mesh of a layer as it is stored.
+
+    Raises:
+        UserError: if its bytes are not the manifest's.
+    """
+    return read_slice(folder / layer.mesh, layer.offset, layer.bytes, layer.sha256, REMEDY)
+
+
+def _read_layer(folder: Path, layer: Layer, place: str) -> TexturedMesh:
     path = folder / layer.mesh
-    refuse_changed(path, layer.bytes, layer.sha256, REMEDY)
-    data = path.read_bytes()
-    if hashlib.sha256(data).hexdigest() != layer.sha256:  # changed between the two
-        raise UserError("damaged asset", file=path, found="the file changed while it was read", remedy="try again")
     try:
-        mesh = decode_mesh(data)
+        mesh = decode_mesh(layer_bytes(folder, layer))
     except DracoError as error:
-        raise UserError("damaged mesh", file=folder / layer.mesh, found=str(error), remedy=REMEDY) from None
+        raise UserError("damaged mesh", file=path, place=place, found=str(error), remedy=REMEDY) from None
     problems = mesh_problems(mesh, layer.vertices, layer.triangles)
     if problems:
-        raise UserError("damaged mesh", file=folder / layer.mesh, found="; ".join(problems), remedy=REMEDY)
+        raise UserError("damaged mesh", file=path, place=place, found="; ".join(problems), remedy=REMEDY)
     return mesh

@@ -16,9 +16,11 @@ from facefolds_core.captures.images import fit_box
 from facefolds_core.captures.motion import head_motion, in_head
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras
 from facefolds_core.captures.picture import Picture
+from facefolds_core.captures.place import draw_place
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
+from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import FrameStore, write_frames
@@ -26,6 +28,9 @@ from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
 
 Negatives = list[Negative]
+
+BALL = (0.02, 0.95)
+"""Radii of the subject's ball in distances of the cameras: an eye would fill it, and beyond it the cameras stand."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     Raises:
         UserError: for everything that is wrong with the capture and shows without decoding its images.
     """
-    similarity, notes = normalizing_similarity(capture, subject.front)
+    similarity, notes = normalizing_similarity(capture, subject.front, subject.centre)
     culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
     kept, frames, incomplete = complete_subset(capture, culling.kept)
     left_out = [*capture.left_out, *notes, *culling.facts, *incomplete]
@@ -97,6 +102,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         left_out=tuple(left_out),
         folder=folder,
         poses=motion.track,
+        radius=None if subject.radius is None else _ball(similarity.scale * subject.radius, capture),
     )
     vertices, there = None, None
     if capture.tracking is not None:
@@ -104,6 +110,25 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         vertices = in_head(there, motion.track).astype(np.float32)
     check_sight(cameras, scene.frame_ids, None if there is None else there.astype(np.float32), capture.root)
     return Plan(capture, scene, tuple(rows), vertices, sound)
+
+
+def _ball(radius: float, capture: Capture) -> float:
+    """The radius of the subject's ball, units.
+
+    Raises:
+        UserError: if it holds next to nothing, or the cameras stand in it.
+    """
+    least, most = BALL
+    if least <= radius <= most:
+        return radius
+    raise UserError(
+        "the ball is much too small or too large",
+        file=capture.root,
+        place="radius",
+        expected=f"{least:g} to {most:g} times the median distance of the cameras from the subject's centre",
+        found=f"{radius:.3g} times it",
+        remedy="give `radius` of this subject in the capture's unit of length, or leave it out",
+    )
 
 
 def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
@@ -138,6 +163,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
         if capture.sound is not None and plan.sound_start is not None:
             seconds = scene.num_frames / (scene.fps or 1.0)
             cut_sound(capture.sound.path, temporary / "audio.wav", plan.sound_start, seconds)
+        draw_place(temporary / "place.png", scene, FrameStore(temporary / "frames.arrow"))
         scene = replace(scene, left_out=(*_doubts(plan, temporary), *scene.left_out))
         write_scene(scene, temporary)
     return scene

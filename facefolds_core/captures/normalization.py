@@ -100,12 +100,17 @@ def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, li
     return centre, orientation(-camera.forward, -camera.rotation[1]), []
 
 
-def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similarity, list[Fact]]:
+def normalizing_similarity(
+    capture: Capture, front: str | None, given: Sequence[float] | None = None
+) -> tuple[Similarity, list[Fact]]:
     """Capture -> normalised coordinates, and facts on what was guessed.
 
     Subject at the origin, facing +x, up +z; the median distance of the cameras from it is 1. With a tracked mesh,
     centre and orientation are the head's. Without, the centre is the point nearest to all optical axes, and the subject
     faces against the viewing direction of the camera `front`, whose image is upright.
+
+    Args:
+        given: (3,) the centre in the capture's coordinates, instead of either.
 
     Raises:
         UserError: if the front camera does not exist, or all cameras stand in the centre.
@@ -115,6 +120,8 @@ def normalizing_similarity(capture: Capture, front: str | None) -> tuple[Similar
         centre, rotation = _from_tracking(capture.tracking)
     else:
         centre, rotation, notes = _from_cameras(capture, front)
+    if given is not None:
+        centre = np.array(given, float)
     distance = float(np.median([np.linalg.norm(view.camera.centre - centre) for view in capture.views]))
     if not np.isfinite(distance) or distance < 1e-9:
         raise UserError(

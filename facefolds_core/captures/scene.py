@@ -10,6 +10,7 @@ A folder with
 - `mattes.arrow`: opacity that training may use, of any camera and frame, where the capture has it (one channel);
 - `surface.npz`: tracked mesh in the head's own frame, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32;
+- `place.png`: the subject's centre, axes and ball over the pictures (`place.py`), for people;
 - `audio.wav`: the sound from the first frame on, where the capture has it.
 
 Normalised world: the subject is at the origin, faces +x, up is +z, its left is +y; camera centres are about 1 unit
@@ -62,6 +63,7 @@ class Scene:
         left_out: a fact for each camera, frame or image of the capture that is not here, with the reason.
         folder: where it was read from.
         poses: the head's own frame -> world in each of the K frames; None where the head is taken to stand still.
+        radius: of the ball about the origin that holds the subject, units; None where it is to be found.
     """
 
     subject: str
@@ -74,6 +76,7 @@ class Scene:
     left_out: tuple[Fact, ...]
     folder: Path
     poses: Track | None = None
+    radius: float | None = None
 
     @property
     def width(self) -> int:
@@ -192,6 +195,7 @@ def write_scene(scene: Scene, folder: Path) -> None:
             "from_capture": scene.from_capture.to_json(),
             "left_out": [one.to_json() for one in scene.left_out],
             "poses": None if scene.poses is None else _poses_json(scene.poses),
+            "radius": scene.radius,
         },
     )
 
@@ -244,6 +248,7 @@ def read_scene(folder: str | Path) -> Scene:
             left_out=tuple(read_fact(one) for one in value["left_out"]),
             folder=folder,
             poses=_read_poses(value.get("poses")),
+            radius=None if value.get("radius") is None else float(value["radius"]),
         )
         _check(scene)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -269,6 +274,8 @@ def _check(scene: Scene) -> None:
         raise ValueError("times or a rate that are none")
     if scene.poses is not None and (problems := scene.poses.problems(frames)):
         raise ValueError(f"poses: {problems[0]}")
+    if scene.radius is not None and not 0 < scene.radius < 10:
+        raise ValueError("a ball without a size")
     similarity = scene.from_capture
     if (similarity.rotation.shape, similarity.translation.shape) != ((3, 3), (3,)):
         raise ValueError("from_capture is no similarity")

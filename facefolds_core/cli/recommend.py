@@ -29,7 +29,7 @@ def command(
     ),
     subject: Annotated[str, typer.Option(help="Name of the subject; needed where the table has several.")] = "",
     max_bytes: Annotated[
-        float | None, typer.Option(help="Of meshes, video and view effects together.", callback=finite)
+        float | None, typer.Option(help="Of meshes, video and reflection together.", callback=finite)
     ] = None,
     max_triangles: Annotated[float | None, typer.Option(help="Of all layers.", callback=finite)] = None,
     max_gpu_bytes: Annotated[

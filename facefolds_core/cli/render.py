@@ -139,7 +139,7 @@ def command(
     seconds: Annotated[float, typer.Option(help="Length of a film; the sequence repeats as needed.", min=0.1)] = 8.0,
     sweep: Annotated[float, typer.Option(help="Degrees to each side, of a turntable.")] = 55.0,
     samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
-    effects: Annotated[bool, typer.Option(help="Reflection and view effects, where the asset has them.")] = True,
+    reflection: Annotated[bool, typer.Option(help="With the reflection, where the asset has one.")] = True,
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
 ) -> None:
     """Render an asset with OpenGL, without a screen: a PNG still, or an MP4 film in which the sequence plays."""
@@ -163,9 +163,7 @@ def command(
                 "no such frame", place="--frame", expected=expected, found=frame, remedy="choose one of these"
             )
         start = Eye(azimuth, elevation, distance)
-        maps = shown.reflection() if effects else None
-        glossy = None if maps is None else Glossy(maps, shown.windows)
-        with OpenGLRenderer(shown, shown.effects() if effects else None, glossy) as renderer:
+        with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
 
             def picture(eye: Eye, index: int) -> NDArray[np.uint8]:
                 camera = camera_of(eye, samples * width, samples * height, field_of_view)

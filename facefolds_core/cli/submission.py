@@ -30,6 +30,7 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file
 from facefolds_core.progress import progress
 from facefolds_core.rendering.opengl import OpenGLRenderer
+from facefolds_core.rendering.opengl_reflection import Glossy
 
 HIDDEN = ("222200046", "222200037", "222200039")
 RATE = 73
@@ -68,7 +69,7 @@ def command(
         to_scene = read_scene(scene if scene is not None else asset.resolve().parent / "scene").from_capture
         colour = parse_colour(background)
         films = {}
-        with OpenGLRenderer(shown, shown.effects()) as renderer, tempfile.TemporaryDirectory() as folder:
+        with OpenGLRenderer(shown, Glossy.of(shown)) as renderer, tempfile.TemporaryDirectory() as folder:
             for one in cameras_of(capture, camera or HIDDEN, (width, height)):
                 larger = one.transformed(to_scene).resized(samples * width, samples * height)
                 bar = progress(range(shown.num_frames), desc=f"camera {one.name}", unit="picture")

@@ -4,6 +4,7 @@ Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player
 holds plain binary meshes with y up, and every frame as a picture of its own.
 
 `facefolds.json` names all files; rectangles are the asset's own ([x, y, width, height], pixels of the picture, y down).
+`track` (absent where the head stands still) has a pose a frame, in the asset's own axes, as the manifest has it.
 A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordinates (s, t), 3 T uint32 indices.
 """
 
@@ -17,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.colour import luma_to_alpha, yuv420_to_rgb
-from facefolds_core.asset.manifest import REMEDY, Texture
+from facefolds_core.asset.manifest import REMEDY
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
-from facefolds_core.asset.video import Picture
+from facefolds_core.engines._picture import rgb_picture
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -95,6 +95,9 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             contents["reflection"] = {**one.model_dump(mode="json", include=_OF_A_REFLECTION), "scales": scales}
             for layer, window in zip(layers, level.windows, strict=True):
                 layer["to_maps"] = list(window_to_window(window, one.uv_window))
+        if level.track is not None:
+            poses = zip(level.track.quaternions.tolist(), level.track.translations.tolist(), strict=True)
+            contents["track"] = [{"quaternion": q, "translation": t} for q, t in poses]
         write_json(out / CONTENTS, contents)
         return sum(path.stat().st_size for path in out.iterdir())
 
@@ -103,14 +106,3 @@ def mesh_bytes(mesh: TexturedMesh) -> bytes:
     """A layer as the add-on reads it."""
     vertices = y_up(mesh.vertices).astype("<f4").tobytes()
     return vertices + mesh.st.astype("<f4").tobytes() + mesh.faces.astype("<u4").tobytes()
-
-
-def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
-    """A decoded picture -> (height, width, 3) RGB: colour in its half, alpha as grey in its own."""
-    height, width = texture.height, texture.width
-    y = picture[:height]
-    cb, cr = picture[height:].reshape(2, height // 2, width // 2)
-    rgb = yuv420_to_rgb(y, cb, cr)
-    x0, y0, w, h = texture.alpha_rect
-    rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
-    return rgb

@@ -16,7 +16,6 @@ from facefolds_core.params.compress import (
     MeshCodec,
     MeterParams,
     VideoCodec,
-    ViewEffectParams,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
@@ -107,7 +106,6 @@ __all__ = [
     "TrainParams",
     "TrainSection",
     "VideoCodec",
-    "ViewEffectParams",
     "VolumeLevel",
     "VolumeParams",
     "WallParams",

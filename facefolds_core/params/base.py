@@ -27,6 +27,11 @@ Many = Annotated[tuple[T, ...], Field(strict=False)]
 
 Pair = Annotated[tuple[T, T], Field(strict=False)]
 
+Triple = Annotated[tuple[T, T, T], Field(strict=False)]
+
+Coordinate = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""In the capture's world; no number of a calibration is larger."""
+
 Count = Annotated[int, Field(ge=1, le=100_000_000)]
 """How many, at least one. A hundred million is beyond any machine that this runs on."""
 

@@ -109,46 +109,6 @@ class MeterParams(Section):
     """Of those that hit anything, drawn once."""
 
 
-class ViewEffectParams(Section):
-    """The fit of the view effects (packaging/effects.py)."""
-
-    share: Annotated[float, Field(gt=0, le=100)] = 0.1
-    """Bytes of the effects, of the full level's, at most."""
-
-    frames: Count = 3
-    """That are fitted to, evenly spread."""
-
-    pixels: Count = 240_000
-    """In the fit, over all cameras and frames."""
-
-    min_opacity: Share = 0.9
-    """From which a pixel is the asset's: beside it the photo shows the room."""
-
-    min_weight: Share = 0.01
-    """Compositing weight of a layer below which a pixel says nothing about it."""
-
-    max_residual: Share = 0.3
-    """Residuals are clipped to it: what is beyond is wrong geometry or the room."""
-
-    ridges: Annotated[Many[Annotated[float, Field(ge=0, le=1e9)]], Field(min_length=1, max_length=100)] = (
-        *(1.0, 3.0),
-        *(10.0, 30.0),
-    )
-    """Strengths of the ridge that are tried; the one that is best on the cameras left out is taken."""
-
-    validation_every: Annotated[int, Field(ge=2, le=100_000)] = 5
-    """Every so many-th training camera is left out to choose the ridge."""
-
-    min_gain: Decibels = 0.2
-    """dB on those cameras below which no effects ship."""
-
-    downscales: Annotated[Many[Annotated[int, Field(ge=1, le=4096)]], Field(min_length=1, max_length=100)] = (
-        *(8, 12, 16),
-        *(24, 32),
-    )
-    """Texels of the textures a texel of the maps, along each side: the first whose file is small enough."""
-
-
 class BetweenParams(Section):
     """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""
 
@@ -216,10 +176,6 @@ class CompressParams(Section):
     glb: GlbParams = GlbParams()
     """One frame for programs that read glTF."""
 
-    view_effects: bool = False
-    """Fit how the colours depend on the view, and ship it where it helps, for a tenth of the bytes of the full level at
-    most. It needs an asset that stands before the room, not one that has it painted on."""
-
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
     """Of poster and photos, on JPEG's scale."""
 
@@ -228,9 +184,6 @@ class CompressParams(Section):
 
     meter: MeterParams = MeterParams()
     """What quality is measured on."""
-
-    effects: ViewEffectParams = ViewEffectParams()
-    """For `view_effects`."""
 
     between: BetweenParams = BetweenParams()
     """For `frame_rate_factor`."""

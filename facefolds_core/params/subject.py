@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, FrameRate, Many, Natural, Pair, Section
+from facefolds_core.params.base import Coordinate, Count, FrameRate, Many, Natural, Pair, Section, Triple
 from facefolds_core.registry import SOURCES
 
 if TYPE_CHECKING:
@@ -96,6 +96,14 @@ class Subject(Overrides):
 
     front: str | None = None
     """For captures without a tracked mesh, a camera that faces the subject upright; null finds the front."""
+
+    centre: Triple[Coordinate] | None = None
+    """[x, y, z], the subject's middle in the coordinates of the capture; null takes the tracked mesh's, or the point
+    nearest to all optical axes. `normalize` draws it over the pictures (scene/place.png)."""
+
+    radius: Annotated[float, Field(gt=0, le=1e9)] | None = None
+    """Of the ball about the centre that holds the subject, in the capture's unit of length: nothing beyond it is
+    modelled, and nothing larger is tried. null takes `train.volume.reach`, and more where that cuts the subject off."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

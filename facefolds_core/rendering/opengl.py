@@ -8,7 +8,6 @@ alone, then its colour where depth is equal, so that its folds count once.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
 
@@ -18,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.rendering.effects import Map
 from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy
-from facefolds_core.rendering.reference import BLACK, Image, Layered, seen_from
+from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from
 
 VERTEX = """
 #version 330
@@ -45,21 +43,6 @@ in vec2 st;
 out vec4 colour;
 void main() { colour = texture(picture, st); }
 """
-FRAGMENT_WITH_EFFECTS = """
-#version 330
-uniform sampler2D picture;
-uniform sampler2DArray effects; // what to add for each unit of x, y and z of the direction to the eye
-uniform vec3 eye;
-in vec2 st;
-in vec3 point;
-out vec4 colour;
-void main() {
-  colour = texture(picture, st);
-  vec3 to_eye = normalize(eye - point);
-  for (int k = 0; k < 3; ++k) colour.rgb += to_eye[k] * texture(effects, vec3(st, k)).rgb;
-  colour.rgb = clamp(colour.rgb, 0.0, 1.0);
-}
-"""
 NOTHING = """
 #version 330
 out vec4 colour;
@@ -77,21 +60,18 @@ class OpenGLRenderer:
 
     Args:
         asset: its meshes go to the card at once, textures as frames are asked for.
-        effects: one map of view effects a layer, such as `asset.effects()`; None for none.
-        glossy: the reflection, instead of view effects; None for none.
+        glossy: the reflection; None for none.
 
     Raises:
         UserError: if there is no OpenGL here.
     """
 
-    def __init__(self, asset: Layered, effects: Sequence[Map] | None = None, glossy: Glossy | None = None) -> None:
+    def __init__(self, asset: Layered, glossy: Glossy | None = None) -> None:
         self._asset = asset
         self._context = _make_context()
-        fragment = FRAGMENT if effects is None else FRAGMENT_WITH_EFFECTS
-        self._colour = self._context.program(VERTEX, FRAGMENT_WITH_REFLECTION if glossy else fragment)
+        self._colour = self._context.program(VERTEX, FRAGMENT_WITH_REFLECTION if glossy else FRAGMENT)
         self._depth = self._context.program(VERTEX, NOTHING)
         self._layers = [self._upload(layer) for layer in asset.layers]
-        self._effects = [self._effect(table) for table in effects or ()] if glossy is None else []
         self._glossy = glossy
         self._reflections = [] if glossy is None else glossy.textures(self._context)
         self._vertices = np.concatenate([layer.vertices for layer in asset.layers]).astype(np.float64)
@@ -122,6 +102,7 @@ class OpenGLRenderer:
         Raises:
             UserError: if the picture is larger than the card allows.
         """
+        to_room = room_from(self._asset, frame)
         camera = seen_from(self._asset, camera, frame)
         self._show_frame(frame)
         target = self._sized_target(camera)
@@ -130,21 +111,18 @@ class OpenGLRenderer:
         projection = _projection(camera, self._vertices).T.astype("f4").tobytes()
         for program in (self._depth, self._colour):
             _uniform(program, "projection").write(projection)
-        if self._effects:
-            _uniform(self._colour, "effects").value = 1
         for unit, (name, texture) in enumerate(self._reflections, 1):
             _uniform(self._colour, name).value = unit
             texture.use(unit)
-        if self._effects or self._reflections:
+        if self._reflections:
             _uniform(self._colour, "eye").write(camera.centre.astype("f4").tobytes())
+            _uniform(self._colour, "to_room").write(to_room.T.astype("f4").tobytes())
         count = len(self._layers)
         for index in reversed(range(count)):
             # NDC depth from -1 (outermost layer) to 1; a little is left free between slices.
             slice_ = np.array([0.99 / count, (2 * index + 1) / count - 1], "f4").tobytes()
             for program in (self._depth, self._colour):
                 _uniform(program, "slice").write(slice_)
-            if self._effects:
-                self._effects[index].use(1)
             if self._glossy is not None:
                 _uniform(self._colour, "to_maps").write(self._glossy.to_maps(index).tobytes())
             self._draw_layer(target, *self._layers[index], self._textures[index])
@@ -193,15 +171,6 @@ class OpenGLRenderer:
         """Stored values as they are: no sRGB format. Row 0 is the top, as t runs."""
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels).tobytes(), alignment=1)
-        texture.filter = moderngl.LINEAR, moderngl.LINEAR
-        texture.repeat_x = texture.repeat_y = False
-        return texture
-
-    def _effect(self, table: Map) -> moderngl.TextureArray:
-        """(h, w, k, rgb) -> three pictures."""
-        height, width = table.shape[:2]
-        pictures = np.ascontiguousarray(table.transpose(2, 0, 1, 3), np.float32)
-        texture = self._context.texture_array((width, height, 3), 3, pictures.tobytes(), alignment=1, dtype="f4")
         texture.filter = moderngl.LINEAR, moderngl.LINEAR
         texture.repeat_x = texture.repeat_y = False
         return texture

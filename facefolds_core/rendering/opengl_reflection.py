@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.reflections import ReflectionMaps, window_to_window
 from facefolds_core.geometry.sphere_uv import Window
 
@@ -21,6 +22,7 @@ uniform sampler2D normals;
 uniform sampler2D environment;
 uniform vec4 to_maps; // (s, t) of the layer -> that of the maps: times xy, plus zw
 uniform vec3 eye;
+uniform mat3 to_room; // from the meshes' own axes to those of the room, which the light is fixed to
 in vec2 st;
 in vec3 point;
 out vec4 colour;
@@ -29,7 +31,7 @@ void main() {
   vec4 here = texture(added, at);
   vec3 normal = normalize(texture(normals, at).rgb);
   vec3 along = normalize(point - eye);
-  vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+  vec3 r = to_room * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   colour = texture(picture, st);
   colour.rgb = clamp(colour.rgb + here.a * texture(environment, place).rgb - here.rgb, 0.0, 1.0);
@@ -43,6 +45,12 @@ class Glossy:
 
     maps: ReflectionMaps
     windows: Sequence[Window]
+
+    @classmethod
+    def of(cls, level: AssetLevel) -> Glossy | None:
+        """That of a level of an asset; None where it has none."""
+        maps = level.reflection()
+        return None if maps is None else cls(maps, level.windows)
 
     def to_maps(self, layer: int) -> NDArray[np.float32]:
         """(4,) the uniform `to_maps` of a layer."""

@@ -131,7 +131,7 @@ def composite(
         hits: of one camera.
         textures: N textures (h, w, 4) uint8, one frame of all layers.
         background: RGB in [0, 1], (3,) or (H, W, 3).
-        added: for each layer (M, 3), what to add to the colours of its M hits before blending: view effects.
+        added: for each layer (M, 3), what to add to the colours of its M hits before blending: the reflection.
 
     Returns:
         rgb (H, W, 3) and alpha (H, W), float32 in [0, 1].
@@ -162,3 +162,9 @@ def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:
     """A camera of the world in the frame of the meshes, which an asset with a `track` moves."""
     track: Track | None = getattr(asset, "track", None)
     return camera if track is None else track.camera(camera, frame)
+
+
+def room_from(asset: Layered, frame: float) -> NDArray[np.float64]:
+    """(3, 3) rotation from the meshes' axes in a frame to those of the room, which the reflected light is fixed to."""
+    track: Track | None = getattr(asset, "track", None)
+    return np.eye(3) if track is None else track.at(frame).rotation

@@ -38,7 +38,7 @@ def row(folder: Path) -> dict[str, Any]:
     folders = SubjectFolders(folder)
     metrics = read_metrics(folders.metrics)
     asset, cost, key = metrics["asset"], metrics["cost"], words.quality_key(metrics)
-    size = sum(finite(cost.get(name)) or 0.0 for name in ("mesh_bytes", "texture_bytes", "view_effects_bytes"))
+    size = sum(finite(cost.get(name)) or 0.0 for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
     poster = folders.asset / "poster.jpg"
     return {
         "name": folder.resolve().name,

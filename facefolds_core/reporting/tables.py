@@ -15,7 +15,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
 from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
 from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
-from facefolds_core.scoring.panels import VARIANTS, WITH_EFFECTS
+from facefolds_core.scoring.panels import VARIANTS
 from facefolds_core.scoring.record import Seen, Spacing
 
 Row = dict[str, Any]
@@ -24,7 +24,6 @@ VARIANT_NAMES = {
     "model": "model",
     "diffuse": "model without view branch",
     "asset": "asset",
-    WITH_EFFECTS: "asset with view effects",
 }
 METRIC_NAMES = {"psnr": "PSNR, dB", "ssim": "SSIM", "lpips": "LPIPS", "st_lpips": "ST-LPIPS"}
 HEAT_RANGE = 3.0
@@ -69,7 +68,7 @@ GROUPS: dict[str, dict[str, tuple[str, int]]] = {
 
 def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     """Means of each variant; metrics that nothing has are left out."""
-    variants = [name for name in (*VARIANTS, WITH_EFFECTS) if name in metrics]
+    variants = [name for name in VARIANTS if name in metrics]
     groups, names, keys = [], [], []
     for group, listed in GROUPS.items():
         kept = [key for key in listed if any(finite(metrics[one].get(key)) is not None for one in variants)]

@@ -28,7 +28,7 @@ from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
 from facefolds_core.scoring.images import Rendering, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
-from facefolds_core.scoring.panels import WITH_EFFECTS, ImageScore, Panel
+from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
@@ -202,8 +202,6 @@ def rendered(
             "diffuse": Rendering(without_view, alpha),
             "asset": Rendering(*composite(view.hits, textures, added=view.glossy)),
         }
-        if view.added is not None:
-            images[WITH_EFFECTS] = Rendering(*composite(view.hits, textures, added=view.added))
         yield k, textures, images
 
 

@@ -8,8 +8,6 @@ from facefolds_core.captures.scene import Split
 from facefolds_core.scoring.metrics import Array
 
 VARIANTS = ("model", "diffuse", "asset")
-WITH_EFFECTS = "asset_view"
-"""A further variant, where the asset has view effects: the asset with them."""
 METRICS = ("psnr", "ssim", "lpips", "st_lpips")
 SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
 FOUND_METRICS = tuple(f"{name}_found" for name in METRICS)
@@ -31,7 +29,7 @@ class ImageScore:
 
     Attributes:
         camera, frame: their names in the capture.
-        variant: one of VARIANTS, or WITH_EFFECTS.
+        variant: one of VARIANTS.
         values: ALL_METRICS; None where a value cannot be had.
         split: of the camera.
     """

@@ -11,7 +11,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.rendering import AssetCaster
-from facefolds_core.rendering.effects import added_colours, to_eye
+from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.scoring.model_view import ModelView
 
@@ -30,7 +30,6 @@ class PosedView:
         hits: there.
         model: the model's view.
         glossy: what the reflection adds, or None.
-        added: what view effects add, or None.
     """
 
     def __init__(
@@ -38,7 +37,7 @@ class PosedView:
     ) -> None:
         self._poses, self._model, self._asset, self._caster = scene.poses, model, asset, caster
         self._camera, self._step = camera, step
-        self._maps, self._reflection = asset.effects(), asset.reflection()
+        self._reflection = asset.reflection()
         self._turn_model(0)
         self._turn_asset(0)
 
@@ -56,10 +55,11 @@ class PosedView:
             self.model = ModelView(self._model, camera)
 
     def _turn_asset(self, frame: int) -> None:
-        self.seen_by = self._asset.camera_in_head(self._camera, frame * self._step)
+        time = frame * self._step
+        self.seen_by = self._asset.camera_in_head(self._camera, time)
         self.hits = self._caster.cast(self.seen_by)
         maps = self._reflection
         self.glossy = None
         if maps is not None:
-            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps)
-        self.added = None if self._maps is None else added_colours(self.hits, to_eye(self.seen_by), self._maps)
+            to_room = None if self._asset.track is None else room_from(self._asset, time)
+            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps, to_room)

@@ -17,7 +17,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_file, read_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, VARIANTS, WITH_EFFECTS, ImageScore
+from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, VARIANTS, ImageScore
 from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.truths import MatteKind
 
@@ -108,12 +108,8 @@ def _means(scores: Sequence[ImageScore], split: Split, about: Circumstances) -> 
         "images": len(images),
         "images_with_mask": sum(score.values["psnr_subject"] is not None for score in images),
         "truth_change": rounded(truth),
-        **{variant: averages(own, variant, changes.get(variant)) for variant in _variants(scores)},
+        **{variant: averages(own, variant, changes.get(variant)) for variant in VARIANTS},
     }
-
-
-def _variants(scores: Sequence[ImageScore]) -> tuple[str, ...]:
-    return (*VARIANTS, WITH_EFFECTS) if any(s.variant == WITH_EFFECTS for s in scores) else VARIANTS
 
 
 def averages(scores: Sequence[ImageScore], variant: str, change: Change | None = None) -> dict[str, float | None]:
@@ -158,7 +154,7 @@ def asset_cost(manifest: Manifest) -> dict[str, int]:
         "mesh_bytes": sum(x.bytes for x in level.layers),
         "texture_bytes": video,
         "video_bits_per_second": round(8 * video * level.texture.fps / level.texture.frames),
-        "view_effects_bytes": sum(one.bytes for one in (level.view_effects, level.reflection) if one),
+        "reflection_bytes": level.reflection.bytes if level.reflection else 0,
         "gpu_bytes": VERTEX_BYTES * vertices + 3 * INDEX_BYTES * triangles + PIXEL_BYTES * picture,
     }
 

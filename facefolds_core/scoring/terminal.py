@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.panels import WITH_EFFECTS
 
 NAME, CELL = 42, 12
 """Columns of the terminal: of a row's name, and of each figure."""
@@ -51,10 +50,8 @@ def score_lines(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def _lines(metrics: Mapping[str, Any], what: str) -> list[str]:
-    variants = ["model"]
-    # Without a view branch the two are the same figures twice.
-    variants += ["diffuse"] if metrics["diffuse"] != metrics["model"] else []
-    variants += ["asset", *([WITH_EFFECTS] if WITH_EFFECTS in metrics else [])]
+    # Without a view branch the first two are the same figures twice.
+    variants = ["model", *(["diffuse"] if metrics["diffuse"] != metrics["model"] else []), "asset"]
     lines = [_line(f"{metrics['images']} pictures {what}", variants)]
     for key, words, form in ROWS:
         values = [metrics[variant].get(key) for variant in variants]
@@ -72,7 +69,7 @@ def result_lines(metrics: Mapping[str, Any], folders: SubjectFolders) -> list[st
     and how to look at it."""
     warnings = [line for one in metrics.get("warnings", ()) if (line := str(one.get("words", "")))]
     cost, key = metrics["cost"], metrics.get("headline", "psnr")
-    size = sum(cost.get(name) or 0 for name in ("mesh_bytes", "texture_bytes", "view_effects_bytes"))
+    size = sum(cost.get(name) or 0 for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
     quality = metrics["asset"].get(key)
     good = "not scored" if quality is None else f"{quality:.2f} dB {HEADLINE_WORDS[key]}"
     return [

@@ -98,7 +98,7 @@ def figures_of(metrics: Mapping[str, Any]) -> dict[str, float]:
     listed |= metrics.get("cost", {})
     found = {name: float(v) for name, v in listed.items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
     if found:
-        found["bytes"] = sum(found.get(name, 0.0) for name in ("mesh_bytes", "texture_bytes", "view_effects_bytes"))
+        found["bytes"] = sum(found.get(name, 0.0) for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
     return found
 
 

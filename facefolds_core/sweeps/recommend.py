@@ -25,7 +25,7 @@ class Budget:
     """At most so much; None is no limit. The fields are named after the figures of a run.
 
     Attributes:
-        bytes: of meshes, video and view effects together.
+        bytes: of meshes, video and reflection together.
         triangles: of all layers.
         gpu_bytes: docs/reference/metrics.md.
         video_bits_per_second: of the texture video.

@@ -10,9 +10,10 @@ import numpy as np
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package
-from facefolds_core.params import CompressParams, merged
+from facefolds_core.params import CompressParams
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
 from tests.assets import CENTRE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
@@ -50,8 +51,8 @@ def filmed(folder: Path) -> Scene:
     return scene
 
 
-def packaged(folder: Path, scene: Scene, section: dict[str, Any]) -> None:
-    """Package the caps with the section `compress`; view effects may be as large as they like."""
+def packaged(folder: Path, scene: Scene, section: dict[str, Any], reflection: ReflectionMaps | None = None) -> None:
+    """Package the caps with the section `compress`."""
     store = folder.with_name("textures.arrow")
     textures = write_store(store, np.stack([cap_textures(LAYERS, frame, R) for frame in range(FRAMES)]))
 
@@ -59,6 +60,5 @@ def packaged(folder: Path, scene: Scene, section: dict[str, Any]) -> None:
         return [cap_mesh(radius_of(i), side) for i in range(LAYERS)]
 
     levels = {level["mesh_resolution"] for level in section.get("levels", ())}
-    export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels})
-    values = merged({"effects": {"share": 10.0}}, section)
-    package(folder, export, scene, CompressParams.model_validate(values))
+    export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels}, reflection)
+    package(folder, export, scene, CompressParams.model_validate(section))

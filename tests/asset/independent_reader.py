@@ -28,10 +28,12 @@ class Player:
 
     def __init__(self, folder: Path, level: int = -1) -> None:
         manifest = json.loads((folder / "manifest.json").read_text())
-        assert manifest["format"] == "facefolds" and manifest["version"] == 2
+        assert manifest["format"] == "facefolds" and manifest["version"] == 3
         self.folder, self.level = folder, manifest["levels"][level]
-        self.meshes = [DracoPy.decode((folder / x["mesh"]).read_bytes()) for x in self.level["layers"]]
-        self.effects = self._effects()
+        files = {x["file"]: (folder / x["file"]).read_bytes() for x in self.level["meshes"]}
+        parts = [files[x["mesh"]][x["offset"] : x["offset"] + x["bytes"]] for x in self.level["layers"]]
+        self.meshes = [DracoPy.decode(part) for part in parts]
+        self.reflection = self._reflection()
 
     def pictures(self) -> list[Array]:
         """All frames as (H, W, 3) RGB above and alpha in a fourth channel: (H, W, 4) of the picture's colour half."""
@@ -48,7 +50,7 @@ class Player:
         meshes = ((np.asarray(m.points, float), np.asarray(m.faces), np.asarray(m.tex_coord)) for m in self.meshes)
         return rays, [nearest(eye, rays, *mesh) for mesh in meshes]
 
-    def render(self, picture: Array, view: tuple[Array, list[tuple[Array, Array]]], effects: bool = False) -> Array:
+    def render(self, picture: Array, view: tuple[Array, list[tuple[Array, Array]]], reflection: bool = False) -> Array:
         """Colours (M, 3) over black of one of `pictures`, along the rays of `look`."""
         rays, hits = view
         colour, through = np.zeros((len(rays), 3)), np.ones(len(rays))
@@ -56,11 +58,8 @@ class Player:
             x, y, w, h = layer["texture_rect"]
             rgba = bilinear(picture[y : y + h, x : x + w], st)
             rgb = rgba[:, :3]
-            if effects and self.effects is not None:
-                ex, ey, ew, eh = layer["effects_rect"]
-                for plane, d in zip(self.effects, -rays[hit].T, strict=True):
-                    rgb = rgb + d[:, None] * bilinear(plane[ey : ey + eh, ex : ex + ew], st)
-                rgb = np.clip(rgb, 0, 1)
+            if reflection and self.reflection is not None:
+                rgb = np.clip(rgb + self._reflected(st, layer["uv_window"], rays[hit]), 0, 1)
             colour[hit] += (through[hit] * rgba[:, 3])[:, None] * rgb
             through[hit] *= 1 - rgba[:, 3]
         return colour
@@ -79,14 +78,37 @@ class Player:
         alpha = y[ay : ay + h, ax : ax + w, None]
         return np.clip(np.concatenate([colour, alpha], -1), 0, 1)
 
-    def _effects(self) -> list[Array] | None:
-        """What each plane adds, in units of colour."""
-        entry: dict[str, Any] | None = self.level["view_effects"]
+    def _reflection(self) -> dict[str, Array] | None:
+        """Environment E, gloss g, offset m and normals n, in units of colour and length."""
+        entry: dict[str, Any] | None = self.level.get("reflection")
         if entry is None:
             return None
         codes = np.asarray(Image.open(self.folder / entry["file"]), float)
-        values = entry["scale"] * (codes / 127.5 - 1)
-        return [values[y : y + h, x : x + w] for x, y, w, h in entry["planes"]]
+        parts = {}
+        for name in ("environment", "gloss", "offset", "normals"):
+            x, y, w, h = entry[f"{name}_rect"]
+            parts[name] = codes[y : y + h, x : x + w]
+        signed = {name: parts[name] / 127.5 - 1 for name in ("offset", "normals")}
+        return {
+            "environment": entry["environment_scale"] * parts["environment"] / 255,
+            "gloss": entry["gloss_scale"] * parts["gloss"] / 255,
+            "offset": entry["offset_scale"] * signed["offset"],
+            "normals": signed["normals"],
+        }
+
+    def _reflected(self, st: Array, window: list[float], d: Array) -> Array:
+        """What is added (M, 3) at (s, t) of a layer with a window, along the rays d."""
+        assert self.reflection is not None
+        (a0, a1, b0, b1), (u0, u1, v0, v1) = window, self.level["reflection"]["uv_window"]
+        s, t = st.T
+        at = np.stack([(b0 - v0 + s * (b1 - b0)) / (v1 - v0), (u1 - a1 + t * (a1 - a0)) / (u1 - u0)], -1)
+        n = bilinear(self.reflection["normals"], at)
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+        r = d - 2 * np.minimum((d * n).sum(1), 0)[:, None] * n
+        long = np.sqrt(np.maximum(2 * (1 + r[:, 0]), 1e-6))
+        where = np.stack([0.5 + 0.5 * r[:, 1] / long, 0.5 - 0.5 * r[:, 2] / long], -1)
+        light = bilinear(self.reflection["environment"], where)
+        return bilinear(self.reflection["gloss"], at) * light - bilinear(self.reflection["offset"], at)
 
 
 def upsampled(chroma: Array) -> Array:

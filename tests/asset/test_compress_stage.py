@@ -13,7 +13,6 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.draco import encode_mesh
-from facefolds_core.asset.effects import EffectsPicture
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
@@ -108,22 +107,6 @@ def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
     assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
 
 
-def test_view_effects_ship_and_are_scored_apart(folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch) -> None:
-    maps = [np.full((4, 3, 3, 3), 0.01 * (i + 1), np.float32) for i in range(3)]
-    monkeypatch.setattr("facefolds_core.packaging.package.fit_effects", lambda *_: EffectsPicture.of(maps))
-    rig(folders, view_effects=True)
-    compress(folders)
-    assert validate_asset(folders.asset) == []
-    asset = read_asset(folders.asset)
-    found = asset.effects()
-    assert found is not None
-    for table, given in zip(found, maps, strict=True):
-        np.testing.assert_allclose(table, given, atol=0.001)
-    assert asset.manifest.full.bytes == sum(size for _, size, _ in asset.manifest.full.files())
-    (folders.asset / "full_effects.png").write_bytes(b"")
-    assert any(problem.startswith("full_effects.png:") for problem in validate_asset(folders.asset))
-
-
 def test_levels_of_detail(folders: SubjectFolders) -> None:
     levels = [
         {"name": "small", "mesh_resolution": 5, "texture_resolution": 16, "crf": 34, "max_error_pixels": 0.5},
@@ -153,11 +136,15 @@ def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     compress(folders)
     assert validate_asset(folders.asset) == []
     manifest = read_asset(folders.asset).manifest
-    assert manifest.audio is not None and manifest.audio.file == "audio.wav"
+    assert manifest.audio is not None and manifest.audio.file == "audio.m4a"
     assert manifest.poster is not None and (manifest.poster.width, manifest.poster.height) == (48, 48)
     assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
     scene = read_scene(folders.scene)
-    assert manifest.view == filmed_view([scene.cameras[index] for index in scene.indices("train")])
+    train, unseen = ([scene.cameras[i] for i in scene.indices(split)] for split in ("train", "holdout"))
+    assert manifest.view == filmed_view(train, unseen)
+    assert manifest.view is not None and manifest.view.measured is not None
+    assert manifest.audio.mime == 'audio/mp4; codecs="mp4a.40.2"'
+    assert manifest.poster.K is not None and manifest.poster.background == (0.0, 0.0, 0.0)
     camera = read_scene(folders.scene).cameras[1]
     np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
     np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
@@ -185,7 +172,7 @@ def test_twice_the_frame_rate(folders: SubjectFolders) -> None:
         assert [photo.frame for photo in asset.manifest.photos] == [0, factor]
         assert not list(folders.asset.glob(".between-*"))
         glbs.append(folders.glb.read_bytes())
-        sounds.append(sound_of(folders.asset / "full.mp4"))
+        sounds.append(sound_of(folders.asset / "audio.m4a"))
     assert glbs[0] == glbs[1]
     assert sounds[0] == sounds[1]
     frames = [np.concatenate([layer.ravel() for layer in frame]).astype(int) for frame in asset.frames()]

@@ -11,13 +11,14 @@ import pytest
 
 from facefolds_core.asset.validation import validate_asset
 from tests.asset.filmed import filmed, packaged
+from tests.viewer.fixtures import random_reflection
 
 FILES = [
     "manifest.json",
-    *(f"{level}_0{layer}.drc" for level in ("small", "full") for layer in range(3)),
+    *(f"{level}_meshes.bin" for level in ("small", "full")),
     *(f"{level}.{container}" for level in ("small", "full") for container in ("mp4", "webm")),
-    "full_effects.png",
-    "audio.wav",
+    *(f"{level}_reflection.png" for level in ("small", "full")),
+    "audio.m4a",
     "poster.jpg",
     "photo_00.jpg",
 ]
@@ -34,10 +35,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     section = {
         "video": {"codec": ["h264", "vp9"], "crf": 24},
         "levels": [{"name": "small", "mesh_resolution": 6, "texture_resolution": 32, "crf": 30}],
-        "view_effects": True,
         "photos": 1,
     }
-    packaged(root / "asset", scene, section)
+    packaged(root / "asset", scene, section, random_reflection())
     return root / "asset"
 
 

@@ -119,7 +119,7 @@ def test_nothing_measured_is_said(tmp_path: Path) -> None:
 
 def test_the_readme_has_a_row_a_subject(tmp_path: Path) -> None:
     scores = {"psnr": 11.0, "ssim": 0.5, "psnr_subject": 24.5, "ssim_subject": 0.875}
-    sizes = {"triangles": 90702, "mesh_bytes": 219_000, "texture_bytes": 260_000, "view_effects_bytes": 15_000}
+    sizes = {"triangles": 90702, "mesh_bytes": 219_000, "texture_bytes": 260_000, "reflection_bytes": 15_000}
     cost = {**sizes, "device": "cpu (2 threads)", "train_seconds": 60.4}
     metrics = {"headline": "psnr_subject", "asset": scores, "model": {"psnr_subject": 25.0}, "cost": cost}
     cameras = [

@@ -14,7 +14,7 @@ from facefolds_core.cli.scores import command
 from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import metrics_json
 
-COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "view_effects_bytes": 0}
+COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
 
 def call(*arguments: str) -> Result:

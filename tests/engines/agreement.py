@@ -20,6 +20,7 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.cli.render import pick_level
 from facefolds_core.engines.godot import write_godot
+from facefolds_core.engines.usd import STAGE, write_usd
 from facefolds_core.geometry.cameras import Camera
 from tests.engines import blender, godot
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
@@ -44,8 +45,15 @@ def in_godot(level: AssetLevel, cameras: list[Camera], frames: list[int], place:
     return godot.pictures(place / "asset", cameras, frames, GREY_VALUE)
 
 
+def in_blender_by_usd(level: AssetLevel, cameras: list[Camera], frames: list[int], place: Path) -> Found:
+    """Blender knows no textures sampled in time: the first frame, whatever is asked for."""
+    write_usd(place / "usd", level, "head")
+    pictures = blender.pictures(place / "usd" / STAGE, cameras, GREY_VALUE)
+    return {(name, frames[0]): picture for name, picture in pictures.items()}
+
+
 def main(
-    engine: Annotated[Literal["blender", "godot"], typer.Argument()],
+    engine: Annotated[Literal["blender", "godot", "usd"], typer.Argument()],
     asset: Annotated[Path, typer.Argument(help="Folder of the asset.")],
     size: Annotated[int, typer.Option(help="Pixels of a side.")] = 320,
     level: Annotated[str | None, typer.Option(help="Level of detail; the full one if left out.")] = None,
@@ -54,8 +62,9 @@ def main(
     """PSNR to the reference, five cameras, first, middle and last frame."""
     whole = read_asset(asset)
     shown = pick_level(whole, level)
-    render = {"blender": in_blender, "godot": in_godot}[engine]
-    cameras, frames = five_cameras(size), sorted({0, whole.num_frames // 2, whole.num_frames - 1})
+    render = {"blender": in_blender, "godot": in_godot, "usd": in_blender_by_usd}[engine]
+    frames = [0] if engine == "usd" else sorted({0, whole.num_frames // 2, whole.num_frames - 1})
+    cameras = five_cameras(size)
     with tempfile.TemporaryDirectory() as place:
         found = render(shown, cameras, frames, Path(place))
     expected = expected_pictures(shown, cameras, frames)

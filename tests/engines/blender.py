@@ -1,4 +1,4 @@
-"""Blender (bpy in an environment of its own, or the program), and what it shows of a GLB."""
+"""Blender (bpy in an environment of its own, or the program), and what it shows of a GLB or of USD."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def find_blender() -> tuple[str, ...] | None:
     return None
 
 
-def pictures(glb: Path, cameras: Sequence[Camera], background: float) -> dict[str, NDArray[np.float64]]:
+def pictures(file: Path, cameras: Sequence[Camera], background: float) -> dict[str, NDArray[np.float64]]:
     """What Blender renders, a sample a pixel: by camera's name, (H, W, 3) in [0, 1]."""
     start = find_blender()
     assert start is not None
@@ -50,6 +50,6 @@ def pictures(glb: Path, cameras: Sequence[Camera], background: float) -> dict[st
         ]
         (Path(place) / "views.json").write_text(json.dumps(views))
         words = ["--views", f"{place}/views.json", "--background", *[str(background)] * 3, "--samples", "1"]
-        done = subprocess.run([*start, str(glb), *words], capture_output=True, text=True, timeout=240, check=False)
+        done = subprocess.run([*start, str(file), *words], capture_output=True, text=True, timeout=240, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         return {name: np.asarray(Image.open(file).convert("RGB")) / 255 for name, file in files.items()}

@@ -184,7 +184,7 @@ def damage_sealed_file(place: Path, random: np.random.Generator) -> Damage:
     path.write_bytes(content)
     entry |= {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
     for level in value["levels"]:
-        files = [*level["layers"], *level["texture"]["videos"], *filter(None, [level["view_effects"]])]
+        files = [*level["layers"], *level["texture"]["videos"], *filter(None, [level.get("reflection")])]
         level["bytes"] = sum(file["bytes"] for file in files)
     seal(place, value)
     return f"{mutation.__name__} {header or 'all'} bytes of {path.name}, sealed", False

@@ -65,7 +65,7 @@ reconstruct: {}
 decimate: {resolution: 8}
 texture: {resolution: 16}
 bake: {hold: 0.02}
-compress: {photos: 1, view_effects: true, video: {codec: [h264, vp9]}}
+compress: {photos: 1, video: {codec: [h264, vp9]}}
 evaluate: {}
 """
 DISK = 32 * 2**20

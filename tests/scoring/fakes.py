@@ -89,9 +89,6 @@ class FlatAsset:
     def reflection(self) -> None:
         return None
 
-    def effects(self) -> None:
-        return None
-
     @property
     def full(self) -> FlatAsset:
         return self

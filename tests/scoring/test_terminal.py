@@ -10,7 +10,7 @@ from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import Circumstances, metrics_json
 from facefolds_core.scoring.terminal import result_lines, score_lines
 
-COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "view_effects_bytes": 0}
+COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
 
 def metrics(diffuse: float = 30.0, **values: float) -> dict[str, object]:

@@ -12,7 +12,7 @@ from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import thickness
 from facefolds_core.training.volume.room import Room
-from facefolds_core.training.volume.search import cut_share
+from facefolds_core.training.volume.search import cut_share, in_ball
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
 from facefolds_core.training.volume.walls import Wall
 
@@ -107,3 +107,9 @@ def test_faint_hair_stays_where_there_is_no_room_and_no_other_body() -> None:
     assert subject_of(volume, (), PARAMS).grid[30, 30, 42, 0] < -10
     volume.room.outer = False
     assert subject_of(volume, (), PARAMS).grid[30, 30, 42, 0] == -4.0
+
+
+def test_a_given_ball_is_the_only_one_that_is_tried() -> None:
+    params = in_ball(0.3, PARAMS)
+    assert (params.volume.reach, params.subject.larger) == (0.3, ())
+    assert in_ball(None, PARAMS) == PARAMS

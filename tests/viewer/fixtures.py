@@ -37,9 +37,9 @@ def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> M
     change(value)
     for level in value["levels"]:
         entries = [
-            *level["layers"],
+            *level["meshes"],
             *level["texture"]["videos"],
-            *filter(None, [level.get("view_effects"), level.get("reflection")]),
+            *filter(None, [level.get("reflection")]),
         ]
         level["bytes"] = sum(entry["bytes"] for entry in entries)
     return write_manifest(Manifest.model_validate_json(json.dumps(value)), path)
@@ -51,16 +51,16 @@ def write_png(path: Path, image: NDArray[np.uint8]) -> dict[str, Any]:
 
 
 def rich_asset(folder: Path) -> Path:
-    """All that the format knows: two levels, three videos, view effects, poster, photos, sound; 6 frames."""
+    """All that the format knows: two levels, three videos, a reflection, poster, photos, sound; 6 frames."""
     make_asset(folder, layers=3, frames=6, resolution=96, params=THREE_CODECS)
     coarse = folder.with_name(f"{folder.name}-coarse")
     make_asset(coarse, layers=2, frames=6, resolution=32)
     level = parse_manifest(coarse / "manifest.json").model_dump(mode="json")["levels"][0]
     level["name"] = "coarse"
+    shutil.copy(coarse / "full_meshes.bin", folder / "coarse_meshes.bin")
+    level["meshes"][0]["file"] = "coarse_meshes.bin"
     for entry in level["layers"]:
-        name = f"coarse_{entry['mesh']}"
-        shutil.copy(coarse / entry["mesh"], folder / name)
-        entry["mesh"] = name
+        entry["mesh"] = "coarse_meshes.bin"
     shutil.copy(coarse / "full.mp4", folder / "coarse.mp4")
     level["texture"]["videos"][0]["file"] = "coarse.mp4"
     with wave.open(str(folder / "audio.wav"), "wb") as sound:
@@ -71,7 +71,7 @@ def rich_asset(folder: Path) -> Path:
 
     def change(value: dict[str, Any]) -> None:
         full = value["levels"][0]
-        add_effects(folder, full)
+        full["reflection"] = reflection_of(folder)
         value["levels"].insert(0, level)
         value["audio"] = file_entry(folder / "audio.wav")
         value["poster"] = write_png(folder / "poster.png", photo) | {"width": 90, "height": 60}
@@ -90,23 +90,17 @@ def random_reflection(seed: int = 0) -> ReflectionMaps:
     return ReflectionMaps((-0.9, 0.8, -0.7, 0.9), gloss, offset, facing, environment)
 
 
-def add_reflection(folder: Path) -> None:
-    """`random_reflection` in the full level."""
+def reflection_of(folder: Path) -> dict[str, Any]:
+    """Write the picture of `random_reflection`; what a level's manifest says of it."""
     picture = ReflectionPicture.of(random_reflection())
     (folder / "full_reflection.png").write_bytes(picture.png())
-    entry = reflection_entry(picture, file_entry(folder / "full_reflection.png")).model_dump(mode="json")
+    return reflection_entry(picture, file_entry(folder / "full_reflection.png")).model_dump(mode="json")
+
+
+def add_reflection(folder: Path) -> None:
+    """`random_reflection` in the full level."""
+    entry = reflection_of(folder)
     change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
-
-
-def add_effects(folder: Path, level: dict[str, Any]) -> None:
-    """Random view effects: each layer has 7 x 5 texels, planes lie below each other."""
-    count = len(level["layers"])
-    planes = [[0, 9 * k, 8 * count, 9] for k in range(3)]
-    image = np.random.default_rng(0).integers(0, 256, (27, 8 * count, 3), dtype=np.uint8)
-    entry = write_png(folder / "full_effects.png", image)
-    level["view_effects"] = entry | {"basis": "sh1", "scale": 0.4, "width": 8 * count, "height": 27, "planes": planes}
-    for i, layer in enumerate(level["layers"]):
-        layer["effects_rect"] = [8 * i, 1, 7, 5]
 
 
 def photo_entry(folder: Path, index: int, frame: int) -> dict[str, Any]:

@@ -137,7 +137,7 @@ def test_touch_turns(new_player: NewPlayer, rich: Path) -> None:
     player.wait(f"e.player.view.get().distance < {before}")
 
 
-def test_layers_apart_wireframe_and_effects(player: Player) -> None:
+def test_layers_apart_wireframe_and_reflection(player: Player) -> None:
     page = player.page
     player.button("Settings")
     assert changes_picture(player, lambda: page.get_by_role("button", name="Layer 1").click())
@@ -149,7 +149,7 @@ def test_layers_apart_wireframe_and_effects(player: Player) -> None:
     page.get_by_role("button", name="All").click()
     assert changes_picture(player, lambda: page.get_by_label("Pull apart").fill("0.5"))
     assert changes_picture(player, lambda: page.get_by_role("switch", name="Wireframe").click())
-    assert changes_picture(player, lambda: page.get_by_role("switch", name="View effects").click())
+    assert changes_picture(player, lambda: page.get_by_role("switch", name="Reflection").click())
     assert value(player, "[e.spread, e.wireframe, e.effects]") == [0.5, True, False]
 
 

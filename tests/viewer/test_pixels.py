@@ -13,7 +13,6 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.rendering import AssetCaster, composite, render_asset
-from facefolds_core.rendering.effects import added_colours, to_eye
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.asset.test_track import TRACK
 from tests.assets import SOURCE, make_asset
@@ -97,23 +96,6 @@ def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_p
     assert psnr(plain, expected) < 25  # the reflection is strong enough to be seen in this test
 
 
-def test_view_effects_follow_the_format(new_player: NewPlayer, rich: Path) -> None:
-    asset = read_asset(rich)
-    player = new_player({"asset": asset.folder})
-    player.open("asset")
-    player.wait("e.level === 'full'")
-    player.run("e.background = v", GREY)
-    camera = five_cameras(SIZE)[1]
-    maps, hits = asset.effects(), AssetCaster(asset).cast(camera)
-    assert maps is not None
-    expected, _ = composite(hits, asset.frame(0), (GREY_VALUE,) * 3, added_colours(hits, to_eye(camera), maps))
-    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
-    player.run("e.effects = false")
-    plain = expected_pictures(asset, [camera], [0])[camera.name, 0]
-    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
-    assert psnr(plain, expected) < 30  # the effects are strong enough to be seen in this test
-
-
 def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
     asset = read_asset(tmp_path / "asset")
@@ -128,3 +110,26 @@ def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path
     player.run("e.still = true")
     assert psnr(player.capture(camera)[..., :3], at_rest) >= AGREE
     assert psnr(moved, at_rest) < 25  # the motion is large enough to be seen in this test
+
+
+def test_the_light_stays_with_the_room_where_the_head_turns(new_player: NewPlayer, tmp_path: Path) -> None:
+    """Also where the head is held still: the room turns around it."""
+    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    add_reflection(tmp_path / "asset")
+    asset, camera = read_asset(tmp_path / "asset"), five_cameras(SIZE)[1]
+    maps, textures = asset.reflection(), asset.frame(2)
+    assert maps is not None and asset.track is not None
+    room, windows = asset.track.at(2).rotation, asset.full.windows
+    player = new_player({"asset": asset.folder})
+    player.open("asset")
+    player.run("e.background = v", GREY)
+    assert player.run("return await e.seek(v)", 2)
+    for still in (False, True):
+        player.run("e.still = v", still)
+        seen_by = camera if still else asset.camera_in_head(camera, 2)
+        hits = AssetCaster(asset).cast(seen_by)
+        grey = (GREY_VALUE,) * 3
+        expected, _ = composite(hits, textures, grey, reflected_colours(hits, seen_by, windows, maps, room))
+        along, _ = composite(hits, textures, grey, reflected_colours(hits, seen_by, windows, maps))
+        assert psnr(player.capture(camera)[..., :3], expected) >= AGREE, still
+        assert psnr(along, expected) < 36  # light that turns with the head is another picture

@@ -1,10 +1,10 @@
-/** Loads one level of detail: its meshes, its view effects and the video with its first picture. */
+/** Loads one level of detail: its meshes, its reflection and the video with its first picture. */
 import { PlayerError } from "./errors.js";
 import { decodeMesh } from "./meshes.js";
 
 /**
  * @typedef {{info: import("./manifest.js").Level, geometries: import("./meshes.js").Geometry[],
- *   effects: ImageBitmap | null, reflection: ImageBitmap | null, source: import("./video/open.js").FrameSource,
+ *   reflection: ImageBitmap | null, source: import("./video/open.js").FrameSource,
  *   video: import("./manifest.js").VideoEntry, dispose: () => void}} LoadedLevel
  * @param {import("./manifest.js").Level} info
  * @param {import("./files.js").Files} files
@@ -13,21 +13,27 @@ import { decodeMesh } from "./meshes.js";
  * @returns {Promise<LoadedLevel>}
  */
 export async function loadLevel(info, files, onVideoError, refused) {
-  const [geometries, effects, opened, reflection] = await allOrNothing([
-    Promise.all(info.layers.map(async (layer) => {
-      const buffer = await files.bytes(layer.mesh);
-      return decodeMesh(buffer, layer, files.address(layer.mesh.name));
-    })),
-    info.effects ? loadPicture(info.effects.file, files) : null,
+  const [geometries, opened, reflection] = await allOrNothing([
+    loadMeshes(info, files),
     import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused)),
     info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
   const dispose = () => {
-    effects?.close();
     reflection?.close();
     opened.source.close();
   };
-  return { info, geometries, effects, reflection, source: opened.source, video: opened.video, dispose };
+  return { info, geometries, reflection, source: opened.source, video: opened.video, dispose };
+}
+
+/** Each file once; the layers' meshes are parts of them. */
+async function loadMeshes({ meshes, layers }, files) {
+  const buffers = new Map(meshes.map((entry) => [entry.name, files.bytes(entry)]));
+  return Promise.all(
+    layers.map(async (layer) => {
+      const { name, offset, bytes } = layer.mesh;
+      return decodeMesh((await buffers.get(name)).slice(offset, offset + bytes), layer, files.address(name));
+    }),
+  );
 }
 
 /** Like Promise.all, but a video opened in vain is closed. */
@@ -35,7 +41,7 @@ async function allOrNothing(work) {
   const done = await Promise.allSettled(work);
   const failed = done.find(({ status }) => status === "rejected");
   if (!failed) return done.map(({ value }) => value);
-  done[2].value?.source.close();
+  done[1].value?.source.close();
   throw failed.reason;
 }
 
@@ -58,6 +64,6 @@ export function gpuBytes(level) {
   let bytes = 4 * level.info.texture.width * level.info.texture.height;
   for (const { index, position, uv } of level.geometries)
     bytes += index.byteLength + position.byteLength + uv.byteLength;
-  for (const image of [level.effects, level.reflection]) if (image) bytes += 4 * image.width * image.height;
-  return bytes;
+  const image = level.reflection;
+  return bytes + (image ? 4 * image.width * image.height : 0);
 }

@@ -7,7 +7,7 @@
  */
 import { Graphics } from "./gl/graphics.js";
 import { Upload } from "./gl/upload.js";
-import { eyeOf, multiplied, transformed } from "./matrices.js";
+import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
@@ -20,6 +20,7 @@ export class LayerRenderer {
     this.context = canvas.getContext("2d");
     this.level = null;
     this.pose = null;
+    this.turn = null;
     this.upload = null;
     this.visible = [];
     this.effectsOn = true;
@@ -50,9 +51,14 @@ export class LayerRenderer {
     this.upload.show(image);
   }
 
-  /** Where the head stands from the next picture on. @param {import("./matrices.js").Matrix | null} matrix null: at rest */
-  setPose(matrix) {
-    this.pose = matrix;
+  /**
+   * Where the head stands from the next picture on.
+   * @param {import("./matrices.js").Matrix | null} matrix null: at rest
+   * @param {boolean} held it is drawn at rest; the light of the room turns around it
+   */
+  setPose(matrix, held) {
+    this.pose = held ? null : matrix;
+    this.turn = matrix;
   }
 
   /** After a lost context came back. The frame has to be given again. */
@@ -199,13 +205,11 @@ export class LayerRenderer {
     const { level, upload } = this;
     const { gl } = this.graphics;
     const head = "#version 300 es\n";
-    const defines = (upload.effects ? "#define EFFECTS 1\n" : "") + (upload.reflection ? "#define REFLECTION 1\n" : "");
+    const defines = upload.reflection ? "#define REFLECTION 1\n" : "";
     const colour = prepared(COLOUR_FRAGMENT.replace(head, head + defines));
     const { at } = colour;
-    gl.activeTexture(gl.TEXTURE2);
-    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, upload.effects);
+    gl.bindTexture(gl.TEXTURE_2D, upload.reflection);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
@@ -213,17 +217,19 @@ export class LayerRenderer {
     const { centre, radius } = this.bounds();
     const away = Math.hypot(...centre.map((v, i) => v - eye[i]));
     gl.uniform2f(at.range, away - radius, away + radius);
-    if (upload.effects) {
-      gl.uniform1i(at.effects, 1);
-      gl.uniform1f(at.effectsScale, this.effectsOn ? level.info.effects.scale : 0);
-    }
     if (upload.reflection) {
       const { environment, gloss, offset, normals, scales } = level.info.reflection;
-      gl.uniform1i(at.reflection, 2);
+      gl.uniform1i(at.reflection, 1);
       gl.uniform4fv(at.environmentRect, environment);
       gl.uniform4fv(at.glossRect, gloss);
       gl.uniform4fv(at.offsetRect, offset);
       gl.uniform4fv(at.normalsRect, normals);
+      const m = this.turn ?? IDENTITY;
+      gl.uniformMatrix3fv(
+        at.toRoom,
+        false,
+        [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => m[i]),
+      );
       gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
     }
     return colour;
@@ -237,12 +243,6 @@ export class LayerRenderer {
     gl.uniform4f(at.colourRect, cx + x, cy + y, w, h);
     gl.uniform2f(at.alphaOffset, ax - cx, ay - cy);
     if (info.reflection) gl.uniform4fv(at.toMaps, toWindow(info.layers[index].window, info.reflection.window));
-    if (!this.upload.effects) return;
-    const [ex, ey, ew, eh] = info.layers[index].effectsRect;
-    gl.uniform4fv(
-      at.planes,
-      info.effects.planes.flatMap(([px, py]) => [px + ex, py + ey, ew, eh]),
-    );
   }
 
   /**

@@ -34,11 +34,6 @@ uniform vec2 alphaOffset; // from its colour to its alpha
 uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 uniform int kind; // of KINDS
 uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
-#ifdef EFFECTS
-uniform sampler2D effects;
-uniform vec4 planes[3]; // of this layer within each plane, pixels of the effects' picture
-uniform float effectsScale; // 0: off
-#endif
 #ifdef REFLECTION
 uniform sampler2D reflection;
 uniform vec4 environmentRect; // of the reflection's picture, pixels; so are the next three
@@ -47,6 +42,7 @@ uniform vec4 offsetRect;
 uniform vec4 normalsRect;
 uniform vec3 reflectionScales; // of environment, gloss, offset; all 0: off
 uniform vec4 toMaps; // (s, t) of this layer -> that of the maps: times xy, plus zw
+uniform mat3 toRoom; // from the meshes' own axes to those of the room, which the light is fixed to
 #endif
 in vec2 st;
 in vec3 point;
@@ -66,7 +62,7 @@ vec3 reflected() {
   vec2 at = st * toMaps.xy + toMaps.zw;
   vec3 normal = normalize(lookAt(reflection, normalsRect, at).rgb * 2.0 - 1.0);
   vec3 along = normalize(point - eye);
-  vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+  vec3 r = toRoom * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   vec3 light = lookAt(reflection, environmentRect, place).rgb * reflectionScales.x;
   float gloss = lookAt(reflection, glossRect, at).r * reflectionScales.y;
@@ -77,15 +73,6 @@ vec3 reflected() {
 void main() {
   vec3 colour = look(picture, colourRect, vec2(0.0)).rgb;
   float alpha = look(picture, colourRect, alphaOffset).r;
-#ifdef EFFECTS
-  if (effectsScale > 0.0) {
-    vec3 toEye = normalize(eye - point);
-    for (int k = 0; k < 3; ++k) {
-      colour += toEye[k] * effectsScale * (look(effects, planes[k], vec2(0.0)).rgb * 2.0 - 1.0);
-    }
-    colour = clamp(colour, 0.0, 1.0);
-  }
-#endif
 #ifdef REFLECTION
   colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif

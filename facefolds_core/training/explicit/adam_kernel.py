@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numba import prange
 
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.training.adam import EPSILON
 
 
@@ -13,11 +16,17 @@ from facefolds_core.training.adam import EPSILON
 def activate(colour, layers, frame_colour, frame_alpha, out):  # type: ignore[no-untyped-def]
     """(M, 3), (M, N, 4), (M, 3), (M, N) -> out (M, N, 4): rgb and alpha in [0, 1], see `GridTextures`."""
     for k in prange(layers.shape[0]):
-        for n in range(layers.shape[1]):
-            for q in range(3):
-                value = colour[k, q] + frame_colour[k, q] + layers[k, n, q]
-                out[k, n, q] = min(max(value, np.float32(0.0)), np.float32(1.0))
-            out[k, n, 3] = 1 / (1 + np.exp(-(layers[k, n, 3] + frame_alpha[k, n])))
+        activate_texel(k, colour, layers, frame_colour, frame_alpha, out)
+
+
+@compiled
+def activate_texel(k: Any, colour: Any, layers: Any, frame_colour: Any, frame_alpha: Any, out: Any) -> None:
+    """`activate` of all layers of texel k."""
+    for n in range(layers.shape[1]):
+        for q in range(3):
+            value = colour[k, q] + frame_colour[k, q] + layers[k, n, q]
+            out[k, n, q] = min(max(value, np.float32(0.0)), np.float32(1.0))
+        out[k, n, 3] = 1 / (1 + math.exp(-(layers[k, n, 3] + frame_alpha[k, n])))
 
 
 @inlined
@@ -25,7 +34,7 @@ def _adam(values, first, second, index, g, rate, correct1, correct2, keep, decay
     """One Adam step on values[index], then shrinking by `keep`."""
     first[index] = decay[0] * first[index] + decay[1] * g
     second[index] = decay[2] * second[index] + decay[3] * g * g
-    step = rate * (first[index] * correct1) / (np.sqrt(second[index] * correct2) + np.float32(EPSILON))
+    step = rate * (first[index] * correct1) / (math.sqrt(second[index] * correct2) + np.float32(EPSILON))
     values[index] = (values[index] - step) * keep
 
 
@@ -43,40 +52,51 @@ def adam_step(  # type: ignore[no-untyped-def]
     decay,  # (4,) of `adam.decays`
 ):
     """Adam on the texels that the rays have met; the others stay as they are, moments included."""
-    count, layers_n = layers.shape[1], layers.shape[2]
     colour0, colour1, colour2 = colour[0], colour[1], colour[2]
     layers0, layers1, layers2 = layers[0], layers[1], layers[2]
     frame0, frame1, frame2 = frame_colour[0], frame_colour[1], frame_colour[2]
     fade0, fade1, fade2 = frame_alpha[0], frame_alpha[1], frame_alpha[2]
+    for k in prange(layers.shape[1]):
+        static = (colour0, colour1, colour2), (layers0, layers1, layers2)
+        own = (frame0, frame1, frame2), (fade0, fade1, fade2)
+        adam_texel(k, static, own, texture, gradient, rates, keep, correct, decay)
+
+
+@compiled
+def adam_texel(
+    k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, keep: Any, correct: Any, decay: Any
+) -> None:
+    """`adam_step` of texel k; static and own are values and moments of its first four arguments."""
+    (colour0, colour1, colour2), (layers0, layers1, layers2) = static
+    (frame0, frame1, frame2), (fade0, fade1, fade2) = own
     one = np.float32(1.0)
+    sum0 = np.float32(0.0)
+    sum1 = np.float32(0.0)
+    sum2 = np.float32(0.0)
+    met = False
     # The clamp passes the gradient on: a colour at its border can come back.
-    for k in prange(count):
-        sum0 = np.float32(0.0)
-        sum1 = np.float32(0.0)
-        sum2 = np.float32(0.0)
-        met = False
-        for n in range(layers_n):
-            g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
-            if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
-                continue
-            for q in range(4):
-                gradient[n, k, q] = 0
-            met = True
-            sum0 += g0
-            sum1 += g1
-            sum2 += g2
-            for q in range(3):
-                g = g0 if q == 0 else (g1 if q == 1 else g2)
-                _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one, decay)
-            alpha = texture[k, n, 3]
-            g = g3 * alpha * (1 - alpha)
-            _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one, decay)
-            layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
-            _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep, decay)
-        if not met:
+    for n in range(layers0.shape[1]):
+        g0, g1, g2, g3 = gradient[n, k, 0], gradient[n, k, 1], gradient[n, k, 2], gradient[n, k, 3]
+        if g0 == 0 and g1 == 0 and g2 == 0 and g3 == 0:
             continue
+        for q in range(4):
+            gradient[n, k, q] = 0
+        met = True
+        sum0 += g0
+        sum1 += g1
+        sum2 += g2
         for q in range(3):
-            g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
-            _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one, decay)
-            colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
-            _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep, decay)
+            g = g0 if q == 0 else (g1 if q == 1 else g2)
+            _adam(layers0, layers1, layers2, (k, n, q), g, rates[1], correct[0], correct[1], one, decay)
+        alpha = texture[k, n, 3]
+        g = g3 * alpha * (1 - alpha)
+        _adam(layers0, layers1, layers2, (k, n, 3), g, rates[2], correct[0], correct[1], one, decay)
+        layers0[k, n, 3] = min(max(layers0[k, n, 3], np.float32(-9.0)), np.float32(9.0))
+        _adam(fade0, fade1, fade2, (k, n), g, rates[4], correct[2], correct[3], keep, decay)
+    if not met:
+        return
+    for q in range(3):
+        g = sum0 if q == 0 else (sum1 if q == 1 else sum2)
+        _adam(colour0, colour1, colour2, (k, q), g, rates[0], correct[0], correct[1], one, decay)
+        colour0[k, q] = min(max(colour0[k, q], np.float32(0.0)), one)
+        _adam(frame0, frame1, frame2, (k, q), g, rates[3], correct[2], correct[3], keep, decay)

@@ -103,67 +103,92 @@ def _shade(
     index: Any,
     wish: Any,
 ) -> Any:
-    """A block of R rays: texels before their crossings (N, R), -1 where there is none, and what is wanted there
-    (N, R, 6): fractions of row and column, gradient of rgba. Returns the sum of |C - I|^2."""
-    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    opacity_weight, binarisation_weight, rate, min_alpha, min_light = terms
-    one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
-    layer = np.empty(layers, np.int64)
-    c = np.empty((layers, 4), np.float32)
-    before = np.empty(layers, np.float32)
+    """A block of R rays, see `shade_ray`. Returns the sum of |C - I|^2."""
+    layers = texture.shape[2]
+    own = (np.empty(layers, np.int64), np.empty((layers, 4), np.float32), np.empty(layers, np.float32))
     added = np.empty(3, np.float32)
     total = 0.0
     for k in range(rays.shape[0]):
-        p = rays[k]
-        transmittance, r0, r1, r2 = one, zero, zero, zero
-        for q in range(3):
-            added[q] = shine[p, q] if shine.shape[0] > 0 else zero
-        m = 0
-        for n in range(layers):
-            index[n, k] = -1
-        for n in range(layers):
-            if codes[p, n, 0] == 0:
-                continue
-            j, b = corner(codes[p, n, 0], width)
-            i, a = corner(codes[p, n, 1], height)
-            alpha = rgba_tap(texture, i, j, n, 3, a, b)
-            if alpha < min_alpha:
-                continue
-            index[n, k] = i * width + j
-            wish[n, k, 0], wish[n, k, 1] = a, b
-            for q in range(3):
-                c[m, q] = rgba_tap(texture, i, j, n, q, a, b) + added[q]
-            c[m, 3] = alpha
-            layer[m], before[m] = n, transmittance
-            light = transmittance * alpha
-            r0 += light * c[m, 0]
-            r1 += light * c[m, 1]
-            r2 += light * c[m, 2]
-            transmittance *= one - alpha
-            m += 1
-            if transmittance < min_light:
-                break
-        cam, pix = camera[p], pixel[p]
-        s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
-        d0 = r0 + transmittance * s0 - images[cam, pix, 0] * inverse
-        d1 = r1 + transmittance * s1 - images[cam, pix, 1] * inverse
-        d2 = r2 + transmittance * s2 - images[cam, pix, 2] * inverse
-        total += d0 * d0 + d1 * d1 + d2 * d2
-        step = rate * transmittance * transmittance * transmittance
-        background[cam, pix, 0] = min(max(s0 - step * d0, zero), one)
-        background[cam, pix, 1] = min(max(s1 - step * d1, zero), one)
-        background[cam, pix, 2] = min(max(s2 - step * d2, zero), one)
-        # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
-        push = opacity_weight - binarisation_weight * max(one - 2 * transmittance, zero)
-        rest = one
-        for q in range(m - 1, -1, -1):
-            n, alpha, light = layer[q], c[q, 3], before[q]
-            g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
-            wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
-            wish[n, k, 5] = light * (d0 * g0 + d1 * g1 + d2 * g2 + push * rest)
-            rest *= one - alpha
-            s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+        total += shade_ray(
+            k, rays[k], codes, camera, pixel, images, background, texture, shine, terms, index, wish, own, added
+        )
     return total
+
+
+@compiled
+def shade_ray(
+    k: Any,
+    p: Any,
+    codes: Any,
+    camera: Any,
+    pixel: Any,
+    images: Any,
+    background: Any,
+    texture: Any,
+    shine: Any,
+    terms: Any,
+    index: Any,
+    wish: Any,
+    own: Any,
+    added: Any,
+) -> Any:
+    """Ray p of `shade`, number k of its block: the texels before its crossings in index (N, R), -1 where there is none,
+    and what is wanted there in wish (N, R, 6): fractions of row and column, gradient of rgba. Returns |C - I|^2.
+
+    Scratch: own, arrays (N,) int64, (N, 4) and (N,); added (3,).
+    """
+    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
+    opacity_weight, binarisation_weight, rate, min_alpha, min_light = terms
+    one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
+    layer, c, before = own
+    transmittance, r0, r1, r2 = one, zero, zero, zero
+    for q in range(3):
+        added[q] = shine[p, q] if shine.shape[0] > 0 else zero
+    m = 0
+    for n in range(layers):
+        index[n, k] = -1
+    for n in range(layers):
+        if codes[p, n, 0] == 0:
+            continue
+        j, b = corner(codes[p, n, 0], width)
+        i, a = corner(codes[p, n, 1], height)
+        alpha = rgba_tap(texture, i, j, n, 3, a, b)
+        if alpha < min_alpha:
+            continue
+        index[n, k] = i * width + j
+        wish[n, k, 0], wish[n, k, 1] = a, b
+        for q in range(3):
+            c[m, q] = rgba_tap(texture, i, j, n, q, a, b) + added[q]
+        c[m, 3] = alpha
+        layer[m], before[m] = n, transmittance
+        light = transmittance * alpha
+        r0 += light * c[m, 0]
+        r1 += light * c[m, 1]
+        r2 += light * c[m, 2]
+        transmittance *= one - alpha
+        m += 1
+        if transmittance < min_light:
+            break
+    cam, pix = camera[p], pixel[p]
+    s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
+    d0 = r0 + transmittance * s0 - images[cam, pix, 0] * inverse
+    d1 = r1 + transmittance * s1 - images[cam, pix, 1] * inverse
+    d2 = r2 + transmittance * s2 - images[cam, pix, 2] * inverse
+    step = rate * transmittance * transmittance * transmittance
+    background[cam, pix, 0] = min(max(s0 - step * d0, zero), one)
+    background[cam, pix, 1] = min(max(s1 - step * d1, zero), one)
+    background[cam, pix, 2] = min(max(s2 - step * d2, zero), one)
+    # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
+    push = opacity_weight - binarisation_weight * max(one - 2 * transmittance, zero)
+    rest = one
+    for q in range(m - 1, -1, -1):
+        n, alpha, light = layer[q], c[q, 3], before[q]
+        g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
+        wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
+        wish[n, k, 5] = light * (d0 * g0 + d1 * g1 + d2 * g2 + push * rest)
+        rest *= one - alpha
+        s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+    return d0 * d0 + d1 * d1 + d2 * d2
 
 
 @kernel(parallel=True)
@@ -173,29 +198,41 @@ def contributions(codes, rays, texture, peak, min_light):  # type: ignore[no-unt
     codes (P, N, 2) as above, rays (R,) which of them to look at, texture (H, W, N, 4); peak (N, H, W) float32 is raised
     to what is found. Nothing is added behind less transmittance than `min_light`.
     """
-    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    count = rays.shape[0]
+    layers, count = texture.shape[2], rays.shape[0]
     before = np.empty((layers, CHUNK), np.float32)
     for start in range(0, count, CHUNK):
         own = min(CHUNK, count - start)
         for k in prange(own):
-            p = rays[start + k]
-            transmittance = np.float32(1.0)
-            for n in range(layers):
-                before[n, k] = transmittance if transmittance >= min_light else np.float32(0.0)
-                if codes[p, n, 0] > 0 and transmittance >= min_light:
-                    j, b = corner(codes[p, n, 0], width)
-                    i, a = corner(codes[p, n, 1], height)
-                    transmittance *= 1 - rgba_tap(texture, i, j, n, 3, a, b)
+            light_before(k, rays[start + k], codes, texture, before, min_light)
         for task in prange(layers):
             n = spread(task, layers)
             for k in range(own):
                 p = rays[start + k]
                 if codes[p, n, 0] == 0 or before[n, k] == 0:
                     continue
-                j, b = corner(codes[p, n, 0], width)
-                i, a = corner(codes[p, n, 1], height)
                 for tap in range(4):
-                    di, dj = tap >> 1, tap & 1
-                    w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]
-                    peak[n, i + di, j + dj] = max(peak[n, i + di, j + dj], before[n, k] * w)
+                    i, j, share = tap_share(codes, p, n, tap, texture)
+                    peak[n, i, j] = max(peak[n, i, j], before[n, k] * share)
+
+
+@compiled
+def light_before(k: Any, p: Any, codes: Any, texture: Any, before: Any, min_light: Any) -> None:
+    """Transmittances of ray p before each layer into before[:, k], 0 for less than `min_light`."""
+    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
+    transmittance = np.float32(1.0)
+    for n in range(layers):
+        before[n, k] = transmittance if transmittance >= min_light else np.float32(0.0)
+        if codes[p, n, 0] > 0 and transmittance >= min_light:
+            j, b = corner(codes[p, n, 0], width)
+            i, a = corner(codes[p, n, 1], height)
+            transmittance *= 1 - rgba_tap(texture, i, j, n, 3, a, b)
+
+
+@inlined
+def tap_share(codes, p, n, tap, texture):  # type: ignore[no-untyped-def]
+    """Row and column of one of four texels around the crossing of ray p with layer n; bilinear weight times alpha."""
+    j, b = corner(codes[p, n, 0], texture.shape[1])
+    i, a = corner(codes[p, n, 1], texture.shape[0])
+    di, dj = tap >> 1, tap & 1
+    w = (a if di else 1 - a) * (b if dj else 1 - b) * texture[i + di, j + dj, n, 3]
+    return i + di, j + dj, w

@@ -6,12 +6,14 @@ that shows each camera its own picture. `smooth` is compiled for CPUs, `smooth_r
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 from numba import prange
 from torch import Tensor
 
-from facefolds_core.jit import kernel
+from facefolds_core.jit import compiled, kernel
 
 
 @kernel(parallel=True)
@@ -24,19 +26,30 @@ def smooth(values, height, width):  # type: ignore[no-untyped-def]
     Returns:
         the same of the means.
     """
-    count = values.shape[1]
     out = np.empty_like(values)
     for i in prange(height):
-        above, below = max(i - 1, 0) * width, min(i + 1, height - 1) * width
-        rows = np.empty((width, count), np.float32)
+        rows = np.empty((width, values.shape[1]), np.float32)
         for j in range(width):
-            for n in range(count):
-                rows[j, n] = values[above + j, n] + values[i * width + j, n] + values[below + j, n]
+            column_sum(i, j, values, height, width, rows[j])
         for j in range(width):
-            left, right = max(j - 1, 0), min(j + 1, width - 1)
-            for n in range(count):
-                out[i * width + j, n] = (rows[left, n] + rows[j, n] + rows[right, n]) * np.float32(1 / 9)
+            left, right = rows[max(j - 1, 0)], rows[min(j + 1, width - 1)]
+            mean(left, rows[j], right, out[i * width + j])
     return out
+
+
+@compiled
+def column_sum(i: Any, j: Any, values: Any, height: Any, width: Any, out: Any) -> None:
+    """out (N,): sum over texel (i, j), the one above, and the one below."""
+    above, below = max(i - 1, 0) * width + j, min(i + 1, height - 1) * width + j
+    for n in range(values.shape[1]):
+        out[n] = values[above, n] + values[i * width + j, n] + values[below, n]
+
+
+@compiled
+def mean(left: Any, middle: Any, right: Any, out: Any) -> None:
+    """out (N,): mean of nine texels of which the sums of threes are given."""
+    for n in range(out.shape[0]):
+        out[n] = (left[n] + middle[n] + right[n]) * np.float32(1 / 9)
 
 
 def smooth_reference(values: Tensor, height: int, width: int) -> Tensor:

@@ -27,6 +27,7 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     Raises:
         UserError: see `VolumeFit`.
     """
+    params = in_ball(scene.radius, params)
     plain, notes = VolumeFit(scene, params, outer=False), list[Fact]()
     plain.run(0, bar)
     if plain.psnr < params.room.needed_below:
@@ -40,6 +41,14 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
+
+
+def in_ball(radius: float | None, params: ExplicitParams) -> ExplicitParams:
+    """The parameters for a subject whose ball is given, units: no other is tried. None leaves them as they are."""
+    if radius is None:
+        return params
+    volume = params.volume.model_copy(update={"reach": radius})
+    return params.model_copy(update={"volume": volume, "subject": params.subject.model_copy(update={"larger": ()})})
 
 
 def _with_room(scene: Scene, params: ExplicitParams, bar: tqdm, notes: list[Fact]) -> Volume:

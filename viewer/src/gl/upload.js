@@ -1,4 +1,4 @@
-/** What a level has on the graphics card: vertex arrays, the picture's texture and those of view effects and reflection. */
+/** What a level has on the graphics card: vertex arrays, the textures of the picture and the reflection. */
 
 export class Upload {
   /** @param {WebGL2RenderingContext} gl @param {import("../levels.js").LoadedLevel} level */
@@ -6,7 +6,6 @@ export class Upload {
     this.gl = gl;
     this.layers = level.geometries.map((geometry) => this.#layer(geometry));
     this.picture = this.#texture();
-    this.effects = level.effects ? this.#texture(level.effects) : null;
     this.reflection = level.reflection ? this.#texture(level.reflection) : null;
   }
 
@@ -88,7 +87,6 @@ export class Upload {
       for (const buffer of buffers) gl.deleteBuffer(buffer);
     }
     gl.deleteTexture(this.picture);
-    if (this.effects) gl.deleteTexture(this.effects);
     if (this.reflection) gl.deleteTexture(this.reflection);
   }
 }

@@ -1,4 +1,4 @@
-/** The settings: detail, what is shown, background, layers, pull apart, wireframe, view effects, statistics. */
+/** The settings: detail, what is shown, background, layers, pull apart, wireframe, reflection, statistics. */
 import { hexOf } from "../colours.js";
 
 const ASIDE = 55; // degrees: from where layers that are pulled apart are seen
@@ -33,7 +33,7 @@ export function connectPanel(element) {
     const names = [...levels].reverse().map((name) => new Option(name, name));
     input("level").replaceChildren(new Option(`auto (${element.level})`, "auto"), ...names);
     input("level").disabled = levels.length < 2;
-    input("effects").closest(".row").hidden = !(player.level.info.effects || player.level.info.reflection);
+    input("effects").closest(".row").hidden = !player.level.info.reflection;
     const one = (name, layer) => `<button type="button" data-layer="${layer}" class="${layer}">${name}</button>`;
     const chips = element.layers.map((_, i) => one(String(i + 1), i));
     panel.querySelector(".layers div").innerHTML = [...chips, one("All", "all")].join("");

@@ -1,0 +1,147 @@
+"""Assets as OpenUSD: what the checker says of the stage, and what the stage says of the asset."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.engines.usd import STAGE, write_usd
+from facefolds_core.errors import UserError
+from tests.assets import make_asset
+from tests.engines.tracks import with_track
+
+if importlib.util.find_spec("pxr") is None:
+    pytest.skip("no usd-core: pip install 'facefolds[usd]'", allow_module_level=True)
+
+FRAMES = 3
+
+
+@pytest.fixture(scope="module")
+def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    folder = tmp_path_factory.mktemp("caps") / "asset"
+    make_asset(folder, layers=3, frames=FRAMES, resolution=64)
+    return read_asset(folder)
+
+
+@pytest.fixture(scope="module")
+def exported(caps: Asset) -> Path:
+    write_usd(caps.folder.parent / "usd", caps.full, "caps")
+    return caps.folder.parent / "usd"
+
+
+def complaints(file: Path) -> list[str]:
+    """Of all checks that usdchecker makes."""
+    from pxr import Usd, UsdValidation
+
+    checks = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(checks).Validate(Usd.Stage.Open(str(file)))
+    return [error.GetErrorAsString() for error in errors]
+
+
+def opened(file: Path) -> Any:
+    from pxr import Usd
+
+    return Usd.Stage.Open(str(file))
+
+
+def test_the_checker_finds_nothing(exported: Path) -> None:
+    assert complaints(exported / STAGE) == []
+
+
+def test_the_checker_finds_a_missing_picture(exported: Path, tmp_path: Path) -> None:
+    (tmp_path / STAGE).write_bytes((exported / STAGE).read_bytes())
+    assert any("frame_00000.jpg" in line for line in complaints(tmp_path / STAGE))
+
+
+def test_a_package_is_whole(caps: Asset, tmp_path: Path) -> None:
+    write_usd(tmp_path / "face.usdz", caps.full, "caps")
+    assert complaints(tmp_path / "face.usdz") == []
+    assert [path.name for path in tmp_path.iterdir()] == ["face.usdz"]
+
+
+def test_the_stage_says_axes_units_and_time(exported: Path) -> None:
+    from pxr import UsdGeom
+
+    stage = opened(exported / STAGE)
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    assert (stage.GetTimeCodesPerSecond(), stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (30, 0, FRAMES - 1)
+
+
+def test_the_subject_looks_along_z_with_y_up(exported: Path) -> None:
+    from pxr import Gf, UsdGeom
+
+    stage = opened(exported / STAGE)  # a prim lives as long as its stage
+    turned = UsdGeom.XformCache().GetLocalToWorldTransform(stage.GetPrimAtPath("/Face/Head"))
+    ways = [tuple(turned.TransformDir(Gf.Vec3d(*axis))) for axis in np.eye(3).tolist()]
+    assert ways == [(0, 0, 1), (1, 0, 0), (0, 1, 0)]  # forward, left, up
+
+
+def test_layers_have_their_order(exported: Path) -> None:
+    stage = opened(exported / STAGE)
+    meshes = [prim for prim in stage.Traverse() if prim.GetTypeName() == "Mesh"]
+    assert [prim.GetAttribute("primvars:facefolds:layer").Get() for prim in meshes] == [2, 1, 0]
+
+
+def looked_up(picture: NDArray[Any], st: NDArray[Any]) -> NDArray[np.float64]:
+    """Bilinear, v up: (V, 3) in [0, 1]."""
+    height, width = picture.shape[:2]
+    x, y = st[:, 0] * width - 0.5, (1 - st[:, 1]) * height - 0.5
+    j, i = np.floor(x).astype(int), np.floor(y).astype(int)
+    a, b = (x - j)[:, None], (y - i)[:, None]
+    p = picture / 255.0
+    return (1 - b) * ((1 - a) * p[i, j] + a * p[i, j + 1]) + b * ((1 - a) * p[i + 1, j] + a * p[i + 1, j + 1])
+
+
+def shader_input(stage: Any, path: str, name: str) -> Any:
+    from pxr import UsdShade
+
+    return UsdShade.Shader(stage.GetPrimAtPath(path)).GetInput(name)
+
+
+@pytest.mark.parametrize("frame", range(FRAMES))
+def test_vertices_find_the_colour_and_alpha_of_their_frame(caps: Asset, exported: Path, frame: int) -> None:
+    stage, textures = opened(exported / STAGE), caps.frame(frame)
+    for index, mesh in enumerate(caps.layers):
+        inner = ((mesh.st > 0.1) & (mesh.st < 0.9)).all(1)
+        h, w = textures[index].shape[:2]
+        flat = np.stack([mesh.st[:, 0], 1 - mesh.st[:, 1]], 1)[inner]
+        expected = looked_up(textures[index], flat)
+        assert (h, w) == tuple(reversed(caps.full.entry.layers[index].texture_rect[2:]))
+        for name, primvar, channels in (("colour", "st", slice(0, 3)), ("alpha", "st_alpha", slice(3, 4))):
+            file = shader_input(stage, f"/Face/Materials/layer_{index:02d}/{name}", "file").Get(frame)
+            picture = np.asarray(Image.open(file.resolvedPath).convert("RGB"))
+            st = np.array(
+                stage.GetPrimAtPath(f"/Face/Head/layer_{index:02d}").GetAttribute(f"primvars:{primvar}").Get()
+            )
+            found = looked_up(picture, st[inner])[:, : expected[:, channels].shape[1]]
+            assert np.abs(found - expected[:, channels]).max() < 0.04, (index, name)
+
+
+def test_a_head_that_moves_has_its_pose_in_each_frame(caps: Asset, tmp_path: Path) -> None:
+    from pxr import Gf, UsdGeom
+
+    level = with_track(caps.full)
+    write_usd(tmp_path / "usd", level, "caps")
+    stage = opened(tmp_path / "usd" / STAGE)
+    head = stage.GetPrimAtPath("/Face/Head")
+    assert level.track is not None
+    for frame in range(FRAMES):
+        pose = level.track.at(frame)
+        moved = UsdGeom.Xformable(head).GetLocalTransformation(frame)
+        found = np.array(moved.Transform(Gf.Vec3d(0.1, 0.2, 0.3)))
+        np.testing.assert_allclose(found, pose.apply(np.array([0.1, 0.2, 0.3])), atol=1e-6)
+
+
+def test_a_folder_with_other_files_is_left_alone(caps: Asset, tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("mine")
+    with pytest.raises(UserError, match="not empty"):
+        write_usd(tmp_path, caps.full, "caps")
+    assert (tmp_path / "precious").is_file()

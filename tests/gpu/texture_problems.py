@@ -1,0 +1,128 @@
+"""Of the texture steps' kernels, with the settings that `fast` trains with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.adam import decays
+from facefolds_core.training.explicit import adam_kernel, kernels_gpu, shading_kernel, smoothing
+from tests.gpu.problem import Problem
+
+FAST = ExplicitParams()
+RAYS, LAYERS, SHAPE = 60, FAST.layers, (9, 7)
+TEXELS = SHAPE[0] * SHAPE[1]
+
+
+def shading(late: bool, shining: bool) -> Problem:
+    """A step of the rounds of geometry, or one of those after them; a third of the alphas is faint."""
+    rng = np.random.default_rng(0)
+    losses, textures = FAST.losses, FAST.textures
+    codes = rng.integers(1, 65536, (RAYS, LAYERS, 2)).astype(np.uint16)
+    codes[rng.random((RAYS, LAYERS)) < 0.2] = 0
+    texture = rng.random((*SHAPE, LAYERS, 4), np.float32)
+    texture[..., 3] *= rng.choice(np.array([0.002, 0.2, 0.9], np.float32), (*SHAPE, LAYERS))
+    weights = (losses.opacity * losses.late_opacity, losses.binarisation) if late else (losses.opacity, 0.0)
+    faint = textures.min_alpha if late else 0.0
+    terms = tuple(np.float32(x) for x in (*weights, FAST.background.rate, faint))
+    arguments = {
+        "codes": codes,
+        "camera": rng.integers(0, 2, RAYS).astype(np.int32),
+        "pixel": rng.permutation(RAYS).astype(np.int32),
+        "rays": np.arange(0, RAYS, 2),
+        "images": rng.integers(0, 256, (2, RAYS, 3)).astype(np.uint8),
+        "background": rng.random((2, RAYS, 3), np.float32),
+        "texture": texture,
+        "shine": rng.random((RAYS if shining else 0, 3), np.float32) * 0.4 - 0.2,
+        "gradient": np.zeros((LAYERS, *SHAPE, 4), np.float32),
+        "terms": (*terms, textures.min_light),
+        "squares": np.zeros(4),
+    }
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        *others, terms, squares = given.values()
+        # Which rays a sum holds is the GPU's affair.
+        for k in range(len(squares)):
+            taken = {**given, "rays": given["rays"][k :: len(squares)]}
+            squares[k] = shading_kernel.shade(*[taken[name] for name in list(given)[: len(others)]], *terms)
+
+    # Worst seen: 1.5e-8, 0, 2e-8 (of 1.7).
+    outputs = {"gradient": 1e-6, "background": 1e-7, "squares": 1e-6}
+    return Problem(kernels_gpu.shade, RAYS // 2, arguments, outputs, on_cpu, {"LAYERS": LAYERS})
+
+
+def contributions() -> Problem:
+    given = shading(True, False).arguments
+    arguments = {name: given[name] for name in ("codes", "rays", "texture")}
+    arguments |= {"peak": np.zeros((LAYERS, *SHAPE), np.float32), "min_light": FAST.textures.min_light}
+    constants = {"LAYERS": LAYERS}
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        shading_kernel.contributions(*given.values())
+
+    return Problem(kernels_gpu.contributions, RAYS // 2, arguments, {"peak": 1e-6}, on_cpu, constants)
+
+
+def _parts(rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Values and moments."""
+    shapes = {"colour": (3,), "layers": (LAYERS, 4), "frame_colour": (3,), "frame_alpha": (LAYERS,)}
+    parts = {name: rng.normal(size=(3, TEXELS, *shape)).astype(np.float32) for name, shape in shapes.items()}
+    for part in parts.values():
+        part[2] = np.abs(part[2])
+    return parts
+
+
+def activation() -> Problem:
+    values = {name: part[0] for name, part in _parts(np.random.default_rng(1)).items()}
+    arguments = {**values, "out": np.zeros((TEXELS, LAYERS, 4), np.float32)}
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        adam_kernel.activate(*given.values())
+
+    return Problem(kernels_gpu.activate, TEXELS, arguments, {"out": 1e-6}, on_cpu)
+
+
+def adam() -> Problem:
+    rng = np.random.default_rng(2)
+    parts = _parts(rng)
+    gradient = rng.normal(size=(LAYERS, TEXELS, 4)).astype(np.float32)
+    gradient[rng.random((LAYERS, TEXELS)) < 0.4] = 0
+    gradient[:, :5] = 0
+    arguments = {
+        **parts,
+        "texture": rng.random((TEXELS, LAYERS, 4), np.float32),
+        "gradient": gradient,
+        "rates": np.array([0.02, 0.006, 0.3, 0.01, 0.15], np.float32),
+        "keep": np.float32(FAST.textures.frame_decay),
+        "correct": np.array([1.5, 2.0, 4.0, 6.0], np.float32),
+        "decay": decays(FAST.textures.betas),
+    }
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        adam_kernel.adam_step(*given.values())
+
+    outputs = dict.fromkeys([*parts, "gradient"], 2e-6)  # worst seen: 5e-7 of 4.2
+    return Problem(kernels_gpu.adam_step, TEXELS, arguments, outputs, on_cpu)
+
+
+def smoothed() -> Problem:
+    values = np.random.default_rng(3).normal(size=(TEXELS, LAYERS)).astype(np.float32)
+    arguments = {"values": values, "height": SHAPE[0], "width": SHAPE[1], "out": np.zeros_like(values)}
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        given["out"][:] = smoothing.smooth(given["values"], given["height"], given["width"])
+
+    return Problem(kernels_gpu.smooth, TEXELS, arguments, {"out": 1e-6}, on_cpu, {"LAYERS": LAYERS})
+
+
+PROBLEMS = {
+    "shading in the rounds": lambda: shading(False, False),
+    "shading of textures": lambda: shading(True, False),
+    "shading with a reflection": lambda: shading(True, True),
+    "contributions": contributions,
+    "activation": activation,
+    "adam of textures": adam,
+    "smoothing": smoothed,
+}
