@@ -9,6 +9,7 @@ click; `make docs` shows it on the first page), hero.zip (both, with the scores 
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -62,8 +63,9 @@ def run_pipeline(folder: Path) -> None:
     Raises:
         UserError: if a stage failed; it has said why.
     """
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     command = [sys.executable, "-m", "dvc", "repro", f"evaluate@{NAME}"]
-    if subprocess.run(command, cwd=folder, check=False).returncode:
+    if subprocess.run(command, cwd=folder, env={**os.environ, "PATH": path}, check=False).returncode:
         raise UserError("the hero was not made", file=folder, remedy="see above, then the same command again")
 
 
