@@ -40,7 +40,7 @@ def test_code_is_left_alone(project_root: Path) -> None:
 
 def test_a_link_to_nothing_is_refused(project_root: Path) -> None:
     with pytest.raises(UserError, match="leads to nothing"):
-        relinked("[x](docs/gone.md)", "README.md", project_root)
+        relinked("[x](gone.md)", "README.md", project_root)
 
 
 def test_the_player_takes_the_place_of_the_readmes_picture(project_root: Path) -> None:
