@@ -208,8 +208,14 @@ def _with_extras(
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(params.poster_side, max(first.width, first.height))
     camera = write_poster(path, manifest, side, params.jpeg_quality)
-    size = {"width": camera.width, "height": camera.height}
-    update["poster"] = Poster(**_stored(path), **size, K=_rows(camera.K), w2c=_rows(camera.w2c), background=BACKGROUND)
+    update["poster"] = Poster(
+        **_stored(path),
+        width=camera.width,
+        height=camera.height,
+        K=_rows(camera.K),
+        w2c=_rows(camera.w2c),
+        background=BACKGROUND,
+    )
     return manifest.model_copy(update=update)
 
 
