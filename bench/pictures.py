@@ -8,19 +8,19 @@ What each was made from stands in docs/images/made.json; report.jpg needs `facef
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
 import typer
 from PIL import Image
 
+from bench.players import chromium
 from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.actor import ActorOptions, camera_at, render
 from facefolds_core.captures.scene import read_scene
+from facefolds_core.cli.render import shrink
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
 from facefolds_core.pictures import open_picture
@@ -59,12 +59,9 @@ def film(subject: Path, out: Path) -> None:
         for index, eye in enumerate(turntable(start, FILM["pictures"], FILM["sweep"])):
             camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
             rgb = renderer.render(camera, index % shown.num_frames, background)[0]
-            means = rgb.reshape(height, samples, width, samples, 3).mean((1, 3))
-            pictures.append(Image.fromarray(np.rint(np.clip(means, 0, 1) * 255).astype(np.uint8)))
-    timing = {"duration": FILM["milliseconds"], "loop": 0}
-    pictures[0].save(
-        out, "WEBP", save_all=True, append_images=pictures[1:], quality=FILM["quality"], method=6, **timing
-    )
+            pictures.append(Image.fromarray(shrink(rgb, samples)))
+    options = {"duration": FILM["milliseconds"], "loop": 0, "quality": FILM["quality"], "method": 6}
+    pictures[0].save(out, "WEBP", save_all=True, append_images=pictures[1:], **options)
 
 
 def sheet(subject: Path, out: Path) -> None:
@@ -104,21 +101,18 @@ def page(subject: Path, out: Path) -> None:
     """
     from playwright.sync_api import sync_playwright
 
-    report = subject / "report.html"
-    if not report.exists():
+    if not (report := subject / "report.html").exists():
         raise UserError("no report", file=report, remedy=f"run `facefolds report {subject}` first")
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        raise UserError("no browser", expected="chromium or google-chrome", remedy="apt-get install chromium")
+    browser = chromium()
     shots = []
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        started = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
         for width in PAGE["widths"]:
-            tab = chromium.new_page(viewport={"width": width, "height": PAGE["height"]})
+            tab = started.new_page(viewport={"width": width, "height": PAGE["height"]})
             tab.goto(report.resolve().as_uri())
             tab.wait_for_timeout(PAGE["patience"])
             shots.append(open_picture(tab.screenshot()).convert("RGB"))
-        chromium.close()
+        started.close()
     whole = Image.new("RGB", (sum(shot.width + PAGE["gap"] for shot in shots) - PAGE["gap"], PAGE["height"]), "white")
     for index, shot in enumerate(shots):
         whole.paste(shot, (sum(before.width + PAGE["gap"] for before in shots[:index]), 0))
@@ -156,12 +150,12 @@ def make(name: str, subject: Path, images: Path = IMAGES) -> None:
         UserError: if the subject lacks what it is made from.
     """
     picture = PICTURES[name]
-    if not (subject / picture.source).exists():
-        raise UserError("nothing to make a picture from", file=subject / picture.source, remedy="run `make repro`")
+    if not (source := subject / picture.source).exists():
+        raise UserError("nothing to make a picture from", file=source, remedy="run `make repro`")
     with atomic_file(images / name) as temporary:
         picture.make(subject, temporary)
     record = read_json(images / RECORD) if (images / RECORD).exists() else {}
-    digests = {"sha256": file_sha256(images / name), "source": file_sha256(subject / picture.source)}
+    digests = {"sha256": file_sha256(images / name), "source": file_sha256(source)}
     record[name] = {"commit": commit_name(), **digests, "options": picture.options}
     write_json(images / RECORD, dict(sorted(record.items())))
 
