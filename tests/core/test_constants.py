@@ -22,6 +22,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "asset/packing.py": ALL,
         "asset/validation.py": ALL,
         "asset/video.py": ALL,
+        "frame_packing.py": ("RUN",),
         "asset/writer.py": ("STATIC_FPS",),
         "captures/krt.py": ALL,
         "cli/submission.py": ALL,
@@ -151,8 +152,9 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "training/loop.py": ("LOG_POINTS",),
         "stages/normalize.py": ("SHOWN",),
     },
-    "the shape of the embedded actor, its rig and its room: data, written as code": {
-        f"captures/actor/{name}.py": ALL for name in ("hair", "mesh", "motion", "render", "rig", "room", "shape")
+    "the shape of the embedded actor, its words, its rig and its room: data, written as code": {
+        f"captures/actor/{name}.py": ALL
+        for name in ("clothes", "hair", "mesh", "motion", "render", "rig", "room", "shape", "speech")
     },
 }
 """Reason -> file, or folder with all its files (in facefolds_core, or from the root) -> names."""
