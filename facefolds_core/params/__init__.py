@@ -15,6 +15,7 @@ from facefolds_core.params.compress import (
     LevelParams,
     MeshCodec,
     MeterParams,
+    StreamParams,
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
@@ -100,6 +101,7 @@ __all__ = [
     "ScoreWarningParams",
     "Section",
     "StartParams",
+    "StreamParams",
     "Subject",
     "SubjectParams",
     "TextureParams",
