@@ -84,6 +84,8 @@ WORDS = {
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
     "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
+    "in_segments": "{frames} frames, trained as {segments} segments over a base of {keys} key frames (fit.json: "
+    "key_frames)",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
     "mattes help (docs/guide/subjects.md)",

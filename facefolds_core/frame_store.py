@@ -10,7 +10,8 @@ and need not be complete (masks exist for some images only).
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,13 @@ class FrameStore:
     def keys(self) -> list[tuple[int, int]]:
         """All (index, frame) that the file holds, sorted."""
         return sorted(self._images)
+
+    def part(self, frames: Sequence[int]) -> FrameStore:
+        """Some of the frames, numbered anew from 0 on, of the same mapped file."""
+        known = {frame: position for position, frame in enumerate(frames)}
+        found = copy(self)
+        found._images = {(i, known[k]): image for (i, k), image in self._images.items() if k in known}
+        return found
 
     def image(self, index: int, frame: int) -> Image:
         """(height, width, channels) uint8, a view of the mapped file.

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
 from facefolds_core.params.reflection import ReflectionParams
+from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.volume import (
     CameraParams,
@@ -225,6 +226,9 @@ class ExplicitParams(Section):
 
     moving: MovingParams = MovingParams()
     """Of a head that turns."""
+
+    segments: SegmentParams = SegmentParams()
+    """Of takes that are too long to be trained at once."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""

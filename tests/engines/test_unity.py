@@ -22,6 +22,7 @@ from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
 from tests.engines.unity_checks import PACKAGE, ROOT, SHADERS, STUBS, compiled, core, missing, run, shader_complaints
+from tests.older import make_older
 from tests.pictures import GREY_VALUE, five_cameras, psnr
 from tests.viewer.fixtures import add_reflection
 
@@ -91,8 +92,9 @@ def test_the_manifest_is_read_as_python_reads_it(check: Path, glossy: Asset) -> 
     assert lines[1].split() == ["full", *(str(n) for n in (texture.width, texture.height, 2, 30, 3))]
     for line, layer in zip(lines[2:], level.layers, strict=True):
         name, *numbers = line.split()
-        assert (name, [float(n) for n in numbers[:4]]) == (layer.mesh, list(layer.texture_rect))
-        scale_s, scale_t, s, t = (float(n) for n in numbers[4:])
+        assert (name, [int(n) for n in numbers[:2]]) == (layer.mesh, [layer.offset, layer.bytes])
+        assert [float(n) for n in numbers[2:6]] == list(layer.texture_rect)
+        scale_s, scale_t, s, t = (float(n) for n in numbers[6:])
         x, y, w, h = layer.texture_rect
         place = np.array([0.25 * scale_s + s, 1 - (0.75 * scale_t + t)]) * [texture.width, texture.height]
         np.testing.assert_allclose(place, [texture.alpha_rect[0] + x + 0.25 * w, texture.alpha_rect[1] + y + 0.75 * h])
@@ -104,6 +106,15 @@ def _changed(asset: Asset, tmp_path: Path, **changes: Any) -> Path:
     return tmp_path / "manifest.json"
 
 
+def test_a_manifest_of_format_2_is_read(check: Path, glossy: Asset, tmp_path: Path) -> None:
+    make_older(Path(shutil.copytree(glossy.folder, tmp_path / "asset")), 2)
+    assert json.loads((tmp_path / "asset" / "manifest.json").read_text())["version"] == 2
+    lines = run("mono", check, "read", tmp_path / "asset" / "manifest.json").stdout.splitlines()
+    assert lines[1].split()[3:] == ["2", "30", "3"]
+    names = [line.split()[:2] for line in lines[2:]]
+    assert [offset for _, offset in names] == ["0"] * 3 and len({name for name, _ in names}) == 3
+
+
 def test_keys_of_a_later_writer_are_passed_over(check: Path, glossy: Asset, tmp_path: Path) -> None:
     done = run("mono", check, "read", _changed(glossy, tmp_path, later={"a": [1, None, "ä\n"]}))
     assert (done.returncode, done.stdout.splitlines()[0]) == (0, "caps")
@@ -112,7 +123,9 @@ def test_keys_of_a_later_writer_are_passed_over(check: Path, glossy: Asset, tmp_
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": 99}, "format 99 cannot be read"),
+        ({"version": 99, "minVersion": 99}, "format 99 cannot be read"),
+        ({"version": 1}, "format 1 cannot be read"),
+        ({"extensionsRequired": ["SOMETHING_new"]}, "extensions that this player does not know"),
         ({"format": "gltf"}, "no manifest of facefolds"),
         ({"levels": []}, "levels is empty"),
         ({"levels": [{"name": "full"}]}, "levels[0].texture is missing"),
@@ -126,7 +139,8 @@ def test_what_is_wrong_is_said(check: Path, glossy: Asset, tmp_path: Path, chang
 
 
 def test_a_file_elsewhere_is_refused(check: Path, glossy: Asset, tmp_path: Path) -> None:
-    text = (glossy.folder / "manifest.json").read_text().replace("full_01.drc", "../full_01.drc")
+    mesh = glossy.full.entry.layers[1].mesh
+    text = (glossy.folder / "manifest.json").read_text().replace(mesh, f"../{mesh}")
     (tmp_path / "manifest.json").write_text(text)
     done = run("mono", check, "read", tmp_path / "manifest.json")
     assert done.returncode == 1 and "no plain file name" in done.stdout

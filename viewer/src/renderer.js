@@ -225,7 +225,11 @@ export class LayerRenderer {
       gl.uniform4fv(at.offsetRect, offset);
       gl.uniform4fv(at.normalsRect, normals);
       const m = this.turn ?? IDENTITY;
-      gl.uniformMatrix3fv(at.toRoom, false, [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => m[i]));
+      gl.uniformMatrix3fv(
+        at.toRoom,
+        false,
+        [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => m[i]),
+      );
       gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
     }
     return colour;

@@ -4,6 +4,7 @@ crossings. Under two minutes, so that an interrupted run simply starts again."""
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from dvclive.live import Live
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.model.grids import GridTextures
@@ -59,6 +60,30 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
         UserError: if an image is missing, nothing stands out from the background, or training diverges even at small
             learning rates.
     """
+    return fit_with_surroundings(scene, params, log, place)[0]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a training found out beside the model, and what frames are fitted with that come later.
+
+    Attributes:
+        splits: of the scene's cameras; of those that contradict the others "out".
+        gains: (C, 3) of the training cameras that are left.
+        background: (C, pixels, 3) float32, of the same.
+        rate: the learning rate that it ended with.
+    """
+
+    splits: tuple[Split, ...]
+    gains: NDArray[np.float64]
+    background: NDArray[np.float32]
+    rate: float
+
+
+def fit_with_surroundings(
+    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None
+) -> tuple[Trained, Surroundings]:
+    """`fit_explicit`, and what else was found out."""
     check_images(scene)
     device = pick_device(params.device)
     began = time.perf_counter()
@@ -87,7 +112,10 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
         time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
     )
     draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
-    return Trained(model, spec, report, trainer.summary(spec), draw)
+    assert trainer.state is not None
+    background = trainer.state.background.cpu().numpy()
+    surroundings = Surroundings(cameras.scene.splits, cameras.gains, background, trainer.rate)
+    return Trained(model, spec, report, trainer.summary(spec), draw), surroundings
 
 
 class _Trainer:

@@ -40,7 +40,7 @@ static class Check
         {
             Console.WriteLine(level.Name + " " + Said(level.Width, level.Height, level.Frames, level.Fps, level.Layers.Count));
             foreach (Layer layer in level.Layers)
-                Console.WriteLine(layer.Mesh + " " + Said(layer.Rect.X, layer.Rect.Y, layer.Rect.Width, layer.Rect.Height)
+                Console.WriteLine(layer.Mesh + " " + Said(layer.Offset, layer.Bytes) + " " + Said(layer.Rect.X, layer.Rect.Y, layer.Rect.Width, layer.Rect.Height)
                     + " " + Said(Drawing.InPicture(layer.Rect, level.Alpha, level.Width, level.Height)));
         }
     }

@@ -99,14 +99,23 @@ namespace Facefolds
 
         IEnumerator LayersLoaded(string address)
         {
+            var files = new Dictionary<string, byte[]>(); // of all layers together, or one of each
             head = new GameObject("head").transform;
             head.SetParent(transform, false);
             for (int index = 0; index < shown.Layers.Count && Error == null; ++index)
             {
-                string file = address + shown.Layers[index].Mesh;
-                byte[] bytes = null;
-                yield return Fetched(file, request => bytes = request.downloadHandler.data);
-                if (bytes == null) yield break;
+                Layer layer = shown.Layers[index];
+                string file = address + layer.Mesh;
+                if (!files.ContainsKey(file))
+                    yield return Fetched(file, request => files[file] = request.downloadHandler.data);
+                if (Error != null) yield break;
+                if (files[file].Length < (long)layer.Offset + layer.Bytes)
+                {
+                    Fail(file + " is cut off");
+                    yield break;
+                }
+                var bytes = new byte[layer.Bytes];
+                Array.Copy(files[file], layer.Offset, bytes, 0, layer.Bytes);
                 // As it is stored: neither its axes nor its texture coordinates turned over.
                 var decoding = Draco.DracoDecoder.DecodeMesh(bytes, Draco.DecodeSettings.None);
                 while (!decoding.IsCompleted) yield return null;

@@ -14,8 +14,8 @@ namespace Facefolds
 
     public sealed class Layer
     {
-        public string Mesh;
-        public int Vertices, Triangles;
+        public string Mesh; // the file, and which bytes of it
+        public int Offset, Bytes;
         public Rect4 Rect; // within the colours' part
         public double[] Window; // u0, u1, v0, v1
     }
@@ -57,7 +57,7 @@ namespace Facefolds
     /// in words for people.</summary>
     public sealed class Manifest
     {
-        public const int Oldest = 2, Newest = 2;
+        public const int Oldest = 2, Newest = 3;
         public string Subject;
         public int Version;
         public List<Level> Levels; // coarsest first
@@ -69,9 +69,12 @@ namespace Facefolds
             if (!fields.Has("format") || fields.Text("format") != "facefolds")
                 throw new FormatException("this is no manifest of facefolds");
             int version = fields.Whole("version");
-            if (version < Oldest || version > Newest)
-                throw new FormatException("format " + version + " cannot be read: this player reads " + Newest
-                    + (version > Newest ? "; update the package" : "; make the asset again"));
+            int needed = fields.Has("minVersion") ? fields.Whole("minVersion") : version; // whose readers show it right
+            if (version < Oldest || needed > Newest)
+                throw new FormatException("format " + version + " cannot be read: this player reads " + Oldest + " to " + Newest
+                    + (needed > Newest ? "; update the package" : "; make the asset again"));
+            if (fields.Has("extensionsRequired"))
+                throw new FormatException("the asset needs extensions that this player does not know; update the package");
             var result = new Manifest
             {
                 Subject = fields.Has("subject") ? fields.Text("subject") : "",
@@ -106,7 +109,7 @@ namespace Facefolds
                 Width = texture.Whole("width"),
                 Height = texture.Whole("height"),
                 Frames = texture.Whole("frames"),
-                Fps = texture.Number("fps"),
+                Fps = texture.Has("frame_rate") ? Ratio(texture.Numbers("frame_rate", 2)) : texture.Number("fps"),
                 Colour = Rect4.From(texture.Numbers("colour_rect", 4)),
                 Alpha = Rect4.From(texture.Numbers("alpha_rect", 4)),
                 Videos = texture.Has("videos") ? texture.Objects("videos").Select(OfVideo).ToList() : new List<Video>(),
@@ -117,13 +120,15 @@ namespace Facefolds
             return level;
         }
 
+        static double Ratio(double[] rate) { return rate[1] > 0 ? rate[0] / rate[1] : 0; }
+
         static Layer OfLayer(Fields fields)
         {
             return new Layer
             {
                 Mesh = PlainName(fields.Text("mesh")),
-                Vertices = fields.Whole("vertices"),
-                Triangles = fields.Whole("triangles"),
+                Offset = fields.Has("offset") ? fields.Whole("offset") : 0, // format 2: a file a mesh
+                Bytes = fields.Whole("bytes"),
                 Rect = Rect4.From(fields.Numbers("texture_rect", 4)),
                 Window = fields.Numbers("uv_window", 4),
             };
