@@ -72,6 +72,8 @@ WORDS = {
     "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
     "from what the images show (is its scale or its place wrong?)",
     "diverged": "level {level}: diverged, begun again with learning rate {rate:.3g}",
+    "specks_cleared": "{count} patches of texels beside the subject made transparent, each under {share:.0%} of it "
+    "(train.pruning.speck_share)",
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",

@@ -19,7 +19,6 @@ from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import Level, Manifest
 from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
-from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.writer import (
@@ -34,16 +33,15 @@ from facefolds_core.export.between import at_frame_rate
 from facefolds_core.export.stores import Grids
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, level_params
+from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.views import spread, training_cameras
 from facefolds_core.params import CompressParams, LevelParams
-from facefolds_core.rendering.reference import AssetCaster, composite
 
 
 @dataclass(frozen=True)
@@ -116,9 +114,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(
-            temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality
-        )
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params)
         if streamed:
             made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
             manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
@@ -146,7 +142,7 @@ def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> 
 
 
 def _with_extras(
-    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
+    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], params: CompressParams
 ) -> Manifest:
     """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
@@ -158,30 +154,18 @@ def _with_extras(
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
-        index = max(train, key=lambda index: _frontality(scene.camera_in_head(index, 0)))
-        poster = _poster(folder / "poster.jpg", manifest.full, scene.camera_in_head(index, 0), jpeg_quality)
-        update["poster"] = poster.model_copy(update={"w2c": _rows(scene.cameras[index].w2c)})
-    return manifest.model_copy(update=update)
-
-
-def _frontality(camera: Camera) -> float:
-    """How much a camera sees the subject from its front, +x: 1 at most."""
-    return float(camera.centre[0] / np.linalg.norm(camera.centre))
-
-
-def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Poster:
-    shown = read_level(path.parent, level)
-    rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
-    pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(pixels).save(path, quality=jpeg_quality)
-    return Poster(
+    path, first = folder / "poster.jpg", scene.cameras[0]
+    side = min(params.poster_side, max(first.width, first.height))
+    camera = write_poster(path, manifest, side, params.jpeg_quality)
+    update["poster"] = Poster(
         **_stored(path),
         width=camera.width,
         height=camera.height,
         K=_rows(camera.K),
         w2c=_rows(camera.w2c),
-        background=(0.0, 0.0, 0.0),
+        background=BACKGROUND,
     )
+    return manifest.model_copy(update=update)
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:

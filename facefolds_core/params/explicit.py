@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -145,6 +145,16 @@ class PruningParams(Section):
     """Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several,
     some `rays_per_texel` a texel; all of them over the frames) are made transparent. A ray reads four a layer: its
     colour changes by no more than N / 255, and that only if all of them are just below."""
+
+    speck_opacity: Share = 0.3
+    """Of all layers together, in any frame: patches of texels that are more opaque are compared by size,"""
+
+    speck_share: Share = 0.02
+    """and those smaller than this share of the largest one are made transparent, with all that is farther than
+    `speck_reach` from the others: splinters beside the head, that cameras left over. 0 keeps them."""
+
+    speck_reach: Natural = 3
+    """Texels: the soft edge of what stays."""
 
 
 class DivergenceParams(Section):

@@ -27,6 +27,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
+from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
@@ -282,11 +283,7 @@ class _Trainer:
         state, n = self.state, self.params.layers
         state.forget_moments()
         assert self.views is not None
-        least = self.params.pruning.texel_opacity
-        hidden = state.contributions(self.views, self._stride()) < least
-        hidden |= state.beside(self.params.start.beside_opacity)
-        state.hide(hidden)
-        self.events.append(fact("texels_cleared", share=float(hidden.float().mean()), least=least))
+        self.events += clear_texels(state, self.views, self._stride(), self.params)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
