@@ -1,4 +1,4 @@
-"""What there are several of: sources of captures, codecs, exporters. Another one is one file in a folder.
+"""What there are several of: sources of captures, codecs, exporters, models. Another one is one file in a folder.
 
 The modules of a registry's package are its entries, named as params.yaml or the command line names them. The names are
 those of the files, so nothing is imported to know them: parameters are checked against them without what they stand
@@ -46,4 +46,5 @@ class Registry:
 SOURCES = Registry("facefolds_core.captures.sources")
 CODECS = Registry("facefolds_core.asset.codecs")
 EXPORTERS = Registry("facefolds_core.engines")
-REGISTRIES = (SOURCES, CODECS, EXPORTERS)
+MODELS = Registry("facefolds_core.models")
+REGISTRIES = (SOURCES, CODECS, EXPORTERS, MODELS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import json
 import mimetypes
 import os
@@ -20,9 +21,21 @@ CHUNK = 1 << 18
 WRITE_PATIENCE = 30.0
 """Seconds that a client may take for one chunk: one that reads nothing does not hold a file for ever."""
 
+PACKED_TYPES = (".html", ".js", ".css", ".json", ".wasm", ".svg", ".map")
+"""Meshes, videos and pictures are packed already."""
+LARGEST_PACKED, MOST_PACKED = 1 << 23, 1 << 25
+"""Bytes of a file that is packed at all, and of all that is kept."""
+_PACKED: dict[str, bytes] = {}
+
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,254}")
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
-_TYPES = {".js": "application/javascript", ".wasm": "application/wasm", ".webm": "video/webm", ".mp4": "video/mp4"}
+_TYPES = {
+    ".js": "application/javascript",
+    ".wasm": "application/wasm",
+    ".webm": "video/webm",
+    ".mp4": "video/mp4",
+    ".m4a": "audio/mp4",
+}
 """Of what the machine's own table may have otherwise: browsers refuse modules and wasm of another type."""
 
 
@@ -55,7 +68,7 @@ def named_files(folder: Path) -> set[str]:
     while waiting:
         value = waiting.pop()
         if isinstance(value, dict):
-            found |= {name for key in ("file", "mesh") if isinstance(name := value.get(key), str)}
+            found |= {name for key in ("file", "mesh", "video") if isinstance(name := value.get(key), str)}
             waiting += value.values()
         elif isinstance(value, list):
             waiting += value
@@ -91,11 +104,41 @@ def byte_range(header: str, size: int) -> tuple[int, int] | None:
     return (start, stop) if start < stop else None
 
 
+def takes_gzip(request: web.Request) -> bool:
+    """Whether the client reads gzip; not where it asks for a part, which is one of the file itself."""
+    offered = [part.strip().split(";") for part in request.headers.get("Accept-Encoding", "").lower().split(",")]
+    wanted = any(
+        name.strip() in ("gzip", "*") and "q=0" not in [one.strip() for one in rest] for name, *rest in offered
+    )
+    return wanted and "Range" not in request.headers
+
+
+def packed(file: FileIO, etag: str) -> bytes:
+    """A file by gzip; kept, since pages ask for the same few again and again."""
+    if etag not in _PACKED:
+        data = file.read()
+        while _PACKED and sum(map(len, _PACKED.values())) > MOST_PACKED:
+            _PACKED.pop(next(iter(_PACKED)))
+        _PACKED[etag] = gzip.compress(data, compresslevel=9, mtime=0)
+    return _PACKED[etag]
+
+
 async def send(request: web.Request, file: FileIO, name: str) -> web.StreamResponse:
-    """Answer with an open file, or the part that is asked for. A file that shrinks meanwhile ends the connection."""
+    """Answer with an open file, or the part that is asked for; texts and programs by gzip where the client takes that.
+
+    A file that shrinks meanwhile ends the connection.
+    """
     status = os.fstat(file.fileno())
+    suffix = Path(name).suffix.lower()
     size, etag = status.st_size, f"{status.st_ino:x}-{status.st_mtime_ns:x}-{status.st_size:x}"
-    headers = {"Accept-Ranges": "bytes", "ETag": f'"{etag}"'}
+    headers = {"Accept-Ranges": "bytes"}
+    packs = suffix in PACKED_TYPES and size <= LARGEST_PACKED
+    if packs:
+        headers["Vary"] = "Accept-Encoding"
+        packs = takes_gzip(request)
+    if packs:
+        etag = f"{etag}-gzip"
+    headers["ETag"] = f'"{etag}"'
     if any(tag.value in (etag, "*") for tag in request.if_none_match or ()):
         return web.Response(status=304, headers=headers)
     start, stop, code = 0, size, 200
@@ -106,8 +149,10 @@ async def send(request: web.Request, file: FileIO, name: str) -> web.StreamRespo
             return web.Response(status=416, headers=headers | {"Content-Range": f"bytes */{size}"})
         (start, stop), code = found, 206
         headers["Content-Range"] = f"bytes {start}-{stop - 1}/{size}"
-    suffix = Path(name).suffix.lower()
     headers["Content-Type"] = _TYPES.get(suffix) or mimetypes.guess_type(name)[0] or "application/octet-stream"
+    if packs:
+        headers["Content-Encoding"] = "gzip"
+        return web.Response(headers=headers, body=await asyncio.to_thread(packed, file, etag))
     response = web.StreamResponse(status=code, headers=headers)
     response.content_length = stop - start
     await response.prepare(request)

@@ -15,7 +15,7 @@ import grimp
 import grimp.exceptions
 
 from facefolds_core.errors import UserError
-from facefolds_core.registry import REGISTRIES
+from facefolds_core.registry import MODELS, REGISTRIES
 
 PACKAGES = ("facefolds_core", "stages")
 
@@ -23,7 +23,8 @@ PACKAGES = ("facefolds_core", "stages")
 def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, str]]:
     """Stage -> module that `stages.<stage>` imports, directly or not, itself included -> digest of what it does.
 
-    Imports for type checking only are left out; who imports a registry imports all its entries.
+    Imports for type checking only are left out; who imports a registry imports all its entries. Every stage knows the
+    models' keys; what else a model's module imports counts for stages that call the function which imports it.
 
     Args:
         root: folder of the packages; the one that they are imported from.
@@ -38,6 +39,7 @@ def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, 
     for registry in REGISTRIES:  # imports that no statement names
         for name in registry.names:
             graph.add_import(importer=registry.package, imported=f"{registry.package}.{name}")
+    _join_models(graph, root)
     known: dict[str, str] = {}
     found: dict[str, dict[str, str]] = {}
     for stage in stages:
@@ -47,6 +49,33 @@ def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, 
                 known[module] = digest_of_file(_file_of(root, module))
         found[stage] = {module: known[module] for module in modules}
     return found
+
+
+CALLED_BY = {
+    "spec": "facefolds_core.model.storage",
+    "build": "facefolds_core.model.storage",
+    "fit": "facefolds_core.training.models",
+    "train": "facefolds_core.training.models",
+}
+"""Function of a model's module (facefolds_core/models) -> module that calls it."""
+
+
+def _join_models(graph: grimp.ImportGraph, root: Path) -> None:
+    """Add what no statement names: params know all models, and their functions' imports are those of the callers."""
+    for name in MODELS.names:
+        model = f"{MODELS.package}.{name}"
+        callers: dict[int, str] = {}
+        for node in _tree(_file_of(root, model)).body:
+            if isinstance(node, ast.FunctionDef) and node.name in CALLED_BY:
+                callers |= dict.fromkeys(range(node.lineno, (node.end_lineno or 0) + 1), CALLED_BY[node.name])
+        for imported in graph.find_modules_directly_imported_by(model):
+            places = graph.get_import_details(importer=model, imported=imported)
+            found = {callers.get(place["line_number"]) for place in places}
+            if None not in found:
+                graph.remove_import(importer=model, imported=imported)
+            for caller in found - {None, imported}:
+                graph.add_import(importer=str(caller), imported=imported)
+        graph.add_import(importer="facefolds_core.params.train", imported=model)
 
 
 def digest_of_file(path: Path) -> str:

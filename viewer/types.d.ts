@@ -108,6 +108,8 @@ export class FacefoldsPlayer extends HTMLElement {
   capture(camera?: Camera): ImageData;
   /** A PNG. */
   screenshot(camera?: Camera): Promise<Blob>;
+  /** A film of one turn from side to side, MP4 or WebM: 8 s and 40 degrees unless told otherwise; the signal ends it early. */
+  record(options?: { seconds?: number; degrees?: number; signal?: AbortSignal }): Promise<Blob>;
   compare(photo: number | null): void;
   /** Plays an asset that is at hand: name -> content, manifest.json among them. */
   openFiles(files: Map<string, Blob>): void;

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from facefolds_core.asset.manifest import Coordinates, Level, Manifest, Photo
+from facefolds_core.asset.manifest import Coordinates, Level, Manifest
+from facefolds_core.asset.manifest_base import Row, Vector
+from facefolds_core.asset.manifest_extras import Photo
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -56,9 +58,10 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
     problems += _order_problems(manifest)
     problems += _coordinate_problems(manifest.coordinates)
-    problems += _track_problems(manifest)
+    problems += _track_problems(manifest) + _extent_problems(manifest)
     for photo in manifest.photos:
         problems += [f"{photo.file}: {problem}" for problem in _photo_problems(photo, manifest.full.texture.frames)]
+    problems += _poster_problems(manifest)
     pictures = [*manifest.photos, *([manifest.poster] if manifest.poster else [])]
     problems += [
         f"{picture.file}: {problem}"
@@ -70,11 +73,29 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         problems.append("one file is named twice")
     texts = [manifest.subject, manifest.generator, *(photo.camera for photo in manifest.photos)]
     texts += [video.mime for level in manifest.levels for video in level.texture.videos]
+    texts += [manifest.audio.mime] if manifest.audio and manifest.audio.mime else []
+    texts += [*(manifest.extensions_used or ()), *(manifest.extensions_required or ())]
     problems += [
         f"a text that is too long, or has characters that do not print: {text[:40]!r}"
         for text in texts
         if len(text) > LONGEST_TEXT or not text.isprintable()
     ]
+    return problems
+
+
+def _extent_problems(manifest: Manifest) -> list[str]:
+    """Of `bounds`, of the distances of `view`, and of the names of extensions."""
+    problems, bounds, view = [], manifest.bounds, manifest.view
+    if bounds is not None:
+        if not all(a <= b for a, b in zip(bounds.min, bounds.max, strict=True)):
+            problems.append("bounds.min is beyond bounds.max")
+        if not max(map(abs, (*bounds.min, *bounds.max))) <= FARTHEST:
+            problems.append(f"bounds of more than {FARTHEST:g} units")
+    distances = [] if view is None else [*(view.distance or ()), *(one[2] for one in view.measured or ())]
+    if not all(0 <= distance <= FARTHEST for distance in distances):
+        problems.append(f"view has distances that are not within 0 and {FARTHEST:g}")
+    if not set(manifest.extensions_required or ()) <= set(manifest.extensions_used or ()):
+        problems.append("extensionsRequired has names that extensionsUsed lacks")
     return problems
 
 
@@ -93,8 +114,8 @@ def _order_problems(manifest: Manifest) -> list[str]:
     problems = []
     if len({level.name for level in levels}) != len(levels):
         problems.append("two levels have one name")
-    if len({(level.texture.frames, level.texture.fps) for level in levels}) != 1:
-        problems.append("the levels differ in frames or fps")
+    if len({(level.texture.frames, level.texture.rate) for level in levels}) != 1:
+        problems.append("the levels differ in frames or frame_rate")
     for coarse, fine in pairwise(levels):
         # Finer in one respect may be coarser in another. In none coarser, in bytes, triangles and texels finer: wrong.
         if all(a > b for a, b in zip(_fineness(coarse), _fineness(fine), strict=True)):
@@ -131,15 +152,28 @@ def _is_rotation(rows: tuple[tuple[float, ...], ...], tolerance: float = 1e-6) -
     return bool(np.abs(rotation @ rotation.T - np.eye(3)).max() <= tolerance and np.linalg.det(rotation) > 0)
 
 
+def _poster_problems(manifest: Manifest) -> list[str]:
+    poster = manifest.poster
+    if poster is None or (poster.K is None and poster.w2c is None and poster.background is None):
+        return []
+    if poster.K is None or poster.w2c is None or poster.background is None:
+        return ["the poster's K, w2c and background come together"]
+    problems = [f"poster: {problem}" for problem in _camera_problems(poster.K, poster.w2c)]
+    return problems + ["the poster's background is no colour"] * (not all(0 <= c <= 1 for c in poster.background))
+
+
 def _photo_problems(photo: Photo, frames: int) -> list[str]:
+    problems = [f"frame {photo.frame} of {frames}"] * (photo.frame >= frames)
+    return problems + _camera_problems(photo.K, photo.w2c)
+
+
+def _camera_problems(K: tuple[Vector, Vector, Vector], w2c: tuple[Row, Row, Row]) -> list[str]:
     problems = []
-    if photo.frame >= frames:
-        problems.append(f"frame {photo.frame} of {frames}")
-    if not _is_rotation(tuple(row[:3] for row in photo.w2c), MEASURED):
+    if not _is_rotation(tuple(row[:3] for row in w2c), MEASURED):
         problems.append("the first three columns of w2c are not a rotation")
-    if not max(abs(row[3]) for row in photo.w2c) <= FARTHEST:
+    if not max(abs(row[3]) for row in w2c) <= FARTHEST:
         problems.append(f"its camera is more than {FARTHEST:g} units away")
-    (fx, _, _), (_, fy, _), last = photo.K
+    (fx, _, _), (_, fy, _), last = K
     if not (min(fx, fy) > 0 and max(fx, fy) <= FARTHEST * MAX_SIDE and np.allclose(last, (0, 0, 1), atol=MEASURED)):
         problems.append("K is no camera's")
     return problems
@@ -159,6 +193,9 @@ def _level_problems(level: Level) -> list[str]:
     low, high = FPS_RANGE
     if not low <= texture.fps <= high:
         problems.append(f"{texture.fps:g} frames a second, not within {low:g} and {high:g}")
+    keys = texture.keyframes
+    if keys[0] != 0 or keys[-1] >= texture.frames or any(a >= b for a, b in pairwise(keys)):
+        problems.append("keyframes are not frames in order, 0 the first")
     if texture.frames > min(MOST_FRAMES, *(video.bytes for video in texture.videos)):
         problems.append(f"{texture.frames} frames, more than its videos can hold")
     problems += layout_of(level).problems()
@@ -168,9 +205,22 @@ def _level_problems(level: Level) -> list[str]:
             problems.append(f"uv_window {[u0, u1, v0, v1]} of layer {index} is empty")
         if max(layer.vertices, layer.triangles) > MOST_VERTICES:
             problems.append(f"{layer.vertices} vertices and {layer.triangles} triangles of layer {index}: too many")
+    problems += _mesh_file_problems(level)
     if level.bytes != (total := sum(size for _, size, _ in level.files())):
         problems.append(f"bytes are {level.bytes}, those of its files are {total}")
     return problems + _reflection_problems(level)
+
+
+def _mesh_file_problems(level: Level) -> list[str]:
+    """Whether the layers' meshes lie in the files that the level has for them."""
+    sizes = {file.file: file.bytes for file in level.meshes}
+    problems = [
+        f"the mesh of layer {index} is not inside a file of `meshes`"
+        for index, layer in enumerate(level.layers)
+        if layer.offset + layer.bytes > sizes.get(layer.mesh, 0)
+    ]
+    unused = sorted(set(sizes) - {layer.mesh for layer in level.layers})
+    return problems + [f"{name} holds no layer's mesh" for name in unused]
 
 
 def _reflection_problems(level: Level) -> list[str]:

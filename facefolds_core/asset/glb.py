@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.draco import attribute_ids
-from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -107,7 +107,7 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
     textures = level.frame(frame)
     for place, index in enumerate(reversed(range(level.num_layers))):
         label = f"layer_{index:02d}"
-        data = (level.folder / level.entry.layers[index].mesh).read_bytes() if draco else None
+        data = layer_bytes(level.folder, level.entry.layers[index]) if draco else None
         primitive = builder.primitive(level.layers[index], data) | {"material": place}
         meshes.append({"name": label, "primitives": [primitive]})
         images.append({"name": label, "mimeType": "image/png", "bufferView": builder.view(_png(textures[index]))})

@@ -1,48 +1,44 @@
-"""What manifest.json of an asset says, format version 2 (docs/reference/asset-format.md), as validated models.
+"""What manifest.json of an asset says, format version 3 (docs/reference/asset-format.md), as validated models.
 
-`manifest_file.py` reads and writes the file, and makes the JSON schema beside it.
+`manifest_file.py` reads and writes the file, and makes the JSON schema beside it; `older.py` brings manifests of older
+versions into this form.
 """
 
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field
 
 from facefolds_core.asset.codecs import CodecName
+from facefolds_core.asset.manifest_base import (
+    UV,
+    Count,
+    ExtensionName,
+    FileName,
+    Maybe,
+    Name,
+    Offset,
+    Part,
+    RateTerm,
+    Rect,
+    Scale,
+    Sha256,
+    StoredFile,
+    Vector,
+)
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pose, Poster
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 REMEDY = "make the asset again (`dvc repro`), or copy it again from where it is whole"
 
 UNSEALED = "0" * 64
 """In the place of a manifest's own checksum, while that is taken."""
-
-Count = Annotated[int, Field(ge=1)]
-UV = Annotated[float, Field(ge=-1, le=1)]
-FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=200)]
-Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-Offset = Annotated[int, Field(ge=0)]
-Scale = Annotated[float, Field(gt=0, le=1000)]
-Rect = tuple[Offset, Offset, Count, Count]
-"""(x, y, width, height) in pixels from the top left corner of the video."""
-Vector = tuple[float, float, float]
-Row = tuple[float, float, float, float]
-
-
-class Part(BaseModel):
-    """Base: frozen, unknown keys refused, no conversion between kinds, no NaN."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        json_schema_serialization_defaults_required=True,
-    )
 
 
 class Transform(Part):
@@ -71,23 +67,17 @@ class Coordinates(Part):
     sphere_centre: Vector
 
 
-class StoredFile(Part):
-    """A file of the asset's folder, with what it must hold."""
-
-    file: FileName
-    bytes: Count
-    sha256: Sha256
-
-
 class Layer(Part):
     """One mesh and its place in the video.
 
     Attributes:
         texture_rect: of its colour, within the colour image; its alpha has the same place within the alpha image.
         uv_window: (u0, u1, v0, v1), what its texture covers of the hemisphere's (u, v).
+        mesh, offset, bytes, sha256: the file among the level's `meshes`, and the bytes in it that are this Draco mesh.
     """
 
     mesh: FileName
+    offset: Offset
     vertices: Count
     triangles: Count
     bytes: Count
@@ -111,12 +101,21 @@ class Video(StoredFile):
     pixel_format: Literal["yuv420p"] = "yuv420p"
 
 
+class Bounds(Part):
+    """Corners of the box around all vertices of all levels, in the meshes' own frame."""
+
+    min: Vector
+    max: Vector
+
+
 class Texture(Part):
     """The textures of a level: pictures, encoded once or in several ways.
 
     Attributes:
         width, height: of the decoded picture.
         colour_rect, alpha_rect: in pixels of the decoded picture; of one size.
+        frame_rate: numerator and denominator of the frames a second.
+        keyframes: the numbers of the frames that can be decoded without the ones before, in order.
         videos: the same pictures; a player takes the first that it can decode.
     """
 
@@ -125,11 +124,22 @@ class Texture(Part):
     colour_rect: Rect
     alpha_rect: Rect
     frames: Count
-    fps: Annotated[float, Field(gt=0)]
+    frame_rate: tuple[RateTerm, RateTerm]
+    keyframes: Annotated[tuple[Offset, ...], Field(min_length=1)]
     colour_space: Literal["bt709"] = "bt709"
     colour_range: Literal["tv"] = "tv"
     chroma_location: Literal["left"] = "left"
     videos: Annotated[tuple[Video, ...], Field(min_length=1)]
+
+    @property
+    def rate(self) -> Fraction:
+        """Frames a second."""
+        return Fraction(*self.frame_rate)
+
+    @property
+    def fps(self) -> float:
+        """Frames a second."""
+        return float(self.rate)
 
 
 class Reflection(StoredFile):
@@ -163,9 +173,11 @@ class Quality(Part):
 
     Attributes:
         psnr_to_model: of training views rendered from this level, against the textures and meshes before coding, dB.
+        target_psnr: what the encoder was asked for; it may be out of reach.
     """
 
     psnr_to_model: float
+    target_psnr: Maybe[float] = None
 
 
 class Level(Part):
@@ -175,80 +187,22 @@ class Level(Part):
         layers: outermost first; their number may differ between levels.
         reflection: what gloss adds; absent where there is none.
         bytes: of all its files.
+        meshes: the files that the layers' meshes are bytes of, usually one.
     """
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$")]
+    name: Name
+    meshes: Annotated[tuple[StoredFile, ...], Field(min_length=1)]
     layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
     texture: Texture
-    reflection: Annotated[Reflection | None, Field(exclude_if=lambda one: one is None)] = None
+    reflection: Maybe[Reflection] = None
     bytes: Count
     quality: Quality | None = None
 
-    @field_validator("reflection")
-    @classmethod
-    def _absent_or_whole(cls, value: Reflection | None) -> Reflection:
-        if value is None:
-            raise ValueError("a reflection, or no such key")
-        return value
-
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of each of its files, the meshes first."""
-        found = [(layer.mesh, layer.bytes, layer.sha256) for layer in self.layers]
-        others: list[StoredFile] = [*self.texture.videos, *([self.reflection] if self.reflection else [])]
-        return found + [(other.file, other.bytes, other.sha256) for other in others]
-
-
-class Poster(StoredFile):
-    """A still picture of the asset, shown while it loads."""
-
-    width: Count
-    height: Count
-
-
-class Photo(Poster):
-    """A photo of the capture and the camera that took it, to compare with.
-
-    Attributes:
-        camera, frame: the capture's name of the camera, the index of the frame.
-        K: intrinsics, rows; continuous pixel coordinates.
-        w2c: (R | t), rows: normalised coordinates to OpenCV's camera axes.
-    """
-
-    camera: str
-    frame: Offset
-    K: tuple[Vector, Vector, Vector]
-    w2c: tuple[Row, Row, Row]
-
-
-class Pose(Part):
-    """Where the head stands in one frame: X_world = R X_mesh + t, normalised coordinates.
-
-    Attributes:
-        quaternion: w, x, y, z of R, of unit length.
-        translation: t.
-    """
-
-    quaternion: Row
-    translation: Vector
-
-
-class FilmedView(Part):
-    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
-
-    Attributes:
-        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
-        elevation: the range of the training cameras, degrees.
-    """
-
-    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
-    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
-
-    @field_validator("azimuth", "elevation")
-    @classmethod
-    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if not value[0] <= value[1] <= value[0] + 360:
-            raise ValueError("from the lower to the higher angle, at most a full turn")
-        return value
+        files: list[StoredFile] = [*self.meshes, *self.texture.videos]
+        files += [] if self.reflection is None else [self.reflection]
+        return [(entry.file, entry.bytes, entry.sha256) for entry in files]
 
 
 class Compositing(Part):
@@ -264,8 +218,11 @@ class Manifest(Part):
     """manifest.json.
 
     Attributes:
+        min_version: the oldest version whose readers show the asset right; they pass over keys that they do not know.
+        extensions_used, extensions_required: names of extensions; who does not know a required one refuses the asset.
+        bounds: of the meshes; absent where they are not known.
         levels: coarsest first; the last is the full one.
-        audio: of the sequence; it is in the MP4 files too.
+        audio: of the sequence.
         photos: for comparison.
         track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
         view: the range that was filmed; absent where it is not known.
@@ -273,32 +230,22 @@ class Manifest(Part):
     """
 
     format: Literal["facefolds"] = "facefolds"
-    version: Literal[2] = 2
+    version: Literal[3] = 3
+    min_version: Annotated[Literal[3], Field(alias="minVersion")] = 3
+    extensions_used: Annotated[Maybe[tuple[ExtensionName, ...]], Field(alias="extensionsUsed")] = None
+    extensions_required: Annotated[Maybe[tuple[ExtensionName, ...]], Field(alias="extensionsRequired")] = None
     generator: str
     subject: str
     coordinates: Coordinates
     compositing: Compositing = Compositing()
+    bounds: Maybe[Bounds] = None
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
-    audio: StoredFile | None = None
+    audio: Audio | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
-    track: Annotated[tuple[Pose, ...] | None, Field(exclude_if=lambda track: track is None)] = None
-    view: Annotated[FilmedView | None, Field(exclude_if=lambda view: view is None)] = None
+    track: Maybe[tuple[Pose, ...]] = None
+    view: Maybe[FilmedView] = None
     manifest_sha256: Sha256 = UNSEALED
-
-    @field_validator("track")
-    @classmethod
-    def _absent_or_poses(cls, value: tuple[Pose, ...] | None) -> tuple[Pose, ...] | None:
-        if value is None:
-            raise ValueError("poses, or no such key")
-        return value
-
-    @field_validator("view")
-    @classmethod
-    def _absent_or_whole(cls, value: FilmedView | None) -> FilmedView:
-        if value is None:
-            raise ValueError("the filmed range, or no such key")
-        return value
 
     @property
     def full(self) -> Level:
@@ -308,7 +255,9 @@ class Manifest(Part):
         """`track` as it is computed with."""
         if self.track is None:
             return None
-        quaternions, translations = ([list(getattr(pose, name)) for pose in self.track] for name in Pose.model_fields)
+        quaternions, translations = (
+            [list(getattr(pose, name)) for pose in self.track] for name in ("quaternion", "translation")
+        )
         return Track(np.array(quaternions, float), np.array(translations, float))
 
     def files(self) -> list[tuple[str, int, str]]:

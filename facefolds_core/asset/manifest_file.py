@@ -15,6 +15,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from facefolds_core.asset.manifest import FORMAT_VERSION, REMEDY, UNSEALED, Manifest
+from facefolds_core.asset.manifest_base import without_absent
+from facefolds_core.asset.older import OLDEST, brought_up
 from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
@@ -22,8 +24,10 @@ from facefolds_core.files import read_json, write_text
 MANIFEST_NAME = "manifest.json"
 SCHEMA_PATH = Path(__file__).with_name("manifest.schema.json")
 
+SCHEMA_ID = f"urn:facefolds:asset:{FORMAT_VERSION}:manifest"
+
 LARGEST = 1 << 24
-"""Bytes of a manifest: one has some kB a level."""
+"""Bytes of a manifest: one has some kB a level, and 200 bytes a segment."""
 
 _SEAL = re.compile(rb'"manifest_sha256"\s*:\s*"([0-9a-f]{64})"')
 
@@ -31,13 +35,9 @@ _SEAL = re.compile(rb'"manifest_sha256"\s*:\s*"([0-9a-f]{64})"')
 def manifest_schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) of `Manifest`; keys with a default are required all the same in a file."""
     schema = Manifest.model_json_schema(mode="serialization")
-    level, reflection = schema["$defs"]["Level"], {"$ref": "#/$defs/Reflection"}
-    level["properties"]["reflection"] = reflection
-    level["required"] = [key for key in level["required"] if key != "reflection"]
-    poses = schema["properties"]["track"]["anyOf"][0]
-    schema["properties"]["track"] = poses | {"title": "Track"}
-    schema["properties"]["view"] = {"$ref": "#/$defs/FilmedView"}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "facefolds asset, version 2"} | schema
+    without_absent(schema)
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": SCHEMA_ID}
+    return {**head, "title": f"facefolds asset, version {FORMAT_VERSION}"} | schema
 
 
 def sealed(manifest: Manifest) -> tuple[str, str]:
@@ -86,18 +86,56 @@ def parse_manifest(path: Path) -> Manifest:
             found=_shown(found),
             remedy=REMEDY,
         )
-    if value.get("version") != FORMAT_VERSION or isinstance(value.get("version"), bool):
+    return _validated(path, _of_this_version(path, value))
+
+
+def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
+    """The same manifest as this version says it.
+
+    Raises:
+        UserError: if it needs a newer reader, or an extension: none is known here.
+    """
+    version, least = value.get("version"), value.get("minVersion")
+    if not isinstance(version, int) or isinstance(version, bool) or version < OLDEST:
+        least = None
+    elif version < FORMAT_VERSION:
+        return brought_up(value)
+    elif version == FORMAT_VERSION:
+        least = FORMAT_VERSION  # a wrong one is said with the other keys
+    if not isinstance(least, int) or isinstance(least, bool) or least > FORMAT_VERSION:
         raise UserError(
             "an asset of another format version",
             file=path,
             place="version",
-            expected=FORMAT_VERSION,
-            found=_shown(value.get("version")),
+            expected=f"{OLDEST} to {FORMAT_VERSION}",
+            found=_shown(version),
             remedy="make the asset again with this version of facefolds, or read it with the one that made it",
         )
-    value = _without_view_effects(value)
+    required = value.get("extensionsRequired")
+    if isinstance(required, list) and required:
+        raise UserError(
+            "the asset needs an extension of the format that this facefolds does not know",
+            file=path,
+            place="extensionsRequired",
+            found=_shown(required[0]),
+            remedy="read it with the program that made it",
+        )
+    return value
+
+
+def _validated(path: Path, value: dict[str, Any]) -> Manifest:
+    newer = value["version"] != FORMAT_VERSION
+    if newer:
+        value = {**value, "version": FORMAT_VERSION, "minVersion": FORMAT_VERSION}
     try:
-        manifest = Manifest.model_validate_json(json.dumps(value))
+        try:
+            manifest = Manifest.model_validate_json(json.dumps(value))
+        except ValidationError as error:
+            unknown = [one["loc"] for one in error.errors() if one["type"] == "extra_forbidden"]
+            if not newer or not unknown:
+                raise
+            manifest = Manifest.model_validate_json(json.dumps(_without(value, unknown)))
+        missing = _missing_keys(manifest.model_dump(mode="json"), value)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -109,35 +147,22 @@ def parse_manifest(path: Path) -> Manifest:
             found=repr(first["input"])[:200],
             remedy=REMEDY,
         ) from None
-    missing = _missing_keys(manifest.model_dump(mode="json"), value)
+    except (ValueError, RecursionError):  # pydantic: what lies too deep in extras
+        raise UserError("the manifest is wrong", file=path, found="too deep", remedy=REMEDY) from None
     if missing:
         raise UserError("the manifest lacks keys", file=path, place=", ".join(missing), remedy=REMEDY)
     return manifest
 
 
-def _without_view_effects(value: dict[str, Any]) -> dict[str, Any]:
-    """A manifest as it would be without what early writers of version 2 had in each level: `view_effects`, null or a
-    picture with a place in it for each layer, which a player was always free to ignore."""
-    levels = value.get("levels")
-    return value | {"levels": [_level_without(one) for one in levels]} if isinstance(levels, list) else value
-
-
-def _level_without(level: Any) -> Any:
-    if not isinstance(level, dict) or "view_effects" not in level:
-        return level
-    kept = {key: part for key, part in level.items() if key != "view_effects"}
-    effects, layers = level["view_effects"], level.get("layers")
-    if isinstance(effects, dict) and isinstance(layers, list):
-        kept["bytes"] = _difference(level.get("bytes"), effects.get("bytes"))
-        kept["layers"] = [
-            {key: part for key, part in layer.items() if key != "effects_rect"} if isinstance(layer, dict) else layer
-            for layer in layers
-        ]
-    return kept
-
-
-def _difference(whole: Any, part: Any) -> Any:
-    return whole - part if isinstance(whole, int) and isinstance(part, int) else whole
+def _without(value: dict[str, Any], places: list[tuple[int | str, ...]]) -> dict[str, Any]:
+    """A copy without the keys at some places: what a newer version added and this one may pass over."""
+    copied: dict[str, Any] = json.loads(json.dumps(value))
+    for place in places:
+        inner: Any = copied
+        for key in place[:-1]:
+            inner = inner[key]
+        inner.pop(place[-1], None)
+    return copied
 
 
 def _shown(value: object) -> object:
@@ -151,6 +176,7 @@ def _shown(value: object) -> object:
 def _missing_keys(whole: Any, given: Any, place: str = "") -> list[str]:
     """Dotted names of the keys of `whole` that `given` lacks (and whose defaults filled the gap)."""
     if isinstance(whole, dict):
+        whole = {key: inner for key, inner in whole.items() if key not in ("extensions", "extras")}
         found = [f"{place}{key}" for key in whole if key not in given]
         pairs = [(key, whole[key], given[key]) for key in whole if key in given]
     elif isinstance(whole, list):

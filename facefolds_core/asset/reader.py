@@ -5,7 +5,6 @@ Nothing is decoded whose bytes are not the manifest's: a file that is changed af
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -16,10 +15,11 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
-from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest, StoredFile
+from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest
+from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
-from facefolds_core.asset.stored import check_file, is_folder, refuse_changed
+from facefolds_core.asset.stored import check_file, is_folder, read_slice, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
@@ -220,20 +220,28 @@ def read_level(folder: Path, level: Level, track: Track | None = None) -> AssetL
     Raises:
         UserError: if a mesh is damaged.
     """
-    return AssetLevel(folder, level, tuple(_read_layer(folder, layer) for layer in level.layers), track=track)
+    for file in level.meshes:
+        refuse_changed(folder / file.file, file.bytes, file.sha256, REMEDY)
+    layers = tuple(_read_layer(folder, layer, f"layer {index}") for index, layer in enumerate(level.layers))
+    return AssetLevel(folder, level, layers, track=track)
 
 
-def _read_layer(folder: Path, layer: Layer) -> TexturedMesh:
+def layer_bytes(folder: Path, layer: Layer) -> bytes:
+    """The Draco mesh of a layer as it is stored.
+
+    Raises:
+        UserError: if its bytes are not the manifest's.
+    """
+    return read_slice(folder / layer.mesh, layer.offset, layer.bytes, layer.sha256, REMEDY)
+
+
+def _read_layer(folder: Path, layer: Layer, place: str) -> TexturedMesh:
     path = folder / layer.mesh
-    refuse_changed(path, layer.bytes, layer.sha256, REMEDY)
-    data = path.read_bytes()
-    if hashlib.sha256(data).hexdigest() != layer.sha256:  # changed between the two
-        raise UserError("damaged asset", file=path, found="the file changed while it was read", remedy="try again")
     try:
-        mesh = decode_mesh(data)
+        mesh = decode_mesh(layer_bytes(folder, layer))
     except DracoError as error:
-        raise UserError("damaged mesh", file=folder / layer.mesh, found=str(error), remedy=REMEDY) from None
+        raise UserError("damaged mesh", file=path, place=place, found=str(error), remedy=REMEDY) from None
     problems = mesh_problems(mesh, layer.vertices, layer.triangles)
     if problems:
-        raise UserError("damaged mesh", file=folder / layer.mesh, found="; ".join(problems), remedy=REMEDY)
+        raise UserError("damaged mesh", file=path, place=place, found="; ".join(problems), remedy=REMEDY)
     return mesh

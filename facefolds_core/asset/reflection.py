@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest import REMEDY, Level, Rect, Reflection
+from facefolds_core.asset.manifest import REMEDY, Level, Reflection
+from facefolds_core.asset.manifest_base import Rect
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.pictures import DamagedPictureError, open_picture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
 from functools import lru_cache
@@ -65,6 +66,25 @@ def refuse_changed(path: Path, size: int, sha256: str, remedy: str) -> None:
         problem = special_problem(path) or "the file cannot be read"
     if problem:
         raise UserError("damaged asset", file=path, found=problem, remedy=remedy)
+
+
+def read_slice(path: Path, offset: int, size: int, sha256: str, remedy: str) -> bytes:
+    """Some bytes of a file, checked.
+
+    Raises:
+        UserError: if they are not (or no longer) what the manifest says.
+    """
+    try:
+        with path.open("rb") as file:
+            file.seek(offset)
+            data = file.read(size)
+    except OSError as error:
+        found = f"the file cannot be read: {error.strerror}"
+        raise UserError("damaged asset", file=path, found=found, remedy=remedy) from None
+    if hashlib.sha256(data).hexdigest() != sha256:
+        found = f"the SHA-256 of the {size} bytes from byte {offset} on is not the manifest's"
+        raise UserError("damaged asset", file=path, found=found, remedy=remedy)
+    return data
 
 
 @lru_cache(maxsize=64)

@@ -10,9 +10,11 @@ import numpy as np
 from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh, degenerate_faces
-from facefolds_core.asset.manifest import Layer, Level, Manifest, Poster, Reflection, Texture, Video
+from facefolds_core.asset.manifest import Layer, Level, Manifest, Reflection, Texture, Video
+from facefolds_core.asset.manifest_extras import Picture as StoredPicture
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.nesting import lies_within
+from facefolds_core.asset.reader import layer_bytes
 from facefolds_core.asset.stored import check_file, is_folder, leads_out
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
@@ -75,7 +77,7 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
             if video.file in whole:
                 found = _video_problems(folder / video.file, video, level.texture)
                 yield from (f"{video.file}: {problem}" for problem in found)
-    pictures: list[Poster | Reflection] = [
+    pictures: list[StoredPicture | Reflection] = [
         *manifest.photos,
         *([manifest.poster] if manifest.poster else []),
     ]
@@ -92,11 +94,12 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
 def _mesh_problems(folder: Path, level: Level, whole: set[str], centre: tuple[float, float, float]) -> Iterator[str]:
     """The layers of a level, each by itself and against the one around it."""
     outer: TexturedMesh | None = None
-    for layer in level.layers:
-        mesh, problems = _layer(folder / layer.mesh, layer) if layer.mesh in whole else (None, [])
-        yield from (f"{layer.mesh}: {problem}" for problem in problems)
+    for index, layer in enumerate(level.layers):
+        mesh, problems = _layer(folder, layer) if layer.mesh in whole else (None, [])
+        place = f"{layer.mesh}: layer {index}"
+        yield from (f"{place}: {problem}" for problem in problems)
         if mesh is not None and outer is not None and lies_within(outer, mesh, centre):
-            yield f"{layer.mesh}: lies around the layer before it: the order is from the outermost in"
+            yield f"{place} lies around the layer before it: the order is from the outermost in"
         outer = mesh
 
 
@@ -119,10 +122,12 @@ def _in_words(name: str, error: UserError) -> str:
     return ", ".join(parts)
 
 
-def _layer(path: Path, layer: Layer) -> tuple[TexturedMesh | None, list[str]]:
+def _layer(folder: Path, layer: Layer) -> tuple[TexturedMesh | None, list[str]]:
     """A layer's mesh (None if it is unusable), and what is wrong with it."""
     try:
-        mesh = decode_mesh(path.read_bytes())
+        mesh = decode_mesh(layer_bytes(folder, layer))
+    except UserError as error:
+        return None, [str(error.found)]
     except DracoError as error:
         return None, [f"not a Draco mesh with texture coordinates: {error}"]
     problems = mesh_problems(mesh, layer.vertices, layer.triangles)
@@ -140,10 +145,10 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
             ("codec", facts.codec, video.codec),
             ("container", facts.container, video.container),
             ("level", facts.level, video.level),
-            ("MIME type", facts.mime, video.mime),
+            ("MIME type", facts.mime if "codecs=" in video.mime else video.mime, video.mime),  # version 1 had none
             ("pixel format", facts.pixel_format, video.pixel_format),
             ("width and height", (facts.width, facts.height), (texture.width, texture.height)),
-            ("frames a second", round(float(facts.rate), 6), round(texture.fps, 6)),
+            ("frames a second", facts.rate, texture.rate),
         ]
         problems = [f"{name} {found}, the manifest says {said}" for name, found, said in pairs if found != said]
         if facts.tags != _BT709_LIMITED:
@@ -172,7 +177,7 @@ def _colourful(picture: Picture, texture: Texture) -> bool:
     return bool((np.abs(chroma.astype(np.int16) - 128) > _COLOURFUL).any(0).mean() > 0.01)
 
 
-def _picture_problems(path: Path, said: Poster | Reflection) -> list[str]:
+def _picture_problems(path: Path, said: StoredPicture | Reflection) -> list[str]:
     try:
         size = picture_size(path)
         if size != (said.width, said.height):

@@ -21,7 +21,6 @@ from av.error import FFmpegError
 from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
-from facefolds_core.asset.audio import SoundTrack
 from facefolds_core.asset.codecs import CODECS, Codec, Stream
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
 from facefolds_core.asset.containers import container_of
@@ -103,16 +102,14 @@ def encode_video(
     fps: Fraction,
     codec: Codec,
     options: dict[str, str],
-    audio: Path | None = None,
 ) -> int:
     """Encode planar pictures of `size` (width, height); returns how many.
 
     Args:
         options: of the encoder, `codec.options(...)`.
-        audio: a sound file; the sound goes into an MP4, from the first picture on.
 
     Raises:
-        UserError: if the encoder refuses, or the sound cannot be read.
+        UserError: if the encoder refuses.
     """
     count = 0
     os.environ.setdefault("SVT_LOG", "1")  # SVT-AV1 writes to stderr by itself; 1: errors only
@@ -121,7 +118,6 @@ def encode_video(
         with av.open(str(path), "w", format=codec.container, options=muxer) as container:
             stream: Any = container.add_stream(codec.encoder, rate=fps, options=options)
             _describe(stream, size, fps)
-            sound = None if audio is None or codec.container != "mp4" else SoundTrack(container, audio)
             with kept_scheduling():
                 container.start_encoding()
             for picture in pictures:
@@ -130,8 +126,6 @@ def encode_video(
                 frame.pts, frame.time_base = count, 1 / fps
                 container.mux(stream.encode(frame))
                 count += 1
-                if sound:
-                    sound.mux_until(count / fps)
             container.mux(stream.encode(None))
     except FFmpegError as error:
         if error.errno in (28, 122):  # disk full, quota: reported as such by the stage
@@ -216,6 +210,17 @@ def probe_video(path: Path) -> VideoFacts:
             rate=rate,
             tags=(int(context.colorspace), int(context.color_range)),
         )
+
+
+def key_frames(path: Path) -> list[int]:
+    """The numbers of the pictures that can be decoded without the ones before, by the container's marks.
+
+    Raises:
+        UserError: if the file cannot be read.
+    """
+    with _opened(path) as (container, stream, _):
+        packets = (packet for packet in container.demux(stream) if packet.size)
+        return [number for number, packet in enumerate(packets) if packet.is_keyframe]
 
 
 def decode_video(path: Path, size: tuple[int, int], fps: float, start: int = 0) -> Iterator[Picture]:

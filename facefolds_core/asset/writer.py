@@ -17,10 +17,22 @@ from facefolds_core import __version__
 from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
 from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
 from facefolds_core.asset.draco import MeshSettings, encode_mesh
-from facefolds_core.asset.manifest import Coordinates, Layer, Level, Manifest, Pose, Texture, Transform, Video
+from facefolds_core.asset.manifest import (
+    Bounds,
+    Coordinates,
+    Layer,
+    Level,
+    Manifest,
+    Texture,
+    Transform,
+    Video,
+)
+from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.manifest_extras import Pose
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
-from facefolds_core.asset.packing import AtlasLayout, Rect, check_layout
-from facefolds_core.asset.video import encode_video, pack_frame, probe_video
+from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -88,15 +100,18 @@ def write_asset(
     folder = Path(folder)
     with atomic_folder(folder) as temporary:
         level = write_level(temporary, FULL, LevelContent(layers, textures, frames, source.fps), params)
-        return write_manifest(manifest_of(source, [level]), temporary / MANIFEST_NAME)
+        return write_manifest(manifest_of(source, [level], temporary), temporary / MANIFEST_NAME)
 
 
-def manifest_of(source: AssetSource, levels: Sequence[Level]) -> Manifest:
-    """A manifest without sound and pictures."""
+def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> Manifest:
+    """A manifest without sound and pictures, of levels whose files lie in `folder`."""
+    corners = [mesh.vertices for level in levels for mesh in read_level(folder, level).layers]
+    low, high = (np.stack([pick(vertices, 0) for vertices in corners]) for pick in (np.min, np.max))
     manifest = Manifest(
         generator=f"facefolds {__version__}",
         subject=source.subject,
         coordinates=Coordinates(to_capture=Transform.of(source.to_capture), sphere_centre=source.sphere_centre),
+        bounds=Bounds(min=tuple(low.min(0).tolist()), max=tuple(high.max(0).tolist())),
         levels=tuple(levels),
     )
     if source.track is None:
@@ -115,14 +130,12 @@ class LevelContent:
         textures: of which the layers' crops ship.
         frames: K.
         fps: frames a second; 0 for a static scene.
-        audio: a sound file for the MP4s.
     """
 
     layers: Sequence[CroppedLayer]
     textures: Textures
     frames: int
     fps: float
-    audio: Path | None = None
 
     @cached_property
     def layout(self) -> AtlasLayout:
@@ -148,13 +161,13 @@ class LevelContent:
         count, layout = self.frames if frames is None else frames, self.layout
         pictures = (pack_frame(self.frame(index), layout) for index in range(count))
         size = (layout.width, layout.height)
-        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf), self.audio)
+        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf))
 
 
 def write_level(
     folder: Path, name: str, content: LevelContent, params: AssetSettings, crfs: Mapping[CodecName, int] | None = None
 ) -> Level:
-    """Write the files of one level into `folder`: NAME_00.drc ..., NAME.mp4 ...; returns its part of the manifest.
+    """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
     Args:
         crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
@@ -163,10 +176,7 @@ def write_level(
         UserError: if the textures do not fit into one video, or an encoder refuses them.
     """
     layout = content.layout
-    entries = tuple(
-        _write_layer(folder / f"{name}_{index:02d}.drc", layer, rect, params)
-        for index, (layer, rect) in enumerate(zip(content.layers, layout.rects, strict=True))
-    )
+    meshes, entries = _write_layers(folder / f"{name}_meshes.bin", content.layers, layout, params)
     videos = []
     for codec in (CODECS[codec] for codec in params.video.codec):
         path = folder / f"{name}.{codec.container}"
@@ -181,25 +191,41 @@ def write_level(
         colour_rect=layout.colour_rect,
         alpha_rect=layout.alpha_rect,
         frames=content.frames,
-        fps=float(content.rate),
+        frame_rate=content.rate.as_integer_ratio(),
+        keyframes=_shared_key_frames([folder / video.file for video in videos]),
         videos=tuple(videos),
     )
-    size = sum(entry.bytes for entry in entries) + sum(video.bytes for video in videos)
-    return Level(name=name, layers=entries, texture=texture, bytes=size)
+    size = meshes.bytes + sum(video.bytes for video in videos)
+    return Level(name=name, meshes=(meshes,), layers=entries, texture=texture, bytes=size)
 
 
-def _write_layer(path: Path, layer: CroppedLayer, rect: Rect, params: AssetSettings) -> Layer:
-    data, decoded = encode_mesh(layer.mesh, params.mesh)
-    path.write_bytes(data)
-    return Layer(
-        mesh=path.name,
-        vertices=len(decoded.vertices),
-        triangles=len(decoded.faces),
-        bytes=len(data),
-        sha256=hashlib.sha256(data).hexdigest(),
-        texture_rect=rect,
-        uv_window=layer.window,
-    )
+def _write_layers(
+    path: Path, layers: Sequence[CroppedLayer], layout: AtlasLayout, params: AssetSettings
+) -> tuple[StoredFile, tuple[Layer, ...]]:
+    """All meshes of a level in one file, one after the other: a player asks for it once."""
+    entries, content = [], bytearray()
+    for layer, rect in zip(layers, layout.rects, strict=True):
+        data, decoded = encode_mesh(layer.mesh, params.mesh)
+        entry = Layer(
+            mesh=path.name,
+            offset=len(content),
+            vertices=len(decoded.vertices),
+            triangles=len(decoded.faces),
+            bytes=len(data),
+            sha256=hashlib.sha256(data).hexdigest(),
+            texture_rect=rect,
+            uv_window=layer.window,
+        )
+        entries.append(entry)
+        content += data
+    path.write_bytes(content)
+    whole = StoredFile(file=path.name, bytes=len(content), sha256=hashlib.sha256(content).hexdigest())
+    return whole, tuple(entries)
+
+
+def _shared_key_frames(videos: Sequence[Path]) -> tuple[int, ...]:
+    """Key frames of all the videos."""
+    return tuple(sorted(set.intersection(*(set(key_frames(path)) for path in videos))))
 
 
 def _video_entry(path: Path, codec: Codec) -> Video:

@@ -4,6 +4,7 @@ Godot 3 has no Draco (it loads garbage without an error), no MP4, and its player
 holds plain binary meshes with y up, and every frame as a picture of its own.
 
 `facefolds.json` names all files; rectangles are the asset's own ([x, y, width, height], pixels of the picture, y down).
+`track` (absent where the head stands still) has a pose a frame, in the asset's own axes, as the manifest has it.
 A mesh file is little-endian: 3 V float32 positions, 2 V float32 texture coordinates (s, t), 3 T uint32 indices.
 """
 
@@ -94,6 +95,9 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
             contents["reflection"] = {**one.model_dump(mode="json", include=_OF_A_REFLECTION), "scales": scales}
             for layer, window in zip(layers, level.windows, strict=True):
                 layer["to_maps"] = list(window_to_window(window, one.uv_window))
+        if level.track is not None:
+            poses = zip(level.track.quaternions.tolist(), level.track.translations.tolist(), strict=True)
+            contents["track"] = [{"quaternion": q, "translation": t} for q, t in poses]
         write_json(out / CONTENTS, contents)
         return sum(path.stat().st_size for path in out.iterdir())
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import re
-from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Union
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -24,11 +24,13 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.model.textures import MlpTextures
 from facefolds_core.reading import check_regular, no_memory
+from facefolds_core.registry import MODELS
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
 
-
 Count = Annotated[int, Field(ge=2)]
+Spec = BaseModel
+"""What is written of a model: its `kind`, and its own fields."""
 
 
 SCALES_1 = {"input_scale": 6.0, "output_scale": 1.0}
@@ -106,16 +108,20 @@ class ExplicitSpec(BaseModel):
     fingerprint: str = ""
 
 
-Spec = Annotated[ModelSpec | ExplicitSpec, Field(discriminator="kind")]
-_SPEC: TypeAdapter[ModelSpec | ExplicitSpec] = TypeAdapter(Spec)
+@cache
+def _specs() -> TypeAdapter[Spec]:
+    """Of all models (facefolds_core/models), told apart by `kind`."""
+    kinds: Any = Union[tuple(MODELS[name].spec() for name in MODELS.names)]  # noqa: UP007
+    return TypeAdapter(Annotated[kinds, Field(discriminator="kind")])
 
 
-def build_model(spec: ModelSpec | ExplicitSpec) -> RadianceManifolds:
+def build_model(spec: Spec) -> RadianceManifolds:
     """An untrained model; its random numbers come from torch's global generator."""
-    return BUILDERS[spec.kind](spec)
+    model: RadianceManifolds = MODELS[spec.model_dump()["kind"]].build(spec)
+    return model
 
 
-def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
+def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     blank = torch.ones(spec.nodes)
     reflection = None
     if spec.reflection is not None:
@@ -127,7 +133,7 @@ def _build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     )
 
 
-def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
+def build_mlp(spec: ModelSpec) -> RadianceManifolds:
     manifolds = MlpManifolds(
         spec.centre,
         spec.levels,
@@ -149,10 +155,6 @@ def _build_mlp(spec: ModelSpec) -> RadianceManifolds:
         spec.view_frequencies,
     )
     return RadianceManifolds(manifolds, textures)
-
-
-BUILDERS: dict[str, Callable[[Any], RadianceManifolds]] = {"explicit": _build_explicit, "mlp": _build_mlp}
-"""Kind of a model -> what builds it of its spec."""
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:
@@ -222,13 +224,13 @@ def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: P
             raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
 
 
-def save_model(model: RadianceManifolds, spec: ModelSpec | ExplicitSpec, folder: Path) -> None:
+def save_model(model: RadianceManifolds, spec: Spec, folder: Path) -> None:
     """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
     write_tensors(folder / "model.safetensors", model.state_dict(), {"spec": spec.model_dump_json()})
     write_json(folder / "model.json", spec.model_dump(mode="json"))
 
 
-def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
+def read_spec(folder: Path) -> Spec:
     """`model.json`.
 
     Raises:
@@ -238,7 +240,7 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
     check_regular(path, _REMEDY)
     value: Any = read_json(path, remedy=_REMEDY)
     try:
-        return _SPEC.validate_python(value)
+        return _specs().validate_python(value)
     except ValidationError as error:
         first = error.errors()[0]
         raise UserError(
@@ -251,10 +253,10 @@ def read_spec(folder: Path) -> ModelSpec | ExplicitSpec:
         ) from None
 
 
-def _describes(description: str, spec: ModelSpec | ExplicitSpec) -> bool:
+def _describes(description: str, spec: Spec) -> bool:
     """Whether a description in JSON, of this version or an older one, says the same as `spec`."""
     try:
-        return _SPEC.validate_json(description) == spec
+        return _specs().validate_json(description) == spec
     except ValidationError:
         return False
 

@@ -41,7 +41,7 @@ def coarse_content(
     size = min(level.texture_resolution, full.textures.image(0, 0).shape[0])
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
-    return LevelContent(layers, textures, full.frames, full.fps, full.audio)
+    return LevelContent(layers, textures, full.frames, full.fps)
 
 
 def level_params(params: CompressParams, level: LevelParams) -> CompressParams:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from facefolds_core.asset.audio import encode_sound
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.manifest import Level, Manifest, Photo, Poster, Quality, StoredFile
+from facefolds_core.asset.manifest import Level, Manifest, Quality
+from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
@@ -99,7 +100,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         at_frame_rate(export.textures, factor, temporary, params.between) as textures,
     ):
         layers = crop_layers(export.meshes, export.windows, textures, frames * factor)
-        full = LevelContent(layers, textures, frames * factor, source.fps * factor, scene.audio)
+        full = LevelContent(layers, textures, frames * factor, source.fps * factor)
         meter = make_meter(full, cameras, params)
         levels = []
         for coarse in params.levels:
@@ -111,7 +112,9 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level]), scene, photos, params.jpeg_quality)
+        manifest = _with_extras(
+            temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality
+        )
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -157,7 +160,8 @@ def _level(
         return level
     shown = read_level(folder, level)
     psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
-    return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3))})
+    asked = None if crfs is None else video.target_psnr
+    return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3), target_psnr=asked)})
 
 
 def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:
@@ -196,20 +200,22 @@ def _with_extras(
     """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
-        path = folder / f"audio{scene.audio.suffix}"
-        shutil.copyfile(scene.audio, path)
-        update["audio"] = StoredFile(**_stored(path))
+        path, texture = folder / "audio.m4a", manifest.full.texture
+        mime = encode_sound(path, scene.audio, texture.frames / texture.fps)
+        update["audio"] = Audio(**_stored(path), mime=mime)
     train = scene.indices("train")
     if train:
-        update["view"] = filmed_view([scene.cameras[index] for index in train])
-        frontal = _frontal([scene.camera_in_head(index, 0) for index in train])
-        update["poster"] = _poster(folder / "poster.jpg", manifest.full, frontal, jpeg_quality)
+        unseen = [scene.cameras[index] for index in scene.indices("holdout")]
+        update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
+        index = max(train, key=lambda index: _frontality(scene.camera_in_head(index, 0)))
+        poster = _poster(folder / "poster.jpg", manifest.full, scene.camera_in_head(index, 0), jpeg_quality)
+        update["poster"] = poster.model_copy(update={"w2c": _rows(scene.cameras[index].w2c)})
     return manifest.model_copy(update=update)
 
 
-def _frontal(cameras: Sequence[Camera]) -> Camera:
-    """The camera that sees the subject most from its front, +x."""
-    return max(cameras, key=lambda camera: camera.centre[0] / np.linalg.norm(camera.centre))
+def _frontality(camera: Camera) -> float:
+    """How much a camera sees the subject from its front, +x: 1 at most."""
+    return float(camera.centre[0] / np.linalg.norm(camera.centre))
 
 
 def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Poster:
@@ -217,7 +223,14 @@ def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Post
     rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
     pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
     Image.fromarray(pixels).save(path, quality=jpeg_quality)
-    return Poster(**_stored(path), width=camera.width, height=camera.height)
+    return Poster(
+        **_stored(path),
+        width=camera.width,
+        height=camera.height,
+        K=_rows(camera.K),
+        w2c=_rows(camera.w2c),
+        background=(0.0, 0.0, 0.0),
+    )
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, cast, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
@@ -15,15 +15,14 @@ from facefolds_core.params.compress import CompressParams
 from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
-from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.renamed import EXPLICIT
-from facefolds_core.params.train import TrainParams, TrainSection
+from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 from facefolds_core.parsing import brief
 
 SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "capture": (CaptureParams,),
     "normalize": (NormalizeParams,),
-    "train": (ExplicitParams, MlpParams),
+    "train": get_args(TrainParams),
     "sample": (SampleParams,),
     "reconstruct": (ReconstructParams,),
     "decimate": (DecimateParams,),
@@ -32,7 +31,7 @@ SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "compress": (CompressParams,),
     "evaluate": (EvaluateParams,),
 }
-"""Stage -> its section's class; two of `train`, told apart by `model`."""
+"""Stage -> its section's class; several of `train`, told apart by `model`."""
 
 STAGE_SECTIONS = tuple(SECTIONS)
 
@@ -66,9 +65,7 @@ def train_params(value: Mapping[str, Any]) -> TrainParams:
     Raises:
         UserError: if a key or value is wrong.
     """
-    section = section_of("train", dict(value))
-    assert isinstance(section, ExplicitParams | MlpParams)
-    return section
+    return cast(TrainParams, section_of("train", dict(value)))
 
 
 def user_error(
@@ -103,10 +100,12 @@ def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
     if kind is ExplicitParams and not folders and key in EXPLICIT:
         return expected, f"it is called `{EXPLICIT[key]}` now: write `{_yaml(EXPLICIT[key])}`"
-    if kind is ExplicitParams and not folders and key in MlpParams.model_fields:
-        return expected, f"`{key}` is a key of the model `mlp` (presets paper, quick): remove it; {_SHARED}"
-    if kind is MlpParams and not folders and key in {**ExplicitParams.model_fields, **EXPLICIT}:
-        return expected, f"`{key}` is a key of the model `explicit` (preset fast): remove it; {_SHARED}"
+    for other in SECTIONS["train"] if model and not folders else ():
+        if key in {**other.model_fields, **(EXPLICIT if other is ExplicitParams else {})}:
+            name = other.model_fields["model"].default
+            presets = [preset for preset, one in PRESETS.items() if one.model == name]
+            whose = f"preset{'s' * (len(presets) > 1)} {', '.join(presets)}"
+            return expected, f"`{key}` is a key of the model `{name}` ({whose}): remove it; {_SHARED}"
     return expected, remedy
 
 

@@ -1,18 +1,23 @@
-"""`train`: one of two models, told apart by the preset, each with its own keys."""
+"""`train`: one of the models (facefolds_core/models), told apart by the preset, each with its own keys."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import BeforeValidator, Field
 
 from facefolds_core.params.base import merged
-from facefolds_core.params.explicit import ExplicitParams
-from facefolds_core.params.mlp import QUICK, MlpParams
+from facefolds_core.registry import MODELS
 
-TrainParams = ExplicitParams | MlpParams
+if TYPE_CHECKING:
+    from facefolds_core.params.explicit import ExplicitParams
+    from facefolds_core.params.mlp import MlpParams
+
+    TrainParams = ExplicitParams | MlpParams
+else:
+    TrainParams = Union[tuple(MODELS[name].Params for name in MODELS.names)]  # noqa: UP007
 
 
 @dataclass(frozen=True)
@@ -31,9 +36,7 @@ class Preset:
 DEFAULT_PRESET = "fast"
 
 PRESETS: dict[str, Preset] = {
-    "fast": Preset("explicit"),
-    "paper": Preset("mlp"),
-    "quick": Preset("mlp", QUICK),
+    preset: Preset(model, values) for model in MODELS.names for preset, values in MODELS[model].PRESETS.items()
 }
 
 
@@ -57,7 +60,7 @@ def filled(value: Any) -> Any:
 
 
 TrainSection = Annotated[
-    Annotated[ExplicitParams | MlpParams, Field(discriminator="model")],
+    Annotated[TrainParams, Field(discriminator="model")],
     BeforeValidator(filled),
 ]
 """The section as it stands in params.yaml."""

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy
-from facefolds_core.rendering.reference import BLACK, Image, Layered, seen_from
+from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from
 
 VERTEX = """
 #version 330
@@ -102,6 +102,7 @@ class OpenGLRenderer:
         Raises:
             UserError: if the picture is larger than the card allows.
         """
+        to_room = room_from(self._asset, frame)
         camera = seen_from(self._asset, camera, frame)
         self._show_frame(frame)
         target = self._sized_target(camera)
@@ -115,6 +116,7 @@ class OpenGLRenderer:
             texture.use(unit)
         if self._reflections:
             _uniform(self._colour, "eye").write(camera.centre.astype("f4").tobytes())
+            _uniform(self._colour, "to_room").write(to_room.T.astype("f4").tobytes())
         count = len(self._layers)
         for index in reversed(range(count)):
             # NDC depth from -1 (outermost layer) to 1; a little is left free between slices.

@@ -22,6 +22,7 @@ uniform sampler2D normals;
 uniform sampler2D environment;
 uniform vec4 to_maps; // (s, t) of the layer -> that of the maps: times xy, plus zw
 uniform vec3 eye;
+uniform mat3 to_room; // from the meshes' own axes to those of the room, which the light is fixed to
 in vec2 st;
 in vec3 point;
 out vec4 colour;
@@ -30,7 +31,7 @@ void main() {
   vec4 here = texture(added, at);
   vec3 normal = normalize(texture(normals, at).rgb);
   vec3 along = normalize(point - eye);
-  vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+  vec3 r = to_room * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   colour = texture(picture, st);
   colour.rgb = clamp(colour.rgb + here.a * texture(environment, place).rgb - here.rgb, 0.0, 1.0);

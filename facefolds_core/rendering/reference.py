@@ -162,3 +162,9 @@ def seen_from(asset: Layered, camera: Camera, frame: float) -> Camera:
     """A camera of the world in the frame of the meshes, which an asset with a `track` moves."""
     track: Track | None = getattr(asset, "track", None)
     return camera if track is None else track.camera(camera, frame)
+
+
+def room_from(asset: Layered, frame: float) -> NDArray[np.float64]:
+    """(3, 3) rotation from the meshes' axes in a frame to those of the room, which the reflected light is fixed to."""
+    track: Track | None = getattr(asset, "track", None)
+    return np.eye(3) if track is None else track.at(frame).rotation

@@ -11,6 +11,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.rendering import AssetCaster
+from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.scoring.model_view import ModelView
 
@@ -54,9 +55,11 @@ class PosedView:
             self.model = ModelView(self._model, camera)
 
     def _turn_asset(self, frame: int) -> None:
-        self.seen_by = self._asset.camera_in_head(self._camera, frame * self._step)
+        time = frame * self._step
+        self.seen_by = self._asset.camera_in_head(self._camera, time)
         self.hits = self._caster.cast(self.seen_by)
         maps = self._reflection
         self.glossy = None
         if maps is not None:
-            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps)
+            to_room = None if self._asset.track is None else room_from(self._asset, time)
+            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps, to_room)

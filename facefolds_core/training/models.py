@@ -1,37 +1,32 @@
-"""The models by name: what trains each. Their keys are in params/train.py, their files in model/storage.py."""
+"""Training by the model that the parameters are of (facefolds_core/models)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import TrainParams
-from facefolds_core.training.explicit.loop import fit_explicit, train_explicit
-from facefolds_core.training.loop import fit_mlp
-from facefolds_core.training.loop import train as train_mlp
+from facefolds_core.registry import MODELS
 from facefolds_core.training.report import TrainingReport
 from facefolds_core.training.trained import Trained
 
-FITTERS: dict[str, Callable[[Scene, Any, Path, Path], Trained]] = {
-    "explicit": lambda scene, params, checkpoints, log: fit_explicit(scene, params, log),
-    "mlp": fit_mlp,
-}
-"""Model -> fit(scene, params, folder of checkpoints, folder of the log)."""
-
-TRAINERS: dict[str, Callable[[Scene, Any, Path, Path, Path], TrainingReport]] = {
-    "explicit": lambda scene, params, folder, checkpoints, log: train_explicit(scene, params, folder, log),
-    "mlp": train_mlp,
-}
-"""Model -> the same, with the model's folder, which is written whole, before the others."""
-
 
 def fit(scene: Scene, params: TrainParams, checkpoints: Path, log: Path) -> Trained:
-    """Train the model that `params` are of."""
-    return FITTERS[params.model](scene, params, checkpoints, log)
+    """Train.
+
+    Args:
+        checkpoints, log: folders, of what lasts as long as the training and of dvclive's files.
+    """
+    trained: Trained = MODELS[params.model].fit(scene, params, checkpoints, log)
+    return trained
 
 
 def train(scene: Scene, params: TrainParams, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    """The same, and write the model's folder."""
-    return TRAINERS[params.model](scene, params, folder, checkpoints, log)
+    """The same, and write the model's folder, whole: by the model's own `train`, if it has one."""
+    own = getattr(MODELS[params.model], "train", None)
+    if own is None:
+        trained = fit(scene, params, checkpoints, log)
+        trained.save(folder)
+        return trained.report
+    report: TrainingReport = own(scene, params, folder, checkpoints, log)
+    return report

@@ -9,7 +9,7 @@ from typing import Any
 
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model.radiance import RadianceManifolds
-from facefolds_core.model.storage import ExplicitSpec, ModelSpec, save_model
+from facefolds_core.model.storage import Spec, save_model
 from facefolds_core.training.report import TrainingReport
 
 
@@ -26,7 +26,7 @@ class Trained:
     """
 
     model: RadianceManifolds
-    spec: ModelSpec | ExplicitSpec
+    spec: Spec
     report: TrainingReport
     fit: dict[str, Any] | None = None
     draw: Callable[[Path], None] | None = None

@@ -28,9 +28,11 @@ class Player:
 
     def __init__(self, folder: Path, level: int = -1) -> None:
         manifest = json.loads((folder / "manifest.json").read_text())
-        assert manifest["format"] == "facefolds" and manifest["version"] == 2
+        assert manifest["format"] == "facefolds" and manifest["version"] == 3
         self.folder, self.level = folder, manifest["levels"][level]
-        self.meshes = [DracoPy.decode((folder / x["mesh"]).read_bytes()) for x in self.level["layers"]]
+        files = {x["file"]: (folder / x["file"]).read_bytes() for x in self.level["meshes"]}
+        parts = [files[x["mesh"]][x["offset"] : x["offset"] + x["bytes"]] for x in self.level["layers"]]
+        self.meshes = [DracoPy.decode(part) for part in parts]
         self.reflection = self._reflection()
 
     def pictures(self) -> list[Array]:

@@ -136,11 +136,15 @@ def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     compress(folders)
     assert validate_asset(folders.asset) == []
     manifest = read_asset(folders.asset).manifest
-    assert manifest.audio is not None and manifest.audio.file == "audio.wav"
+    assert manifest.audio is not None and manifest.audio.file == "audio.m4a"
     assert manifest.poster is not None and (manifest.poster.width, manifest.poster.height) == (48, 48)
     assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
     scene = read_scene(folders.scene)
-    assert manifest.view == filmed_view([scene.cameras[index] for index in scene.indices("train")])
+    train, unseen = ([scene.cameras[i] for i in scene.indices(split)] for split in ("train", "holdout"))
+    assert manifest.view == filmed_view(train, unseen)
+    assert manifest.view is not None and manifest.view.measured is not None
+    assert manifest.audio.mime == 'audio/mp4; codecs="mp4a.40.2"'
+    assert manifest.poster.K is not None and manifest.poster.background == (0.0, 0.0, 0.0)
     camera = read_scene(folders.scene).cameras[1]
     np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
     np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
@@ -168,7 +172,7 @@ def test_twice_the_frame_rate(folders: SubjectFolders) -> None:
         assert [photo.frame for photo in asset.manifest.photos] == [0, factor]
         assert not list(folders.asset.glob(".between-*"))
         glbs.append(folders.glb.read_bytes())
-        sounds.append(sound_of(folders.asset / "full.mp4"))
+        sounds.append(sound_of(folders.asset / "audio.m4a"))
     assert glbs[0] == glbs[1]
     assert sounds[0] == sounds[1]
     frames = [np.concatenate([layer.ravel() for layer in frame]).astype(int) for frame in asset.frames()]

@@ -15,10 +15,10 @@ from tests.viewer.fixtures import random_reflection
 
 FILES = [
     "manifest.json",
-    *(f"{level}_0{layer}.drc" for level in ("small", "full") for layer in range(3)),
+    *(f"{level}_meshes.bin" for level in ("small", "full")),
     *(f"{level}.{container}" for level in ("small", "full") for container in ("mp4", "webm")),
     *(f"{level}_reflection.png" for level in ("small", "full")),
-    "audio.wav",
+    "audio.m4a",
     "poster.jpg",
     "photo_00.jpg",
 ]

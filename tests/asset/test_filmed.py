@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.manifest import FilmedView
+from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.asset.manifest_file import SCHEMA_PATH, parse_manifest
 from facefolds_core.errors import UserError
 from tests.assets import make_asset

@@ -15,6 +15,7 @@ from facefolds_core import __version__
 from facefolds_core.asset.manifest_file import SCHEMA_PATH, manifest_schema, parse_manifest, seal_is_whole
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
+from tests.older import as_version_2
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,12 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Manifests that break one rule each."""
     edits: dict[str, tuple[list[Any], Any]] = {
         "format": (["format"], "gltf"),
-        "version": (["version"], 1),
+        "version": (["version"], "3"),
+        "no such version": (["version"], 0),
+        "minVersion": (["minVersion"], 4),
+        "no name": (["extensionsUsed"], [""]),
+        "null": (["extras"], None),
+        "extension": (["levels", 0, "extensions"], {"A": 1}),
         "no levels": (["levels"], []),
         "level name": (["levels", 0, "name"], "Full"),
         "no layers": (["levels", 0, "layers"], []),
@@ -64,7 +70,7 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
         "hash": (["levels", 0, "texture", "videos", 0, "sha256"], "0" * 63),
         "count as text": (["levels", 0, "texture", "frames"], "5"),
         "codec": (["levels", 0, "texture", "videos", 0, "codec"], "mpeg2"),
-        "fps": (["levels", 0, "texture", "fps"], 0),
+        "fps": (["levels", 0, "texture", "frame_rate"], [0, 1]),
         "culling": (["compositing", "culling"], "back"),
         "rotation": (["coordinates", "to_capture", "rotation"], [[1, 0], [0, 1]]),
         "scale": (["coordinates", "to_capture", "scale"], 0),
@@ -115,8 +121,13 @@ def test_schema_and_models_accept_all_that_may_be_there(path: Path, tmp_path: Pa
     poster = stored | {"width": 4, "height": 4}
     row = [1.0, 0.0, 0.0]
     photo = poster | {"camera": "a", "frame": 0, "K": [row] * 3, "w2c": [[*row, 0.0]] * 3}
-    value |= {"audio": stored, "poster": poster, "photos": [photo]}
-    level = value["levels"][0] | {"reflection": REFLECTION, "quality": {"psnr_to_model": 40.0}}
+    shown = poster | {"K": photo["K"], "w2c": photo["w2c"], "background": [0.0, 0.5, 1.0]}
+    value |= {"audio": stored | {"mime": "audio/mp4"}, "poster": shown, "photos": [photo]}
+    value["view"] = {"azimuth": [0.0, 1.0], "elevation": [0.0, 1.0], "distance": [1.0, 2.0], "measured": [row]}
+    value |= {"extensionsUsed": ["A"], "extensions": {"A": {"b": [1, {}]}}, "extras": {"c": None}}
+    value["track"] = [{"quaternion": [1.0, 0.0, 0.0, 0.0], "translation": row}]
+    level = value["levels"][0] | {"reflection": REFLECTION, "quality": {"psnr_to_model": 40.0, "target_psnr": 41.0}}
+    level["layers"][0]["extras"] = "a note"
     value["levels"] = [level]
     jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text())).validate(value)
     (tmp_path / "manifest.json").write_text(json.dumps(value))
@@ -126,13 +137,15 @@ def test_schema_and_models_accept_all_that_may_be_there(path: Path, tmp_path: Pa
 @pytest.mark.parametrize("effects", [None, {"file": "full_effects.png", "bytes": 9, "sha256": "0" * 64, "scale": 0.5}])
 def test_the_view_effects_of_older_assets_are_left_out(path: Path, tmp_path: Path, effects: Any) -> None:
     value, today = json.loads(path.read_text()), parse_manifest(path)
+    value = as_version_2(value)
     level = value["levels"][0]
     level["view_effects"] = effects
     if effects:
         level["bytes"] += effects["bytes"]
         level["layers"] = [layer | {"effects_rect": [0, 0, 1, 1]} for layer in level["layers"]]
     (tmp_path / "manifest.json").write_text(json.dumps(value))
-    assert parse_manifest(tmp_path / "manifest.json") == today
+    read = parse_manifest(tmp_path / "manifest.json")
+    assert (read.full.bytes, read.full.layers[0].texture_rect) == (today.full.bytes, today.full.layers[0].texture_rect)
 
 
 def test_checksum_of_the_manifest(path: Path) -> None:
@@ -152,19 +165,31 @@ def test_not_a_manifest(tmp_path: Path, text: str, word: str) -> None:
         parse_manifest(tmp_path / "manifest.json")
 
 
-def test_version_1_is_refused_in_plain_words(path: Path, tmp_path: Path) -> None:
-    (tmp_path / "manifest.json").write_text(json.dumps({"format": "facefolds", "version": 1, "layers": []}))
-    with pytest.raises(UserError, match="another format version") as caught:
-        parse_manifest(tmp_path / "manifest.json")
-    assert (caught.value.expected, caught.value.found) == (2, 1)
-
-
 def test_another_version_is_said_in_plain_words(path: Path, tmp_path: Path) -> None:
-    value = json.loads(path.read_text()) | {"version": 7, "something": "new"}
+    value = json.loads(path.read_text()) | {"version": 7, "minVersion": 7}
     (tmp_path / "manifest.json").write_text(json.dumps(value))
     with pytest.raises(UserError, match="another format version") as caught:
         parse_manifest(tmp_path / "manifest.json")
-    assert (caught.value.expected, caught.value.found) == (2, 7)
+    assert (caught.value.expected, caught.value.found) == ("1 to 3", 7)
+
+
+def test_a_newer_version_that_says_so_is_read_without_what_it_added(path: Path, tmp_path: Path) -> None:
+    value = json.loads(path.read_text())
+    newer = copy.deepcopy(value) | {"version": 4, "something": "new"}
+    newer["levels"][0]["texture"]["more"] = [1]
+    (tmp_path / "manifest.json").write_text(json.dumps(newer))
+    assert parse_manifest(tmp_path / "manifest.json") == parse_manifest(path)
+    (tmp_path / "manifest.json").write_text(json.dumps(newer | {"minVersion": 4}))
+    with pytest.raises(UserError, match="another format version"):
+        parse_manifest(tmp_path / "manifest.json")
+
+
+def test_a_required_extension_is_refused_by_its_name(path: Path, tmp_path: Path) -> None:
+    value = json.loads(path.read_text()) | {"extensionsUsed": ["A_b"], "extensionsRequired": ["A_b"]}
+    (tmp_path / "manifest.json").write_text(json.dumps(value))
+    with pytest.raises(UserError, match="extension") as caught:
+        parse_manifest(tmp_path / "manifest.json")
+    assert caught.value.found == "A_b"
 
 
 def test_generator_is_the_projects_version() -> None:

@@ -13,7 +13,8 @@ import pytest
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.checks import manifest_problems
 from facefolds_core.asset.glb import write_glb
-from facefolds_core.asset.manifest import Manifest, Pose
+from facefolds_core.asset.manifest import Manifest
+from facefolds_core.asset.manifest_extras import Pose
 from facefolds_core.asset.manifest_file import SCHEMA_PATH
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.track import Track

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -22,7 +23,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import file_sha256
 from tests.assets import cap_mesh, make_asset
 
-FILES = ["manifest.json", "full_00.drc", "full_01.drc", "full.mp4"]
+FILES = ["manifest.json", "full_meshes.bin", "full.mp4"]
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +62,19 @@ def video(value: dict[str, Any]) -> dict[str, Any]:
 def add_up(value: dict[str, Any]) -> None:
     """Correct the level's total after a change of a file's size."""
     level = value["levels"][0]
-    level["bytes"] = sum(entry["bytes"] for entry in [*level["layers"], *level["texture"]["videos"]])
+    level["bytes"] = sum(entry["bytes"] for entry in [*level["meshes"], *level["texture"]["videos"]])
 
 
 def replace_mesh(folder: Path, data: bytes, vertices: int, triangles: int) -> None:
-    path = folder / "full_01.drc"
-    path.write_bytes(data)
-    entry = {"bytes": len(data), "sha256": file_sha256(path), "vertices": vertices, "triangles": triangles}
+    """Of layer 1, the last in the level's file."""
+    path, digest = folder / "full_meshes.bin", hashlib.sha256(data).hexdigest()
+    entry = {"bytes": len(data), "sha256": digest, "vertices": vertices, "triangles": triangles}
 
     def change(value: dict[str, Any]) -> None:
-        value["levels"][0]["layers"][1].update(entry)
+        level = value["levels"][0]
+        level["layers"][1].update(entry)
+        path.write_bytes(path.read_bytes()[: level["layers"][1]["offset"]] + data)
+        level["meshes"][0].update(bytes=path.stat().st_size, sha256=file_sha256(path))
         add_up(value)
 
     edit(folder, change)
@@ -126,7 +130,7 @@ def test_flipped_bits(asset: Path, file: str) -> None:
 @pytest.mark.parametrize("key", ["vertices", "triangles"])
 def test_wrong_mesh_counts(asset: Path, key: str) -> None:
     edit(asset, lambda value: value["levels"][0]["layers"][1].update({key: value["levels"][0]["layers"][1][key] + 1}))
-    assert_found(asset, "full_01.drc", key)
+    assert_found(asset, "full_meshes.bin", key)
 
 
 @pytest.mark.parametrize("frames", [2, 4])
@@ -136,7 +140,7 @@ def test_wrong_number_of_frames(asset: Path, frames: int) -> None:
 
 
 def test_wrong_rate(asset: Path) -> None:
-    edit(asset, lambda value: value["levels"][0]["texture"].update(fps=25.0))
+    edit(asset, lambda value: value["levels"][0]["texture"].update(frame_rate=[25, 1]))
     assert any("frames a second" in problem for problem in validate_asset(asset))
 
 
@@ -158,6 +162,22 @@ def test_rects_overlap(asset: Path) -> None:
         ),
     )
     assert_found(asset, "manifest.json", "overlap")
+
+
+def test_a_mesh_outside_its_file(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][0]["layers"][1].update(offset=10**6))
+    assert_found(asset, "manifest.json", "not inside a file")
+
+
+def test_a_mesh_that_begins_elsewhere_in_its_file(asset: Path) -> None:
+    edit(asset, lambda value: value["levels"][0]["layers"][1].update(offset=1))
+    assert_found(asset, "full_meshes.bin", "layer 1: the SHA-256")
+
+
+@pytest.mark.parametrize("keyframes", [[0, 3], [1], [0, 2, 1]])
+def test_key_frames_that_are_none(asset: Path, keyframes: list[int]) -> None:
+    edit(asset, lambda value: value["levels"][0]["texture"].update(keyframes=keyframes))
+    assert_found(asset, "manifest.json", "keyframes")
 
 
 def test_wrong_total(asset: Path) -> None:
@@ -188,13 +208,13 @@ def test_rotation_that_is_none(asset: Path) -> None:
 def test_texture_coordinates_outside(asset: Path) -> None:
     mesh = cap_mesh(0.3, 4)
     replace_mesh(asset, draco(mesh.vertices, mesh.faces, mesh.st * 1.5), 16, 18)
-    assert_found(asset, "full_01.drc", "outside [0, 1]")
+    assert_found(asset, "full_meshes.bin", "outside [0, 1]")
 
 
 def test_no_texture_coordinates(asset: Path) -> None:
     mesh = cap_mesh(0.3, 4)
     replace_mesh(asset, draco(mesh.vertices, mesh.faces, None), 16, 18)
-    assert_found(asset, "full_01.drc", "no texture coordinates")
+    assert_found(asset, "full_meshes.bin", "no texture coordinates")
 
 
 def test_vertices_not_finite(asset: Path) -> None:
@@ -202,7 +222,7 @@ def test_vertices_not_finite(asset: Path) -> None:
     vertices = mesh.vertices.copy()
     vertices[5, 2] = np.nan
     replace_mesh(asset, draco(vertices, mesh.faces, mesh.st), 16, 18)
-    assert_found(asset, "full_01.drc", "not finite")
+    assert_found(asset, "full_meshes.bin", "not finite")
 
 
 def test_degenerate_face(asset: Path) -> None:
@@ -215,12 +235,12 @@ def test_degenerate_face(asset: Path) -> None:
 
 def test_not_a_mesh(asset: Path) -> None:
     replace_mesh(asset, b"something else" * 9, 16, 18)
-    assert_found(asset, "full_01.drc", "not a Draco mesh")
+    assert_found(asset, "full_meshes.bin", "not a Draco mesh")
 
 
 def test_file_that_the_manifest_does_not_name(asset: Path) -> None:
-    (asset / "full_02.drc").write_bytes(b"")
-    assert validate_asset(asset) == ["full_02.drc: not named in the manifest"]
+    (asset / "full_02.bin").write_bytes(b"")
+    assert validate_asset(asset) == ["full_02.bin: not named in the manifest"]
 
 
 def test_damaged_video_with_a_matching_checksum_is_no_traceback(asset: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import wave
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -158,25 +157,6 @@ def test_level_and_codec_string_of_vp9() -> None:
     level, mime = CODECS["vp9"].level_and_mime(Stream(b"", (2064, 3104), Fraction(30), 5e6))
     assert (level, mime) == ("5", 'video/webm; codecs="vp09.00.50.08.00.01.13.01.00"')
     assert CODECS["vp9"].level_and_mime(Stream(b"", (256, 128), Fraction(30), 1e5))[0] == "1.1"
-
-
-def test_sound_goes_into_the_mp4_and_leaves_the_pictures(tmp_path: Path) -> None:
-    sound = tmp_path / "tone.wav"
-    with wave.open(str(sound), "wb") as file:
-        file.setparams((1, 2, 48_000, 0, "NONE", ""))
-        tone = 8000 * np.sin(2 * np.pi * 440 * np.arange(48_000 * 20 // 30) / 48_000)
-        file.writeframes(tone.astype("<i2").tobytes())
-    path, codec = tmp_path / "texture.mp4", CODECS["h264"]
-    pictures = (pack_frame(numbered(frame), LAYOUT) for frame in range(20))
-    encode_video(path, pictures, SIZE, Fraction(30), codec, codec.options(VideoCodec(), 18), sound)
-    numbers = [number_of(unpack_picture(p, LAYOUT), 0) for p in decode_video(path, SIZE, 30.0)]
-    assert numbers == list(range(20))
-    assert number_of(unpack_picture(next(decode_video(path, SIZE, 30.0, start=17)), LAYOUT), 0) == 17
-    with av.open(str(path)) as container:
-        heard = np.concatenate([frame.to_ndarray()[0] for frame in container.decode(audio=0)])
-    spectrum = np.abs(np.fft.rfft(heard))
-    assert abs(spectrum.argmax() * 48_000 / len(heard) - 440) < 3
-    assert len(heard) / 48_000 == pytest.approx(20 / 30, abs=0.05)
 
 
 def test_header_comes_first(video: Path) -> None:

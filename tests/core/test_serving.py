@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import http.client
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 from facefolds_core.errors import UserError
 from facefolds_core.serving import serving
 
+TEXT = b"the same again and again " * 400
+
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
@@ -19,6 +22,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     for name, data in {
         "player/index.html": b"<!doctype html>",
         "player/page.js": b"1",
+        "player/long.js": TEXT,
         "player/draco/decoder.wasm": b"\0asm",
         "asset/manifest.json": b'{"levels": [{"file": "full.mp4"}]}',
         "asset/full.mp4": bytes(range(200)),
@@ -80,3 +84,35 @@ def test_a_port_that_is_taken(address: str, tmp_path: Path) -> None:
 def test_a_port_that_cannot_be_does_not_hang(tmp_path: Path) -> None:
     with pytest.raises(OverflowError), serving(tmp_path, {}, 70_000):
         pass
+
+
+def test_texts_and_programs_come_by_gzip(address: str) -> None:
+    response, body = get(address, "/long.js", **{"Accept-Encoding": "br, gzip"})
+    assert response.getheader("Content-Encoding") == "gzip" and response.getheader("Vary") == "Accept-Encoding"
+    assert len(body) < len(TEXT) / 10 and int(response.getheader("Content-Length", "0")) == len(body)
+    assert gzip.decompress(body) == TEXT
+
+
+@pytest.mark.parametrize("said", ["identity", "gzip;q=0", "br"])
+def test_who_cannot_read_gzip_gets_the_file(address: str, said: str) -> None:
+    response, body = get(address, "/long.js", **{"Accept-Encoding": said})
+    assert response.getheader("Content-Encoding") is None and body == TEXT
+
+
+def test_a_part_is_one_of_the_file_itself(address: str) -> None:
+    response, body = get(address, "/long.js", **{"Accept-Encoding": "gzip", "Range": "bytes=4-7"})
+    assert (response.status, response.getheader("Content-Encoding"), body) == (206, None, TEXT[4:8])
+
+
+def test_videos_are_not_packed_again(address: str) -> None:
+    response, body = get(address, "/asset/full.mp4", **{"Accept-Encoding": "gzip"})
+    assert response.getheader("Content-Encoding") is None and len(body) == 200
+
+
+def test_what_is_packed_has_a_mark_of_its_own(address: str) -> None:
+    plain, _ = get(address, "/long.js")
+    response, _ = get(address, "/long.js", **{"Accept-Encoding": "gzip"})
+    mark = response.getheader("ETag", "")
+    assert mark != plain.getheader("ETag")
+    again, body = get(address, "/long.js", **{"Accept-Encoding": "gzip", "If-None-Match": mark})
+    assert (again.status, body) == (304, b"")

@@ -39,7 +39,7 @@ def unknown(text: str, root: Path) -> list[str]:
     said += [f"make {name}" for name in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE) if name not in targets]
     modules = re.findall(r"python -m ((?:bench|stages|tests|facefolds_core)[a-z_.]*)\b", text)
     said += [f"python -m {name}" for name in modules if importlib.util.find_spec(name) is None]
-    used = re.findall(r"\bfacefolds\.(\w+)", text)
+    used = re.findall(r"(?<!com\.)\bfacefolds\.(\w+)", text)
     said += [f"facefolds.{name}" for name in used if name not in facefolds_core.__all__]
     dotted = [
         key for key in re.findall(r"`([a-z_]+(?:\.[a-z_]+)+)(?:: [^`]*)?`", text) if key.split(".")[0] in sections

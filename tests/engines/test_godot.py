@@ -15,9 +15,11 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines.godot import CONTENTS, write_godot
 from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
 from tests.engines.godot import errors, missing, pictures, run_godot, view_of
+from tests.engines.tracks import with_track
 from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
 from tests.viewer.fixtures import add_reflection
 
@@ -92,6 +94,22 @@ def test_reflections_agree_with_the_reference(caps: Asset, tmp_path: Path) -> No
         expected, _ = composite(hits, level.frame(2), (GREY_VALUE,) * 3, added)
         assert psnr(found[camera.name, 2], expected) >= AGREE
         assert psnr(plain[camera.name, 2], expected) < 25
+
+
+@pytest.mark.usefixtures("_godot")
+def test_a_head_that_moves_stands_where_it_stood_and_the_light_stays(caps: Asset, tmp_path: Path) -> None:
+    shutil.copytree(caps.folder, tmp_path / "asset")
+    add_reflection(tmp_path / "asset")
+    level, camera, frame = with_track(read_asset(tmp_path / "asset").full, 40), five_cameras(SIZE)[1], 4
+    write_godot(tmp_path / "godot", level, "caps")
+    found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
+    maps, seen_by = level.reflection(), level.camera_in_head(camera, frame)
+    assert maps is not None
+    hits, room = AssetCaster(level).cast(seen_by), room_from(level, frame)
+    expected, _ = composite(
+        hits, level.frame(frame), (GREY_VALUE,) * 3, reflected_colours(hits, seen_by, level.windows, maps, room)
+    )
+    assert psnr(found, expected) >= AGREE
 
 
 @pytest.mark.usefixtures("_godot")

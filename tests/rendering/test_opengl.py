@@ -21,6 +21,7 @@ from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import make_asset
+from tests.engines.tracks import with_track
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import random_reflection
 
@@ -62,6 +63,19 @@ def test_reflections_agree_with_the_reference(caps: Asset) -> None:
         rgb, _ = renderer.render(camera, 1)
     assert psnr(rgb, expected) > 45
     assert psnr(plain, expected) < 25
+
+
+def test_the_light_stays_with_the_room_where_the_head_turns(caps: Asset) -> None:
+    level, camera, maps = with_track(caps.full, 40), look_at_origin("camera", 30, 10, 120), random_reflection()
+    seen_by, windows = level.camera_in_head(camera, 2), level.windows
+    assert level.track is not None
+    hits, turned = AssetCaster(level).cast(seen_by), level.track.at(2).rotation
+    expected, _ = composite(hits, level.frame(2), added=reflected_colours(hits, seen_by, windows, maps, turned))
+    along, _ = composite(hits, level.frame(2), added=reflected_colours(hits, seen_by, windows, maps))
+    with OpenGLRenderer(level, glossy=Glossy(maps, windows)) as renderer:
+        rgb, _ = renderer.render(camera, 2)
+    assert psnr(rgb, expected) > 45
+    assert psnr(along, expected) < 25  # light that turns with the head is another picture
 
 
 def test_a_background_picture_shines_through(caps: Asset) -> None:

@@ -93,7 +93,7 @@ def test_the_cost_adds_up(folders: SubjectFolders) -> None:
     crops = cap_crops(2, 2, 32)
     assert cost["vertices"] == sum(len(crop.mesh.vertices) for crop in crops)
     assert cost["triangles"] == sum(len(crop.mesh.faces) for crop in crops)
-    assert cost["mesh_bytes"] == sum(path.stat().st_size for path in folders.asset.glob("*.drc"))
+    assert cost["mesh_bytes"] == sum(path.stat().st_size for path in folders.asset.glob("*_meshes.bin"))
     assert cost["texture_bytes"] == (folders.asset / "full.mp4").stat().st_size
     picture = manifest.full.texture.width * manifest.full.texture.height
     assert cost["gpu_bytes"] == 20 * cost["vertices"] + 12 * cost["triangles"] + 4 * picture

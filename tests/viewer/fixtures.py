@@ -37,7 +37,7 @@ def change_manifest(folder: Path, change: Callable[[dict[str, Any]], None]) -> M
     change(value)
     for level in value["levels"]:
         entries = [
-            *level["layers"],
+            *level["meshes"],
             *level["texture"]["videos"],
             *filter(None, [level.get("reflection")]),
         ]
@@ -57,10 +57,10 @@ def rich_asset(folder: Path) -> Path:
     make_asset(coarse, layers=2, frames=6, resolution=32)
     level = parse_manifest(coarse / "manifest.json").model_dump(mode="json")["levels"][0]
     level["name"] = "coarse"
+    shutil.copy(coarse / "full_meshes.bin", folder / "coarse_meshes.bin")
+    level["meshes"][0]["file"] = "coarse_meshes.bin"
     for entry in level["layers"]:
-        name = f"coarse_{entry['mesh']}"
-        shutil.copy(coarse / entry["mesh"], folder / name)
-        entry["mesh"] = name
+        entry["mesh"] = "coarse_meshes.bin"
     shutil.copy(coarse / "full.mp4", folder / "coarse.mp4")
     level["texture"]["videos"][0]["file"] = "coarse.mp4"
     with wave.open(str(folder / "audio.wav"), "wb") as sound:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import io
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from PIL import Image
@@ -52,6 +54,53 @@ def test_a_picture_is_saved(player: Player) -> None:
     assert download.value.suggested_filename == "caps-1.png"
     saved = np.asarray(Image.open(io.BytesIO(Path(download.value.path()).read_bytes())).convert("RGBA")) / 255
     assert np.abs(saved - player.capture()).max() <= 1 / 255
+
+
+def film_of(path: Path) -> tuple[list[np.ndarray], float]:
+    """Pictures of a film as grey, and its seconds."""
+    with av.open(str(path)) as film:
+        frames = list(film.decode(video=0))
+    return [frame.to_ndarray(format="gray") for frame in frames], float(frames[-1].time - frames[0].time)
+
+
+def test_a_turn_is_recorded(player: Player, tmp_path: Path) -> None:
+    player.run("e.player.view.set({azimuth: 5, elevation: 3, distance: 1.1, target: [0, 0, 0]})")
+    before = player.run("return [e.player.view.get(), e.playing]")
+    code = """const film = await e.record({seconds: 2, degrees: 30});
+        const text = await new Promise((done) => {
+            const reader = new FileReader(); reader.onload = () => done(reader.result); reader.readAsDataURL(film); });
+        return [film.type, text.split(',')[1]];"""
+    kind, data = player.run(code)  # type: ignore[misc]
+    assert kind in ("video/mp4", "video/webm")
+    (tmp_path / "turn").write_bytes(base64.b64decode(data))
+    pictures, seconds = film_of(tmp_path / "turn")
+    assert len(pictures) >= 4 and 1 < seconds < 6  # a slow machine draws few pictures, and the last may be late
+    changes = [np.abs(one.astype(float) - pictures[0]).mean() for one in pictures]
+    assert max(changes) > 5 * max(0.2, min(changes[1:]))  # it turned, and came back
+    assert player.run("return [e.player.view.get(), e.playing]") == before
+
+
+def test_a_recording_is_ended_and_saved(player: Player) -> None:
+    player.button("Settings")
+    record = player.page.get_by_role("button", name="Record a turn")
+    record.click()
+    player.page.wait_for_timeout(1000)
+    with player.page.expect_download() as download:
+        record.click()
+    name = download.value.suggested_filename
+    assert name in ("caps-turn.mp4", "caps-turn.webm")
+    assert len(film_of(Path(download.value.path()))[0]) >= 1
+    assert record.get_attribute("aria-pressed") == "false"
+
+
+def test_a_browser_that_cannot_record_says_what_does(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player(
+        {"asset": rich}, script="delete globalThis.MediaRecorder", viewport={"width": 760, "height": 500}
+    )
+    player.open("asset")
+    player.button("Settings")
+    player.button("Record a turn")
+    player.page.locator(".toast", has_text="facefolds render ASSET --kind turntable").wait_for()
 
 
 def test_the_code_to_embed_plays(player: Player) -> None:

@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
+from tests.assets import make_asset
+from tests.older import make_older
 from tests.viewer.conftest import NewPlayer
 from tests.viewer.fixtures import change_manifest, file_entry
 
@@ -54,12 +56,13 @@ def test_no_asset_at_the_address(new_player: NewPlayer, asset: Path) -> None:
     assert "manifest.json is missing" in player.message()
 
 
-def test_an_asset_of_version_1(new_player: NewPlayer, asset: Path) -> None:
-    path = asset / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 1}))
-    player = new_player({"asset": asset})
-    player.open("asset", wait=False)
-    assert "format version 1" in player.message()
+@pytest.mark.parametrize("version", [1, 2])
+def test_an_asset_of_an_older_version_plays(new_player: NewPlayer, tmp_path: Path, version: int) -> None:
+    make_asset(tmp_path / "asset", layers=2, frames=4)
+    make_older(tmp_path / "asset", version)
+    player = new_player({"asset": tmp_path / "asset"})
+    player.open("asset")
+    assert player.run("return [await e.seek(3), e.frame, e.fps, e.statistics.layers]") == [True, 3, 30, 2]
 
 
 @pytest.mark.parametrize(
@@ -78,8 +81,8 @@ def test_a_garbled_manifest(new_player: NewPlayer, asset: Path, text: str, said:
 
 
 def spoil_missing(asset: Path) -> str:
-    (asset / "coarse_full_01.drc").unlink()
-    return "coarse_full_01.drc is missing"
+    (asset / "coarse_meshes.bin").unlink()
+    return "coarse_meshes.bin is missing"
 
 
 def spoil_short(asset: Path) -> str:
@@ -89,7 +92,7 @@ def spoil_short(asset: Path) -> str:
 
 
 def spoil_changed(asset: Path) -> str:
-    path = asset / "coarse_full_00.drc"
+    path = asset / "coarse_meshes.bin"
     data = bytearray(path.read_bytes())
     data[200] ^= 1
     path.write_bytes(data)
@@ -98,12 +101,11 @@ def spoil_changed(asset: Path) -> str:
 
 def spoil_mesh(asset: Path) -> str:
     """Garbage whose checksum is right."""
-    path = asset / "coarse_full_00.drc"
-    path.write_bytes(b"\x01" * 300)
+    path = asset / "coarse_meshes.bin"
+    path.write_bytes(b"\x01" * path.stat().st_size)
 
     def change(value: dict) -> None:
-        entry = file_entry(path)
-        value["levels"][0]["layers"][0] |= {"bytes": entry["bytes"], "sha256": entry["sha256"]}
+        value["levels"][0]["meshes"][0]["sha256"] = file_entry(path)["sha256"]
 
     change_manifest(asset, change)
     return "not a Draco mesh"
@@ -151,23 +153,23 @@ def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path:
 
 
 def test_a_damaged_finer_level_leaves_the_coarse_one_playing(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "full_01.drc").unlink()
+    (asset / "full_meshes.bin").unlink()
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("asset")
-    assert "full_01.drc is missing" in player.notice()
+    assert "full_meshes.bin is missing" in player.notice()
     assert player.run("e.play(); return [e.level, e.playing]") == ["coarse", True]
 
 
 def test_a_damaged_coarse_level_gives_way_to_the_finer_one(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "coarse_full_01.drc").unlink()
+    (asset / "coarse_meshes.bin").unlink()
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("asset")
-    assert "coarse_full_01.drc is missing" in player.notice()
+    assert "coarse_meshes.bin is missing" in player.notice()
     assert player.run("return e.level") == "full"
 
 
 def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "full_01.drc").unlink()
+    (asset / "full_meshes.bin").unlink()
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("asset", "level=full&frame=0")
     assert player.run("return e.level") == "coarse"
@@ -175,7 +177,7 @@ def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlay
 
 def test_an_asset_of_a_newer_format(new_player: NewPlayer, asset: Path) -> None:
     path = asset / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 3}))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 4, "minVersion": 4}))
     player = new_player({"asset": asset})
     player.open("asset", wait=False)
     assert "too old" in player.message()

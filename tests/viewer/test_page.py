@@ -34,6 +34,8 @@ def test_a_poster_and_progress_are_shown_before_the_first_picture(new_player: Ne
     player.page.locator(".poster").wait_for()
     assert player.page.get_by_role("progressbar").is_visible()
     assert player.page.get_by_text("Loading").is_visible()
+    while not held:  # the poster may come before the video is asked for
+        player.page.wait_for_timeout(20)
     held[0].continue_()
     player.wait("e.ready")
     assert not player.page.get_by_role("progressbar").is_visible()

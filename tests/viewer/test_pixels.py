@@ -110,3 +110,26 @@ def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path
     player.run("e.still = true")
     assert psnr(player.capture(camera)[..., :3], at_rest) >= AGREE
     assert psnr(moved, at_rest) < 25  # the motion is large enough to be seen in this test
+
+
+def test_the_light_stays_with_the_room_where_the_head_turns(new_player: NewPlayer, tmp_path: Path) -> None:
+    """Also where the head is held still: the room turns around it."""
+    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    add_reflection(tmp_path / "asset")
+    asset, camera = read_asset(tmp_path / "asset"), five_cameras(SIZE)[1]
+    maps, textures = asset.reflection(), asset.frame(2)
+    assert maps is not None and asset.track is not None
+    room, windows = asset.track.at(2).rotation, asset.full.windows
+    player = new_player({"asset": asset.folder})
+    player.open("asset")
+    player.run("e.background = v", GREY)
+    assert player.run("return await e.seek(v)", 2)
+    for still in (False, True):
+        player.run("e.still = v", still)
+        seen_by = camera if still else asset.camera_in_head(camera, 2)
+        hits = AssetCaster(asset).cast(seen_by)
+        grey = (GREY_VALUE,) * 3
+        expected, _ = composite(hits, textures, grey, reflected_colours(hits, seen_by, windows, maps, room))
+        along, _ = composite(hits, textures, grey, reflected_colours(hits, seen_by, windows, maps))
+        assert psnr(player.capture(camera)[..., :3], expected) >= AGREE, still
+        assert psnr(along, expected) < 36  # light that turns with the head is another picture

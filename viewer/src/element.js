@@ -353,6 +353,16 @@ export class FacefoldsPlayer extends HTMLElement {
     return asPng(this.capture(camera));
   }
 
+  /**
+   * Records one turn from side to side. @param {{seconds?: number, degrees?: number, signal?: AbortSignal}} [options]
+   * @returns {Promise<Blob>} MP4 or WebM
+   */
+  async record(options) {
+    if (!this.ready) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
+    const { recordTurn } = await import("./recording.js");
+    return recordTurn(this.#player, options);
+  }
+
   /** Shows held-out photo `index` beside the asset, from the photo's camera and frame; null: closes. */
   compare(index) {
     return index === null ? this.comparison?.close() : this.comparison?.open(index);

@@ -14,10 +14,7 @@ import { decodeMesh } from "./meshes.js";
  */
 export async function loadLevel(info, files, onVideoError, refused) {
   const [geometries, opened, reflection] = await allOrNothing([
-    Promise.all(info.layers.map(async (layer) => {
-      const buffer = await files.bytes(layer.mesh);
-      return decodeMesh(buffer, layer, files.address(layer.mesh.name));
-    })),
+    loadMeshes(info, files),
     import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused)),
     info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
@@ -26,6 +23,17 @@ export async function loadLevel(info, files, onVideoError, refused) {
     opened.source.close();
   };
   return { info, geometries, reflection, source: opened.source, video: opened.video, dispose };
+}
+
+/** Each file once; the layers' meshes are parts of them. */
+async function loadMeshes({ meshes, layers }, files) {
+  const buffers = new Map(meshes.map((entry) => [entry.name, files.bytes(entry)]));
+  return Promise.all(
+    layers.map(async (layer) => {
+      const { name, offset, bytes } = layer.mesh;
+      return decodeMesh((await buffers.get(name)).slice(offset, offset + bytes), layer, files.address(name));
+    }),
+  );
 }
 
 /** Like Promise.all, but a video opened in vain is closed. */

@@ -1,22 +1,23 @@
-/** manifest.json, format version 2 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
+/** manifest.json, format version 3 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
 import { PlayerError } from "./errors.js";
+import { broughtUp } from "./older.js";
 
-export const VERSION = 2;
+export const VERSION = 3;
 const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
 
 /**
  * @typedef {[number, number, number, number]} Rect x, y, width, height in pixels, y down
  * @typedef {{name: string, bytes: number, sha256: string}} FileEntry
- * @typedef {{mesh: FileEntry, vertices: number, triangles: number, rect: Rect, window: number[]}} LayerEntry
+ * @typedef {{mesh: {name: string, offset: number, bytes: number}, vertices: number, triangles: number, rect: Rect, window: number[]}} LayerEntry
  * @typedef {FileEntry & {codec: string, mime: string}} VideoEntry
  * @typedef {{width: number, height: number, colourRect: Rect, alphaRect: Rect, frames: number, fps: number}} TextureEntry
- * @typedef {{name: string, layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
+ * @typedef {{name: string, meshes: FileEntry[], layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
  *   reflection: ReflectionEntry | null, bytes: number}} Level
  * @typedef {{file: FileEntry, window: number[], environment: Rect, gloss: Rect, offset: Rect, normals: Rect,
  *   scales: number[]}} ReflectionEntry `scales` of environment, gloss and offset
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
  *   w2c: number[][]}} Photo
- * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry | null,
+ * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry & {mime: string} | null,
  *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null,
  *   track: import("./track.js").Pose[] | null}} Manifest
  */
@@ -41,10 +42,10 @@ export function parseManifest(text, file) {
       remedy: "Give the folder that holds an asset's manifest.json.",
     });
   }
-  if (value.version !== VERSION) {
-    const newer = Number(value.version) > VERSION;
+  const newer = Number(value.version) > VERSION;
+  if (newer ? !(value.minVersion <= VERSION) : ![1, 2, VERSION].includes(value.version)) {
     throw new PlayerError(
-      `The asset has format version ${value.version}; this player reads version ${VERSION}${newer ? " and is too old for it" : ""}`,
+      `The asset has format version ${value.version}; this player reads versions 1 to ${VERSION}${newer ? " and is too old for it" : ""}`,
       {
         file,
         kind: "unsupported",
@@ -54,8 +55,18 @@ export function parseManifest(text, file) {
       },
     );
   }
+  if (value.extensionsRequired?.length) {
+    throw new PlayerError(
+      `The asset needs an extension that this player does not know: ${value.extensionsRequired[0]}`,
+      {
+        file,
+        kind: "unsupported",
+        remedy: "Put the player that the asset was made for on this page.",
+      },
+    );
+  }
   try {
-    return readManifest(value);
+    return readManifest(value.version < VERSION ? broughtUp(value) : value);
   } catch (cause) {
     if (cause instanceof TypeError || cause instanceof RangeError) throw damaged(file, cause.message, cause);
     throw cause;
@@ -78,7 +89,9 @@ function readManifest(value) {
     generator: String(value.generator ?? ""),
     centre: value.coordinates?.sphere_centre ?? [0, 0, 0],
     levels,
-    audio: value.audio ? readFile(value.audio, value.audio.file, "audio") : null,
+    audio: value.audio
+      ? { ...readFile(value.audio, value.audio.file, "audio"), mime: String(value.audio.mime ?? "") }
+      : null,
     poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
     photos: (value.photos ?? []).map(readPhoto),
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
@@ -98,9 +111,17 @@ function readLevel(level, index) {
   check(videos.length > 0, `${place}.texture.videos is empty`);
   const layers = list(level.layers, `${place}.layers`).map((layer, i) => readLayer(layer, `${place}.layers[${i}]`));
   check(layers.length > 0, `${place}.layers is empty`);
+  const meshes = list(level.meshes, `${place}.meshes`).map((file, i) =>
+    readFile(file, file.file, `${place}.meshes[${i}]`),
+  );
+  for (const [i, { mesh }] of layers.entries()) {
+    const whole = meshes.find(({ name }) => name === mesh.name);
+    check(mesh.offset + mesh.bytes <= whole?.bytes, `${place}.layers[${i}] is not inside a file of meshes`);
+  }
   const reflection = level.reflection ? readReflection(level.reflection, `${place}.reflection`) : null;
   return {
     name: String(level.name),
+    meshes,
     layers,
     texture: readTexture(texture, `${place}.texture`),
     videos,
@@ -110,8 +131,9 @@ function readLevel(level, index) {
 }
 
 function readTexture(texture, place) {
-  const fps = Number(texture.fps);
-  check(fps > 0, `${place}.fps is ${texture.fps}`);
+  const [frames, seconds] = list(texture.frame_rate, `${place}.frame_rate`);
+  const fps = frames / seconds;
+  check(fps > 0 && fps < Infinity, `${place}.frame_rate is ${texture.frame_rate}`);
   return {
     width: count(texture.width, `${place}.width`),
     height: count(texture.height, `${place}.height`),
@@ -124,7 +146,7 @@ function readTexture(texture, place) {
 
 function readLayer(layer, place) {
   return {
-    mesh: readFile(layer, layer.mesh, place),
+    mesh: { ...readFile(layer, layer.mesh, place), offset: count(layer.offset + 1, `${place}.offset`) - 1 },
     vertices: count(layer.vertices, `${place}.vertices`),
     triangles: count(layer.triangles, `${place}.triangles`),
     rect: rectangle(layer.texture_rect, `${place}.texture_rect`),

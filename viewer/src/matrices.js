@@ -5,6 +5,8 @@
 /** @param {number[][]} rows four of four @returns {Matrix} */
 export const fromRows = (rows) => [0, 1, 2, 3].flatMap((column) => rows.map((row) => row[column]));
 
+export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+
 /** @param {Matrix} m @param {number[]} p @returns {number[]} the first three coordinates of m (p, 1) */
 export const transformed = (m, [x, y, z]) => [0, 1, 2].map((i) => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
 

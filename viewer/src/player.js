@@ -71,7 +71,7 @@ export class Player extends EventTarget {
 
   async #loadSound(entry) {
     try {
-      this.sound = new Sound(await this.files.bytes(entry));
+      this.sound = new Sound(await this.files.bytes(entry), entry.mime);
       this.say("change");
     } catch (error) {
       this.fail(error);
@@ -333,7 +333,7 @@ export class Player extends EventTarget {
   /** The head where it stood in the frame shown, or at rest. */
   #place() {
     const { track } = this.manifest;
-    this.renderer.setPose(track && !this.held && this.shown >= 0 ? matrixOf(track[this.shown]) : null);
+    this.renderer.setPose(track && this.shown >= 0 ? matrixOf(track[this.shown]) : null, this.held);
     this.stale = true;
   }
 

@@ -7,7 +7,7 @@
  */
 import { Graphics } from "./gl/graphics.js";
 import { Upload } from "./gl/upload.js";
-import { eyeOf, multiplied, transformed } from "./matrices.js";
+import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
 const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
@@ -20,6 +20,7 @@ export class LayerRenderer {
     this.context = canvas.getContext("2d");
     this.level = null;
     this.pose = null;
+    this.turn = null;
     this.upload = null;
     this.visible = [];
     this.effectsOn = true;
@@ -50,9 +51,14 @@ export class LayerRenderer {
     this.upload.show(image);
   }
 
-  /** Where the head stands from the next picture on. @param {import("./matrices.js").Matrix | null} matrix null: at rest */
-  setPose(matrix) {
-    this.pose = matrix;
+  /**
+   * Where the head stands from the next picture on.
+   * @param {import("./matrices.js").Matrix | null} matrix null: at rest
+   * @param {boolean} held it is drawn at rest; the light of the room turns around it
+   */
+  setPose(matrix, held) {
+    this.pose = held ? null : matrix;
+    this.turn = matrix;
   }
 
   /** After a lost context came back. The frame has to be given again. */
@@ -218,6 +224,12 @@ export class LayerRenderer {
       gl.uniform4fv(at.glossRect, gloss);
       gl.uniform4fv(at.offsetRect, offset);
       gl.uniform4fv(at.normalsRect, normals);
+      const m = this.turn ?? IDENTITY;
+      gl.uniformMatrix3fv(
+        at.toRoom,
+        false,
+        [0, 1, 2, 4, 5, 6, 8, 9, 10].map((i) => m[i]),
+      );
       gl.uniform3fv(at.reflectionScales, this.effectsOn ? scales : [0, 0, 0]);
     }
     return colour;

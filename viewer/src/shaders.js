@@ -42,6 +42,7 @@ uniform vec4 offsetRect;
 uniform vec4 normalsRect;
 uniform vec3 reflectionScales; // of environment, gloss, offset; all 0: off
 uniform vec4 toMaps; // (s, t) of this layer -> that of the maps: times xy, plus zw
+uniform mat3 toRoom; // from the meshes' own axes to those of the room, which the light is fixed to
 #endif
 in vec2 st;
 in vec3 point;
@@ -61,7 +62,7 @@ vec3 reflected() {
   vec2 at = st * toMaps.xy + toMaps.zw;
   vec3 normal = normalize(lookAt(reflection, normalsRect, at).rgb * 2.0 - 1.0);
   vec3 along = normalize(point - eye);
-  vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+  vec3 r = toRoom * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
   vec2 place = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 1e-6));
   vec3 light = lookAt(reflection, environmentRect, place).rgb * reflectionScales.x;
   float gloss = lookAt(reflection, glossRect, at).r * reflectionScales.y;

@@ -3,9 +3,9 @@
 const DRIFT = 0.12; // s
 
 export class Sound {
-  /** @param {ArrayBuffer} buffer an audio file that the browser knows */
-  constructor(buffer) {
-    this.audio = new Audio(URL.createObjectURL(new Blob([buffer])));
+  /** @param {ArrayBuffer} buffer an audio file that the browser knows @param {string} mime "" if it is not known */
+  constructor(buffer, mime = "") {
+    this.audio = new Audio(URL.createObjectURL(new Blob([buffer], { type: mime.split(";")[0] })));
     this.audio.preload = "auto";
     this.muted = true; // until somebody asks for sound: browsers refuse it before a click
   }

@@ -120,15 +120,18 @@ test("a still picture needs no clock", () => {
 const file = { bytes: 10, sha256: "0".repeat(64) };
 const manifest = () => ({
   format: "facefolds",
-  version: 2,
+  version: 3,
+  minVersion: 3,
   subject: "test",
   levels: [
     {
       name: "full",
       bytes: 20,
+      meshes: [{ file: "full_meshes.bin", ...file }],
       layers: [
         {
-          mesh: "full_00.drc",
+          mesh: "full_meshes.bin",
+          offset: 0,
           ...file,
           vertices: 4,
           triangles: 2,
@@ -137,7 +140,8 @@ const manifest = () => ({
         },
       ],
       texture: {
-        ...{ width: 16, height: 32, colour_rect: [0, 0, 16, 16], alpha_rect: [0, 16, 16, 16], frames: 2, fps: 30 },
+        ...{ width: 16, height: 32, colour_rect: [0, 0, 16, 16], alpha_rect: [0, 16, 16, 16], frames: 2 },
+        ...{ frame_rate: [30000, 1001], keyframes: [0] },
         videos: [{ file: "full.mp4", codec: "h264", mime: 'video/mp4; codecs="avc1.42"', ...file }],
       },
     },
@@ -164,19 +168,60 @@ test("a track is read, and moves points as its poses say", () => {
   assert.throws(() => parseManifest(JSON.stringify({ ...value, track: [pose] }), "x"), /damaged/);
 });
 
+/** The same as facefolds 0.1 and early 0.2 wrote it. */
+const older = (version) => {
+  const value = { ...manifest(), version };
+  delete value.minVersion;
+  const [level] = value.levels;
+  delete level.meshes;
+  delete level.texture.frame_rate;
+  delete level.texture.keyframes;
+  Object.assign(level.layers[0], { mesh: "full_00.drc", offset: undefined });
+  level.texture.fps = 30;
+  if (version === 2) return value;
+  const { videos, ...texture } = level.texture;
+  const { file: video, ...coded } = videos[0];
+  delete value.levels;
+  return { ...value, layers: level.layers, texture: { ...texture, ...coded, video, mime: undefined } };
+};
+
+test("manifests of older versions are read", () => {
+  const today = parseManifest(JSON.stringify(manifest()), "x").levels[0];
+  for (const version of [1, 2]) {
+    const [level] = parseManifest(JSON.stringify(older(version)), "x").levels;
+    assert.deepEqual(level.layers[0].rect, today.layers[0].rect);
+    assert.deepEqual(level.meshes[0], { ...today.meshes[0], name: "full_00.drc" });
+    assert.equal(level.texture.fps, 30);
+    assert.equal(level.videos[0].name, "full.mp4");
+    assert.equal(level.bytes, 20);
+  }
+  for (const spoilt of [{ levels: 1 }, { levels: [1] }, { levels: [{}] }])
+    assert.throws(() => parseManifest(JSON.stringify({ ...older(2), ...spoilt }), "x"), /damaged/);
+  assert.throws(() => parseManifest(JSON.stringify({ ...older(1), layers: 1 }), "x"), /damaged/);
+});
+
+test("a newer manifest that says so is read without what it added", () => {
+  const newer = { ...manifest(), version: 4, something: "new" };
+  assert.deepEqual(parseManifest(JSON.stringify(newer), "x"), parseManifest(JSON.stringify(manifest()), "x"));
+});
+
 test("view effects of older assets are left out", () => {
-  const value = manifest();
+  const value = older(2);
   value.levels[0].view_effects = { file: "e.png", ...file, basis: "sh1" };
-  assert.deepEqual(parseManifest(JSON.stringify(value), "x"), parseManifest(JSON.stringify(manifest()), "x"));
+  assert.deepEqual(parseManifest(JSON.stringify(value), "x"), parseManifest(JSON.stringify(older(2)), "x"));
 });
 
 test("a manifest that is wrong is refused, naming the place", () => {
   const cases = [
     [(m) => (m.levels = []), /levels is empty/],
     [(m) => (m.levels[0].layers[0].texture_rect = [1, 2]), /levels\[0\]\.layers\[0\]\.texture_rect/],
-    [(m) => (m.levels[0].texture.fps = 0), /texture\.fps is 0/],
+    [(m) => (m.levels[0].texture.frame_rate = [0, 1]), /texture\.frame_rate is 0/],
+    [(m) => (m.levels[0].layers[0].offset = 1), /layers\[0\] is not inside a file of meshes/],
+    [(m) => (m.levels[0].layers[0].offset = -1), /offset/],
+    [(m) => (m.extensionsRequired = ["A_b"]), /extension.*A_b/],
     [(m) => (m.levels[0].layers[0].mesh = "../secret"), /names no plain file/],
-    [(m) => (m.version = 3), /format version 3.*too old/],
+    [(m) => (m.version = m.minVersion = 4), /format version 4.*too old/],
+    [(m) => (m.version = 0), /format version 0/],
     [(m) => (m.view = { azimuth: [10, -10], elevation: [0, 0] }), /view\.azimuth/],
     [(m) => (m.format = "gltf"), /not a facefolds asset/],
     [(m) => delete m.levels[0].texture, /texture is missing/],

@@ -31,6 +31,7 @@ export function connectBar(element) {
     close: () => element.compare(null),
     reset: () => element.reset(),
     picture: () => savePicture(element),
+    record: () => saveTurn(element, root.querySelector('[data-do="record"]')),
     embed: () => element.openEmbed(),
     dismiss: () => dismiss(element),
     vr: () => toggleVr(element, find('[data-do="vr"]')),
@@ -119,10 +120,29 @@ async function toggleFullScreen(element) {
   }
 }
 
+const fileName = (element) => (element.player.manifest.subject || "facefolds").replace(/[^\w-]+/g, "_");
+
 async function savePicture(element) {
+  if (element.ready) save(await element.screenshot(), `${fileName(element)}-${element.frame + 1}.png`);
+}
+
+/** Begins to record, or ends what is being recorded; what was recorded is saved. */
+async function saveTurn(element, button) {
+  if (element.recording) return element.recording.abort();
   if (!element.ready) return;
-  const name = (element.player.manifest.subject || "facefolds").replace(/[^\w-]+/g, "_");
-  save(await element.screenshot(), `${name}-${element.frame + 1}.png`);
+  element.recording = new AbortController();
+  button.setAttribute("aria-pressed", "true");
+  element.overlays.say("Recording. Press again to end it early.", 8000);
+  try {
+    const film = await element.record({ signal: element.recording.signal });
+    save(film, `${fileName(element)}-turn.${film.type.split("/")[1]}`);
+    element.overlays.say("Saved");
+  } catch (error) {
+    element.overlays.say(error.remedy ? `${error.message}. ${error.remedy}` : `Not recorded: ${error.message}`, 12000);
+  } finally {
+    element.recording = null;
+    button.setAttribute("aria-pressed", "false");
+  }
 }
 
 /** Escape: closes what lies over the picture, the last first. */

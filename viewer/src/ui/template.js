@@ -21,6 +21,7 @@ export const ICONS = {
   full: icon("M4 4h6v2H6v4H4zm10 0h6v6h-2V6h-4zM4 14h2v4h4v2H4zm14 0h2v6h-6v-2h4z"),
   close: icon("M18.300 4.300 12 10.600 5.700 4.300 4.300 5.700l6.300 6.300-6.300 6.300 1.400 1.400 6.300-6.300 6.300 6.300 1.400-1.400-6.300-6.300 6.300-6.300z"),
   picture: icon("M9 4h6l1.500 2H20a1.500 1.500 0 0 1 1.500 1.500v10A1.500 1.500 0 0 1 20 19H4a1.500 1.500 0 0 1-1.500-1.500v-10A1.500 1.500 0 0 1 4 6h3.500zm3 4.500a4 4 0 1 0 0 8 4 4 0 0 0 0-8zm0 2a2 2 0 1 1 0 4 2 2 0 0 1 0-4z"),
+  record: icon("M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18zm0 2a7 7 0 1 1 0 14 7 7 0 0 1 0-14zm0 3.500a3.500 3.500 0 1 0 0 7 3.500 3.500 0 0 0 0-7z"),
   vr: icon("M4 7h16a2 2 0 0 1 2 2v6a2 2 0 0 1-2 2h-4.200l-2-2.700a2.200 2.200 0 0 0-3.600 0l-2 2.700H4a2 2 0 0 1-2-2V9a2 2 0 0 1 2-2zm3.500 2.500a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z"),
   embed: icon("M8.300 6.700 9.700 8.100 5.800 12l3.900 3.900-1.400 1.400L3 12zm7.400 0L21 12l-5.300 5.300-1.400-1.400L18.200 12l-3.900-3.900z"),
   reset: icon("M12 5V1.500L6.500 6 12 10.500V7a5.500 5.500 0 1 1-5.300 7H4.600A7.500 7.500 0 1 0 12 5z"),
@@ -64,7 +65,7 @@ export const TEMPLATE = `<div class="stage">
     <fieldset class="layers"><legend>Layers <small>outermost first</small></legend><div></div></fieldset>
     <label class="row"><span>Pull apart</span><input type="range" name="spread" min="0" max="1" step="0.01" value="0"></label>
     ${toggle("wireframe", "Wireframe")}${toggle("effects", "Reflection", true)}${toggle("stats", "Statistics")}
-    <div class="row deeds">${worded("picture", "Save picture", "I")}${worded("embed", "Embed")}${worded("reset", "Reset", "0")}</div>
+    <div class="row deeds">${worded("picture", "Save picture", "I")}${worded("record", "Record a turn")}${worded("embed", "Embed")}${worded("reset", "Reset", "0")}</div>
     <details><summary>Keys</summary><dl class="keys">
       <dt>Space</dt><dd>play, pause</dd><dt>← →</dt><dd>step</dd><dt>Home End</dt><dd>first, last frame</dd>
       <dt>&lt; &gt;</dt><dd>slower, faster</dd><dt>L</dt><dd>loop</dd><dt>Shift + arrows</dt><dd>turn</dd><dt>+ −</dt><dd>zoom</dd><dt>0</dt><dd>reset</dd>

@@ -22,6 +22,7 @@ uniform vec4 gloss_rect;
 uniform vec4 offset_rect;
 uniform vec4 normals_rect;
 uniform vec3 reflection_scales;   // of environment, gloss and offset
+uniform mat3 to_room;              // from the meshes' own axes to those of the room, which the light is fixed to
 uniform vec4 to_maps;             // (s, t) of the layer -> that of the maps: times xy, plus zw
 
 varying vec3 point;               // of the surface and of the eye, in the asset's own axes: z up, the subject looks to +x
@@ -60,7 +61,7 @@ void fragment() {
 		vec2 at = UV * to_maps.xy + to_maps.zw;
 		vec3 normal = normalize(read(reflection, normals_rect, reflection_size, at) * 2.0 - 1.0);
 		vec3 along = normalize(point - eye);
-		vec3 r = along - 2.0 * min(dot(along, normal), 0.0) * normal;
+		vec3 r = to_room * (along - 2.0 * min(dot(along, normal), 0.0) * normal);
 		vec2 from = 0.5 + 0.5 * vec2(r.y, -r.z) / sqrt(max(2.0 * (1.0 + r.x), 0.000001));
 		vec3 light = read(reflection, environment_rect, reflection_size, from) * reflection_scales.x;
 		colour += light * read(reflection, gloss_rect, reflection_size, at).r * reflection_scales.y;

@@ -14,6 +14,7 @@ const VERSION = 1
 export(String, DIR) var folder = ""
 export var autoplay = true
 export var loop = true
+export var still = false setget set_still  # holds a head that turns; it performs
 
 var contents = {}
 var error = ""
@@ -75,11 +76,32 @@ func seek(number):
 	else:
 		_picture.set_data(image)
 	_set_all("picture", _picture)
+	_place(number)
 	_clock = number / fps
 	if number != frame:
 		frame = number
 		emit_signal("frame_changed", frame)
 	return true
+
+
+func set_still(on):
+	still = on
+	if frames > 0:
+		_place(frame)
+
+
+# Puts the head where it stood in that frame. The light of the room does not turn with it.
+func _place(number):
+	if not contents.has("track"):
+		return
+	var pose = contents.track[number]
+	var q = pose.quaternion  # w, x, y, z, in the asset's axes: (x, y, z) is (y, z, x) here
+	var t = pose.translation
+	_set_all("to_room", Basis(Quat(q[1], q[2], q[3], q[0])))
+	var placed = Transform(Basis(Quat(q[2], q[3], q[1], q[0])), Vector3(t[1], t[2], t[0]))
+	for layer in get_children():
+		if layer is MeshInstance:
+			layer.transform = Transform.IDENTITY if still else placed
 
 
 func set_layer_visible(index, shown):
@@ -146,6 +168,7 @@ func _build_layers():
 	if problem != "":
 		return problem
 	_set_all("slices", float(count))
+	_set_all("to_room", Basis())
 	_set_all("centre", bounds.position + bounds.size / 2)
 	_set_all("radius", bounds.size.length() / 2)
 	return ""

@@ -1,0 +1,97 @@
+"""What a manifest says beside the levels: sound, pictures, the head's motion, the range that was filmed."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from facefolds_core.asset.manifest_base import Count, Maybe, Offset, Part, Row, StoredFile, Vector
+
+
+class Picture(StoredFile):
+    """A picture of `width` x `height` pixels."""
+
+    width: Count
+    height: Count
+
+
+class Poster(Picture):
+    """A still picture of the asset's first frame, shown while it loads.
+
+    Attributes:
+        K, w2c: the camera that shows the same, as a photo's; absent where it is not known.
+        background: stored values in [0, 1] behind the layers; absent where it is not known.
+    """
+
+    K: Maybe[tuple[Vector, Vector, Vector]] = None
+    w2c: Maybe[tuple[Row, Row, Row]] = None
+    background: Maybe[Vector] = None
+
+
+class Photo(Picture):
+    """A photo of the capture and the camera that took it, to compare with.
+
+    Attributes:
+        camera, frame: the capture's name of the camera, the index of the frame.
+        K: intrinsics, rows; continuous pixel coordinates.
+        w2c: (R | t), rows: normalised coordinates to OpenCV's camera axes.
+    """
+
+    camera: str
+    frame: Offset
+    K: tuple[Vector, Vector, Vector]
+    w2c: tuple[Row, Row, Row]
+
+
+class Audio(StoredFile):
+    """The sequence's sound, from frame 0 on.
+
+    Attributes:
+        mime: MIME type with codec string, as browsers take it; absent where it is not known.
+    """
+
+    mime: Maybe[str] = None
+
+
+class Pose(Part):
+    """Where the head stands in one frame: X_world = R X_mesh + t, normalised coordinates.
+
+    Attributes:
+        quaternion: w, x, y, z of R, of unit length.
+        translation: t.
+    """
+
+    quaternion: Row
+    translation: Vector
+
+
+class FilmedView(Part):
+    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
+
+    Attributes:
+        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
+        elevation: the range of the training cameras, degrees.
+        distance: the range of the training cameras, units; absent where it is not known.
+        measured: (azimuth, elevation, distance) of cameras that training did not see and that quality is measured
+            with; absent where there are none.
+    """
+
+    azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
+    elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
+    distance: Maybe[tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]] = None
+    measured: Maybe[tuple[Vector, ...]] = None
+
+    @field_validator("azimuth", "elevation", "distance")
+    @classmethod
+    def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value is not None and not value[0] <= value[1]:
+            raise ValueError("from the lower to the higher")
+        return value
+
+    @field_validator("azimuth")
+    @classmethod
+    def _a_turn(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if value[1] > value[0] + 360:
+            raise ValueError("at most a full turn")
+        return value

@@ -1,0 +1,41 @@
+"""Radius maps and texels, fitted from a volume on: docs/reference/method.md."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from facefolds_core.params.explicit import ExplicitParams as Params
+
+if TYPE_CHECKING:
+    from facefolds_core.captures.scene import Scene
+    from facefolds_core.model.radiance import RadianceManifolds
+    from facefolds_core.model.storage import ExplicitSpec
+    from facefolds_core.training.report import TrainingReport
+    from facefolds_core.training.trained import Trained
+
+PRESETS: dict[str, dict[str, Any]] = {"fast": {}}
+
+
+def spec() -> type[ExplicitSpec]:
+    from facefolds_core.model.storage import ExplicitSpec
+
+    return ExplicitSpec
+
+
+def build(spec: ExplicitSpec) -> RadianceManifolds:
+    from facefolds_core.model.storage import build_explicit
+
+    return build_explicit(spec)
+
+
+def fit(scene: Scene, params: Params, checkpoints: Path, log: Path) -> Trained:
+    from facefolds_core.training.explicit.loop import fit_explicit
+
+    return fit_explicit(scene, params, log)
+
+
+def train(scene: Scene, params: Params, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
+    from facefolds_core.training.explicit.loop import train_explicit
+
+    return train_explicit(scene, params, folder, log)

@@ -1,0 +1,48 @@
+"""The sequence's sound as a file of its own."""
+
+from __future__ import annotations
+
+import wave
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from facefolds_core.asset.audio import encode_sound, sound_problem
+from facefolds_core.errors import UserError
+
+
+def tone(path: Path, seconds: float, channels: int = 1) -> Path:
+    """440 Hz."""
+    with wave.open(str(path), "wb") as file:
+        file.setparams((channels, 2, 48_000, 0, "NONE", ""))
+        wave_form = 8000 * np.sin(2 * np.pi * 440 * np.arange(round(48_000 * seconds)) / 48_000)
+        file.writeframes(np.repeat(wave_form.astype("<i2"), channels).tobytes())
+    return path
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_it_is_the_sound_and_no_longer_than_the_pictures(tmp_path: Path, channels: int) -> None:
+    made = tmp_path / "audio.m4a"
+    assert encode_sound(made, tone(tmp_path / "tone.wav", 2.0, channels), 20 / 30) == 'audio/mp4; codecs="mp4a.40.2"'
+    with av.open(str(made)) as container:
+        assert (len(container.streams), container.streams.audio[0].codec_context.channels) == (1, channels)
+        heard = np.concatenate([frame.to_ndarray()[0] for frame in container.decode(audio=0)])
+    spectrum = np.abs(np.fft.rfft(heard))
+    assert abs(spectrum.argmax() * 48_000 / len(heard) - 440) < 3
+    assert len(heard) / 48_000 == pytest.approx(20 / 30, abs=0.03)
+    assert sound_problem(made, 20 / 30) is None
+
+
+def test_the_same_bytes_each_time(tmp_path: Path) -> None:
+    source = tone(tmp_path / "tone.wav", 0.3)
+    for name in ("a.m4a", "b.m4a"):
+        encode_sound(tmp_path / name, source, 0.3)
+    assert (tmp_path / "a.m4a").read_bytes() == (tmp_path / "b.m4a").read_bytes()
+
+
+def test_what_is_no_sound_is_named(tmp_path: Path) -> None:
+    (tmp_path / "x.wav").write_bytes(b"#EXTM3U\n/etc/passwd\n")
+    with pytest.raises(UserError, match="sound cannot be read"):
+        encode_sound(tmp_path / "a.m4a", tmp_path / "x.wav", 1.0)
