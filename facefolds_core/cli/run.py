@@ -93,7 +93,7 @@ def _has_remote(root: Path) -> bool:
 
 
 def _record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> None:
-    good = [outcome.job.target for outcome in outcomes if not outcome.error]
+    good = [outcome for outcome in outcomes if not outcome.error]
     if not good:
         return
     ran, error = record(root, good, pull)

@@ -23,6 +23,7 @@ from typing import Any
 import dask.system
 from distributed import get_worker
 
+from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
 
@@ -40,6 +41,7 @@ class Job:
         target: of DVC: "evaluate@anna".
         params: the text of params.yaml, where it is another one than the project's.
         links: paths relative to the project, and where they really are: captures outside it.
+        lock: what the project's dvc.lock says of the subject.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Job:
     target: str
     params: str | None
     links: tuple[tuple[str, str], ...]
+    lock: str = ""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class Outcome:
         ran: the stages that ran, `configure` left out; the others came from the cache.
         metrics: metrics.json; {} where there is none.
         log: all that DVC and the stages said.
+        lock: the job's own dvc.lock; "" if it failed.
     """
 
     job: Job
@@ -67,6 +71,7 @@ class Outcome:
     ran: tuple[str, ...] = ()
     metrics: Mapping[str, Any] | None = None
     log: str = ""
+    lock: str = ""
 
     @property
     def state(self) -> str:
@@ -90,7 +95,7 @@ def do(job: Job, run: str) -> Outcome:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix=f"{job.name[:40]}-", dir=worker.local_directory) as temporary:
         try:
-            root, pull = project.unfold(Path(temporary), dict(job.links), job.params)
+            root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock)
         except UserError as error:
             return Outcome(job, str(error), host=socket.gethostname())
 
@@ -115,6 +120,7 @@ def do(job: Job, run: str) -> Outcome:
             ran=tuple(stage for stage in RUNNING.findall(log) if stage != "configure"),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,
+            lock="" if status else (root / LOCK).read_text(encoding="utf-8"),
         )
 
 

@@ -15,7 +15,9 @@ from zlib import crc32
 
 import yaml
 
-from facefolds_core.cluster.job import RUNNING, Job
+from facefolds_core.cluster.dvc import THEN
+from facefolds_core.cluster.job import RUNNING, Job, Outcome
+from facefolds_core.cluster.lockfile import parts_of, put_together
 from facefolds_core.cluster.project import CODE
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_text
@@ -36,7 +38,8 @@ def subject_jobs(params: Params, root: Path, subjects: Sequence[str], stage: str
     Raises:
         UserError: if there is no such subject.
     """
-    return [Job(name, name, f"{stage}@{name}", None, links_of(params, root, name)) for name in subjects]
+    locks = parts_of(root, subjects)
+    return [Job(name, name, f"{stage}@{name}", None, links_of(params, root, name), locks[name]) for name in subjects]
 
 
 def links_of(params: Params, root: Path, subject: str) -> tuple[tuple[str, str], ...]:
@@ -75,7 +78,7 @@ def sweep_jobs(
         UserError: if a key or value does not fit.
     """
     jobs: dict[Job, Mapping[str, Any]] = {}
-    text = (root / "params.yaml").read_text(encoding="utf-8")
+    text, locks = (root / "params.yaml").read_text(encoding="utf-8"), parts_of(root, subjects)
     for subject in subjects:
         for number, cell in enumerate(cells):
             with tempfile.TemporaryDirectory() as temporary:
@@ -84,7 +87,8 @@ def sweep_jobs(
                 set_for_subject(changed, subject, cell)
                 name = f"{subject}-{number:03d}"
                 new = changed.read_text(encoding="utf-8")
-            jobs[Job(name, subject, f"{stage}@{subject}", new, links_of(params, root, subject))] = cell
+            links = links_of(params, root, subject)
+            jobs[Job(name, subject, f"{stage}@{subject}", new, links, locks[subject])] = cell
     return jobs
 
 
@@ -105,8 +109,9 @@ def how_to_repeat(job: Job, cell: Mapping[str, Any] | None, folder: Path) -> str
     return f"facefolds run --subjects {job.subject} --sweep {path} --to {stage} --out {path.with_suffix('.csv')}"
 
 
-def record(root: Path, targets: Sequence[str], pull: bool) -> tuple[list[str], str]:
-    """`dvc repro` of what is all in the cache: files into the project's folder, one dvc.lock.
+def record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> tuple[list[str], str]:
+    """What good jobs made into the project's folder: their parts of dvc.lock, files from the cache; and a `dvc repro`,
+    which looks whether all is there, and makes what is not.
 
     It waits for another DVC that is at work in the folder.
 
@@ -116,16 +121,27 @@ def record(root: Path, targets: Sequence[str], pull: bool) -> tuple[list[str], s
     Returns:
         stages that ran nevertheless, and an error, or "".
     """
-    command = [sys.executable, "-m", "dvc", "--wait-for-lock", "repro", *targets]
-    if pull:
-        command.insert(-len(targets), "--pull")
+    targets = [outcome.job.target for outcome in outcomes]
+    put_together(root, [outcome.lock for outcome in outcomes])
+    fetch = ["pull" if pull else "checkout", "--with-deps", "--force", *targets]
+    look = ["repro", *(["--pull"] if pull else []), *targets]
+    status, said = _dvc(root, ["--wait-for-lock", *fetch, THEN, "--wait-for-lock", *look])
+    return RUNNING.findall(said), said.strip()[-2000:] if status else ""
+
+
+def _dvc(root: Path, command: Sequence[str]) -> tuple[int, str]:
+    """Exit status of DVC commands, when no other DVC is in their way any more, and what they said."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     while True:
         done = subprocess.run(
-            command, cwd=root, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False
+            [sys.executable, "-m", "facefolds_core.cluster.dvc", *command],
+            cwd=root,
+            env={**os.environ, "PATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         said = done.stdout + done.stderr
-        if done.returncode and BUSY in said:
-            time.sleep(LOOK)
-            continue
-        return RUNNING.findall(said), said.strip()[-2000:] if done.returncode else ""
+        if not done.returncode or BUSY not in said:
+            return done.returncode, said
+        time.sleep(LOOK)

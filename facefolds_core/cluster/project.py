@@ -12,12 +12,13 @@ from configobj import ConfigObj
 from distributed import WorkerPlugin
 from dvc.config import Config
 
+from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.run_cache import drop_empty_runs
 from facefolds_core.errors import UserError
 from facefolds_core.reading import is_regular
 
 CODE = ("facefolds_core", "stages")
-FILES = ("dvc.yaml", "dvc.lock", "params.yaml", ".dvcignore", ".dvc/config", ".dvc/config.local")
+FILES = ("dvc.yaml", "params.yaml", ".dvcignore", ".dvc/config", ".dvc/config.local")
 LEFT_OUT = (".pyc", ".pyo")
 
 
@@ -58,13 +59,14 @@ class Project(WorkerPlugin):
         assert self.scratch is not None
         return self.scratch / f"code-{self.name}"
 
-    def unfold(self, place: Path, links: Mapping[str, str], params: str | None) -> tuple[Path, bool]:
+    def unfold(self, place: Path, links: Mapping[str, str], params: str | None, lock: str) -> tuple[Path, bool]:
         """Make a project's folder for one job.
 
         Args:
             place: an empty folder.
             links: see `Job`.
             params: the text of params.yaml; None for the project's.
+            lock: that of dvc.lock.
 
         Returns:
             its path, and whether results travel through a remote.
@@ -92,6 +94,8 @@ class Project(WorkerPlugin):
                 (root / name).write_bytes(self.files[name][1])
         if params is not None:
             (root / "params.yaml").write_text(params, encoding="utf-8")
+        if lock:
+            (root / LOCK).write_text(lock, encoding="utf-8")
         for name, target in links.items():
             path = Path(os.path.normpath(root / name))
             path.parent.mkdir(parents=True, exist_ok=True)

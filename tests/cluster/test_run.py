@@ -85,7 +85,7 @@ def test_results_are_as_of_dvc_repro_and_a_failing_job_fails_alone(tmp_path: Pat
     for name in ("a", "bb", ".config"):
         assert files_of(parallel / "data" / name) == files_of(serial / "data" / name)
     changed = (parallel / "dvc.lock").read_text().replace("parallel-captures", "serial-captures")
-    assert changed.count("md5") == (serial / "dvc.lock").read_text().count("md5")
+    assert yaml.safe_load(changed) == yaml.safe_load((serial / "dvc.lock").read_text())
     assert not [path for path in (parallel / ".dvc" / "cache").iterdir() if path.name.startswith(".")]
     status, output = run(parallel, project_root, "facefolds_core", "run", "--subjects", "a,bb")
     assert status == 0, output
