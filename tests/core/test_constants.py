@@ -115,7 +115,8 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "serving.py": ALL,
     },
     "how much is done at a time: memory and speed, never the result": {
-        "gpu.py": ("THREADS",),
+        "gpu.py": ("THREADS", "_most"),
+        "training/explicit/state_gpu.py": ("SUMS",),
         "export/sampling.py": ("DIRECTIONS_AT_ONCE",),
         "captures/developing.py": ALL,
         "captures/picture.py": ("_HEAD",),
