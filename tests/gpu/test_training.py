@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.training.explicit import device
+from facefolds_core.training import device
 
 pytest.importorskip("numba_cuda", reason="the extra `cuda` is not installed: training on GPUs is not tested")
 

@@ -24,14 +24,14 @@ from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
+from facefolds_core.training.device import Device, choose
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
-from facefolds_core.training.explicit.device import Device, choose, state_type
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Epochs, Level, plan
-from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
+from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes, state_type
 from facefolds_core.training.explicit.views import Images, Rays, check_images, rays_of
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import log_metrics, open_log
@@ -159,14 +159,14 @@ class _Trainer:
         if new_rays:
             finest = level.texels if level.stride > 1 else self.fit.texels
             share = self.params.textures.rays_per_texel * finest[0] * finest[1]
-            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving)
+            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
             self.stride = level.stride
         assert self.views is not None
         if self.state is None:
             background = first_background(self.scene, self.images, self.volume, self.params.background)
             start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
             shape = (self.params.layers, self.scene.num_frames)
-            self.state = state_type(self.device)(level.texels, *shape, start, background, self.params)
+            self.state = state_type(self.device.gpu)(level.texels, *shape, start, background, self.params)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:

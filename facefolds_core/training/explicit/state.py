@@ -237,6 +237,15 @@ class TextureState:
         return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0], self.background]
 
 
+def state_type(gpu: bool) -> type[TextureState]:
+    """The class whose steps run there."""
+    if not gpu:
+        return TextureState
+    from facefolds_core.training.explicit.state_gpu import GpuTextureState
+
+    return GpuTextureState
+
+
 def _with_moments(values: Tensor) -> Tensor:
     return torch.cat([values[None], values.new_zeros(2, *values.shape)])
 

@@ -9,7 +9,6 @@ from typing import Literal
 import torch
 
 from facefolds_core.errors import UserError
-from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.report import device_name, peak_memory
 
 
@@ -53,15 +52,6 @@ def choose(name: Literal["auto", "cpu", "cuda"]) -> Device:
     if not gpu.available():
         raise _none("an NVIDIA GPU and its driver", "see whether `nvidia-smi` shows one")
     return Device(True)
-
-
-def state_type(device: Device) -> type[TextureState]:
-    """The class of the texture grids that it trains."""
-    if not device.gpu:
-        return TextureState
-    from facefolds_core.training.explicit.state_gpu import GpuTextureState
-
-    return GpuTextureState
 
 
 def _none(missing: str, remedy: str) -> UserError:
