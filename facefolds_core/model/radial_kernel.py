@@ -1,4 +1,4 @@
-"""First crossings of rays with radius maps, compiled for CPUs. Reference: `radial.reference_crossings` (torch)."""
+"""First crossings of rays with radius maps, compiled for CPUs; GPUs: `*_gpu.py`. Reference: `radial.reference_crossings` (torch)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Rays through a grid of density and colour, forwards and backwards in one pass, and the grid's Adam step.
 
-Compiled for CPUs. Reference: `reference.py`."""
+Compiled for CPUs; GPUs: `kernels_gpu.py`. Reference: `reference.py`."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ A point y, in radii of the ball, lies in the grid at y for |y| < 1 and at (2 - 1
 voxels grow with distance, and infinity is a sphere of radius 2. Steps along a ray have one length in the contracted
 space. Only what lies behind a ray's point nearest to the ball's centre is looked at: cameras see the subject freely.
 
-Compiled for CPUs. Reference: `room_reference.py`."""
+Compiled for CPUs; GPUs: `kernels_gpu.py`. Reference: `room_reference.py`."""
 
 from __future__ import annotations
 
