@@ -28,7 +28,9 @@ def command(
     subjects: Annotated[str, typer.Option(help="Names, with commas. Left out: all of params.yaml.")] = "",
     sweep: Annotated[Path | None, typer.Option(help="YAML: keys and lists of values; every combination runs.")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="At once. 0: one for two cores.", min=0)] = 0,
-    scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:8786, or slurm, pbs, sge, lsf, ...")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="tcp://HOST:8786, ssh:HOST,HOST, or slurm, pbs, sge, lsf, ...")
+    ] = None,
     memory: Annotated[str, typer.Option(help="What a job needs: 14GB. Left out: not looked at.")] = "0",
     gpu: Annotated[int, typer.Option(help="GPUs that a job needs.", min=0)] = 0,
     remote: Annotated[bool, typer.Option("--remote", help="Results through DVC's default remote in any case.")] = False,

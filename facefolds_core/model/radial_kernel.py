@@ -1,4 +1,6 @@
-"""First crossings of rays with radius maps, compiled for CPUs; GPUs: `*_gpu.py`. Reference: `radial.reference_crossings` (torch)."""
+"""First crossings of rays with radius maps, compiled for CPUs; GPUs: `radial_gpu.py`.
+
+Reference: `radial.reference_crossings` (torch)."""
 
 from __future__ import annotations
 

@@ -43,10 +43,10 @@ from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.levels import coarse_content, level_params
 from facefolds_core.packaging.meshbits import resolved
+from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import ViewMeter, spread, training_cameras
 from facefolds_core.params import CompressParams, CrfSearchParams, LevelParams, VideoCodec
-from facefolds_core.rendering.reference import AssetCaster, composite
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(
-            temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality
-        )
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params)
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -195,7 +193,7 @@ def _crf(
 
 
 def _with_extras(
-    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
+    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], params: CompressParams
 ) -> Manifest:
     """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
@@ -207,30 +205,18 @@ def _with_extras(
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
-        index = max(train, key=lambda index: _frontality(scene.camera_in_head(index, 0)))
-        poster = _poster(folder / "poster.jpg", manifest.full, scene.camera_in_head(index, 0), jpeg_quality)
-        update["poster"] = poster.model_copy(update={"w2c": _rows(scene.cameras[index].w2c)})
-    return manifest.model_copy(update=update)
-
-
-def _frontality(camera: Camera) -> float:
-    """How much a camera sees the subject from its front, +x: 1 at most."""
-    return float(camera.centre[0] / np.linalg.norm(camera.centre))
-
-
-def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Poster:
-    shown = read_level(path.parent, level)
-    rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
-    pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(pixels).save(path, quality=jpeg_quality)
-    return Poster(
+    path, first = folder / "poster.jpg", scene.cameras[0]
+    side = min(params.poster_side, max(first.width, first.height))
+    camera = write_poster(path, manifest, side, params.jpeg_quality)
+    update["poster"] = Poster(
         **_stored(path),
         width=camera.width,
         height=camera.height,
         K=_rows(camera.K),
         w2c=_rows(camera.w2c),
-        background=(0.0, 0.0, 0.0),
+        background=BACKGROUND,
     )
+    return manifest.model_copy(update=update)
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:

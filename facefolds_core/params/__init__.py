@@ -40,6 +40,7 @@ from facefolds_core.params.export import (
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
+from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
@@ -99,6 +100,7 @@ __all__ = [
     "SampleParams",
     "ScoreWarningParams",
     "Section",
+    "SegmentParams",
     "StartParams",
     "Subject",
     "SubjectParams",

@@ -176,6 +176,9 @@ class CompressParams(Section):
     glb: GlbParams = GlbParams()
     """One frame for programs that read glTF."""
 
+    poster_side: Annotated[int, Field(ge=16, le=4096)] = 720
+    """Pixels of the poster's longer side; no more than that of the capture's pictures."""
+
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
     """Of poster and photos, on JPEG's scale."""
 

@@ -92,11 +92,25 @@ function readManifest(value) {
     audio: value.audio
       ? { ...readFile(value.audio, value.audio.file, "audio"), mime: String(value.audio.mime ?? "") }
       : null,
-    poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
+    poster: value.poster ? readPoster(value.poster) : null,
+    bounds: value.bounds ? readBounds(value.bounds) : null,
     photos: (value.photos ?? []).map(readPhoto),
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
     view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
   };
+}
+
+/** What may show the same as the first picture: with its camera, and what is behind the layers. */
+function readPoster(entry) {
+  const { K, w2c, background, width, height } = entry;
+  const camera = K && w2c && background ? { K, w2c, width, height, background } : null;
+  return { ...readFile(entry, entry.file, "poster"), camera };
+}
+
+function readBounds({ min, max }) {
+  const [low, high] = [min, max].map((corner) => list(corner, "bounds").map(Number));
+  check([...low, ...high].every(Number.isFinite) && low.length === 3 && high.length === 3, "bounds is no box");
+  return { low, high, centre: low.map((v, i) => (v + high[i]) / 2) };
 }
 
 function readLevel(level, index) {

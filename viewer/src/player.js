@@ -64,6 +64,7 @@ export class Player extends EventTarget {
     this.say("progress");
     startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
     this.view.setFilmed(this.manifest.view);
+    if (this.manifest.bounds) this.#settle(this.manifest.bounds);
     const { frames, fps } = this.manifest.levels.at(-1).texture;
     Object.assign(this.playback, { frames, fps });
     await this.detail.load(want, () => this.manifest.audio && this.#loadSound(this.manifest.audio));
@@ -78,6 +79,12 @@ export class Player extends EventTarget {
     }
   }
 
+  /** The first view fits what there is. */
+  #settle(box) {
+    this.home = box;
+    this.view.setHome(box);
+  }
+
   /** Names of the levels that this machine can show, coarsest first. */
   get choices() {
     return this.detail.choices;
@@ -90,10 +97,7 @@ export class Player extends EventTarget {
     this.renderer.setLevel(level);
     this.#showLayers();
     this.#show(frame, picture);
-    if (!old) {
-      this.home = this.renderer.bounds();
-      this.view.setHome(this.home);
-    }
+    if (!old && !this.home) this.#settle(this.renderer.bounds());
     this.draw();
     old?.dispose();
     if (!old) this.say("ready");
@@ -176,6 +180,7 @@ export class Player extends EventTarget {
     this.view.resize(w, h, below);
     if (this.home) this.view.setHome(this.home);
     if (this.level) this.draw(); // at once: setting the size has emptied the canvas
+    this.say("resized");
   }
 
   /** Off the screen nothing is drawn, decoded or fetched. */

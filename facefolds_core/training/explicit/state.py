@@ -16,7 +16,7 @@ from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
-from facefolds_core.training.explicit.views import Images, Rays, Views
+from facefolds_core.training.explicit.views import Pictures, Rays, Views
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
@@ -127,7 +127,7 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Images,
+        images: Pictures,
         frame: int,
         weights: LossWeights,
         rates: NDArray[np.float32],
@@ -148,7 +148,7 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Images,
+        images: Pictures,
         frame: int,
         weights: LossWeights,
         rates: NDArray[np.float32],
@@ -189,8 +189,15 @@ class TextureState:
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
-        for logits in (self.layers[0, ..., 3], self.frame_alpha[0, frame]):
-            logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
+        self._smooth(self.layers[0, ..., 3])
+        self.smooth_frame(frame)
+
+    def smooth_frame(self, frame: int) -> None:
+        """The same of one frame alone."""
+        self._smooth(self.frame_alpha[0, frame])
+
+    def _smooth(self, logits: Tensor) -> None:
+        logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
 
     def look(self, views: Views, images: NDArray[np.uint8], frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""

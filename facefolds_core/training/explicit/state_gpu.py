@@ -15,7 +15,7 @@ from facefolds_core import gpu
 from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
 from facefolds_core.training.explicit.state import LossWeights, TextureState
-from facefolds_core.training.explicit.views import Images, Rays, Views
+from facefolds_core.training.explicit.views import Pictures, Rays, Views
 
 SUMS = 256
 """Over which a step's squared errors are spread, so that threads seldom wait for one another."""
@@ -110,7 +110,7 @@ class GpuTextureState(TextureState):
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Images,
+        images: Pictures,
         frame: int,
         weights: LossWeights,
         rates: NDArray[np.float32],
@@ -126,7 +126,7 @@ class GpuTextureState(TextureState):
             len(rays),
             *self._views(views),
             gpu.to_gpu(rays),
-            self._kept.get(("frame", frame), None, lambda: (gpu.to_gpu(images.frame(frame)),))[0],
+            self._kept.get(("frame", frame), images, lambda: (gpu.to_gpu(images.frame(frame)),))[0],
             away.background,
             away.texture.reshape(h, w, n, 4),
             self._kept.get("shine", self.shine, lambda: (gpu.to_gpu(self.shine),))[0],
@@ -155,12 +155,17 @@ class GpuTextureState(TextureState):
         return self._kept.get(("views", id(views)), views, lambda: tuple(gpu.to_gpu(array) for array in arrays))
 
     def smooth_alpha(self, frame: int) -> None:
-        away = self._go()
-        for logits in (away.layers[0, :, :, 3], away.frames[frame][1][0]):
-            m, n = logits.shape
-            smoothed = gpu.empty((m, n))
-            kernels_gpu.smooth.run(m, logits, *self.shape, smoothed, LAYERS=n)
-            kernels_gpu.assign.run(m, smoothed, logits)
+        self._smooth_there(self._go().layers[0, :, :, 3])
+        self.smooth_frame(frame)
+
+    def smooth_frame(self, frame: int) -> None:
+        self._smooth_there(self._go().frames[frame][1][0])
+
+    def _smooth_there(self, logits: Any) -> None:
+        m, n = logits.shape
+        smoothed = gpu.empty((m, n))
+        kernels_gpu.smooth.run(m, logits, *self.shape, smoothed, LAYERS=n)
+        kernels_gpu.assign.run(m, smoothed, logits)
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
         away, (h, w), frames = self._go(), self.shape, len(self.steps)

@@ -130,6 +130,7 @@ class MovingRays:
         stride: of the pixels that there are, as in `trace_views`.
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how many shares a frame has in use, and how much is kept.
+        first: number of the first share of frame 0.
         gpu: whether they are traced on a GPU.
     """
 
@@ -140,8 +141,10 @@ class MovingRays:
         stride: int,
         share: float,
         params: MovingParams,
+        first: int = 0,
         gpu: bool = False,
     ) -> None:
+        self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
         self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
@@ -158,7 +161,7 @@ class MovingRays:
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
         """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""
         turn, rest = phase % self._used, phase // self._used
-        number = (frame * self._used + turn) % self.shares
+        number = (self._first + frame * self._used + turn) % self.shares
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)
@@ -200,7 +203,25 @@ def rays_of(
     """
     if scene.poses is None:
         return StillRays(trace_views(scene, manifolds, stride, gpu))
-    return MovingRays(scene, manifolds, stride, share, params, gpu)
+    return MovingRays(scene, manifolds, stride, share, params, gpu=gpu)
+
+
+class Pictures(Protocol):
+    """Of the training cameras, by frame."""
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """(C, H W, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The pictures of one frame, whichever is asked for."""
+
+    images: NDArray[np.uint8]
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        return self.images
 
 
 class Images:
