@@ -15,6 +15,7 @@ from facefolds_core.params.compress import (
     LevelParams,
     MeshCodec,
     MeterParams,
+    StreamParams,
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
@@ -102,6 +103,7 @@ __all__ = [
     "Section",
     "SegmentParams",
     "StartParams",
+    "StreamParams",
     "Subject",
     "SubjectParams",
     "TextureParams",
