@@ -49,7 +49,7 @@ $(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.js
 	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 
-report: $(READY)
+report: $(READY) $(if $(shell command -v npm),$(PLAYER)) # the page shows the asset with the player
 	$(BIN)/facefolds report $(SUBJECT)
 
 hero: $(READY) $(PLAYER)

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, CDPSession, Page, sync_playwright
 
+from bench.players import chromium
 from bench.results import commit_name, machine_name, now
 from bench.tables import markdown
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.render import parse_size
-from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_file, write_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.pictures import open_picture
@@ -31,7 +32,7 @@ from facefolds_core.player import find_player
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.serving import serving
-from tests.chromium import BROWSERS, FLAGS, find_browser
+from tests.chromium import FLAGS
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
 
 PATIENCE = 120_000
@@ -192,15 +193,12 @@ def main(
     """Bytes, times and main-thread time of the player's page, and its pixels' agreement with `facefolds render`."""
     with report_user_errors("page"):
         read_asset(asset)
-        path = find_browser()
-        if path is None:
-            raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
         wanted = [float(text) or None for text in lines.split(",")]
         window = parse_size(size, film=False)
         with (
             serving(find_player(), {"asset": asset}) as address,
             sync_playwright() as playwright,
-            playwright.chromium.launch(executable_path=path, args=list(FLAGS)) as browser,
+            playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS)) as browser,
         ):
             rows = [measure(browser, address, line, window) for line in wanted]
             near = agreement(browser, address, asset)

@@ -15,6 +15,7 @@ from facefolds_core.params.compress import (
     LevelParams,
     MeshCodec,
     MeterParams,
+    StreamParams,
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
@@ -37,6 +38,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
+from facefolds_core.params.matte import CutOutParams, MatteParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -69,6 +71,7 @@ __all__ = [
     "CollapseParams",
     "CompressParams",
     "CrfSearchParams",
+    "CutOutParams",
     "DecimateParams",
     "DivergenceParams",
     "EnvironmentParams",
@@ -81,6 +84,7 @@ __all__ = [
     "HoldoutEvery",
     "LevelParams",
     "LossParams",
+    "MatteParams",
     "MeshCodec",
     "MeshParams",
     "MeterParams",
@@ -102,6 +106,7 @@ __all__ = [
     "Section",
     "SegmentParams",
     "StartParams",
+    "StreamParams",
     "Subject",
     "SubjectParams",
     "TextureParams",
@@ -110,6 +115,7 @@ __all__ = [
     "VideoCodec",
     "VolumeLevel",
     "VolumeParams",
+    "VoteParams",
     "WallParams",
     "WarningParams",
     "merged",

@@ -47,6 +47,9 @@ class SegmentParams(Section):
     thumbnail: Annotated[int, Field(ge=2, le=256)] = 32
     """Rows of the small grey pictures that are compared."""
 
+    vertices: Count = 512
+    """Of a tracked mesh that are compared, at most."""
+
     neighbours: Annotated[int, Field(ge=1, le=100)] = 3
     """A frame starts from the mean of so many key frames, the ones most like it, weighted by likeness: without a leap
     when another key frame comes near."""
@@ -67,7 +70,7 @@ class SegmentParams(Section):
     """Learning rate of a frame's parts against that of the training at once; it falls to `textures.final_rate` of
     itself."""
 
-    ray_nanoseconds: Factor = 700.0
+    ray_nanoseconds: Factor = 1500.0
     """Of one core, a ray and step, of twelve layers: what the time is foretold by. Measured."""
 
     free_share: Annotated[Share, Field(gt=0)] = 0.9

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -17,6 +18,7 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.track import Track
 from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.params import ExplicitParams, train_params
@@ -187,3 +189,14 @@ def test_a_damaged_segment_is_named(keep: int, again: tuple[Scene, Path]) -> Non
 def test_an_unknown_key_frame_is_refused(again: tuple[Scene, Path]) -> None:
     with pytest.raises(UserError, match="key frame"):
         train(again[0], again[1], named=["000001", "elsewhere"])
+
+
+def test_a_head_that_turns_is_fitted_frame_by_frame_too(tmp_path: Path) -> None:
+    """Its rays meet other texels in each frame. It is the sphere itself, said to have shifted by next to nothing."""
+    scene = make_scene(tmp_path / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    shifts = np.outer(np.linspace(-1e-4, 1e-4, FRAMES), [0, 1, 0])
+    scene = replace(scene, poses=Track.of([np.eye(3)] * FRAMES, shifts))
+    with counted() as fitted:
+        model = train(scene, tmp_path)
+    assert fitted == list(range(FRAMES))
+    assert error_of(scene, model, 0, 0) < error_of(scene, model, 0, 2)

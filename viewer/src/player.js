@@ -59,10 +59,12 @@ export class Player extends EventTarget {
   async load(files, want = "auto") {
     this.files = files;
     files.onProgress = () => this.say("progress");
+    files.onTrouble = (error) => this.fail(error);
+    import("./video/open.js").catch(() => {}); // wanted soon; said where a level waits for it
+    startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
     const text = await files.text("manifest.json");
     this.manifest = parseManifest(text, files.address("manifest.json"));
     this.say("progress");
-    startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
     this.view.setFilmed(this.manifest.view);
     if (this.manifest.bounds) this.#settle(this.manifest.bounds);
     const { frames, fps } = this.manifest.levels.at(-1).texture;
@@ -70,9 +72,11 @@ export class Player extends EventTarget {
     await this.detail.load(want, () => this.manifest.audio && this.#loadSound(this.manifest.audio));
   }
 
+  /** Of a long take the browser fetches the sound by itself, as it plays. */
   async #loadSound(entry) {
     try {
-      this.sound = new Sound(await this.files.bytes(entry), entry.mime);
+      const address = this.manifest.levels[0].videos[0].segments && this.files.addressFor?.(entry);
+      this.sound = address ? new Sound(address) : Sound.of(await this.files.bytes(entry), entry.mime);
       this.say("change");
     } catch (error) {
       this.fail(error);

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from safetensors import safe_open
 from torch import Tensor
 
-import facefolds_core
 from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files import atomic_folder
@@ -24,7 +23,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, read_spec
 from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams
-from facefolds_core.source_code import digest_of_file
+from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.patience import patiently
 
@@ -68,15 +67,13 @@ def digest_of_training(params: ExplicitParams) -> bytes:
     left_out = {"device", "preset", "segments"}
     values = params.model_dump(mode="json", exclude=left_out)
     digest.update(json.dumps(values, sort_keys=True).encode())
-    package = Path(facefolds_core.__file__).parent
-    for path in sorted(p for name in ("training", "model", "geometry") for p in (package / name).rglob("*.py")):
-        digest.update(digest_of_file(path).encode())
+    digest.update(digest_of_packages("training", "model", "geometry").encode())
     return digest.digest()
 
 
 def digest_of_fitting(params: ExplicitParams) -> bytes:
     """Of the parameters by which frames are fitted to a base."""
-    names = {"cameras", "thumbnail", "neighbours", "blend", "steps", "rate"}
+    names = {"cameras", "thumbnail", "vertices", "neighbours", "blend", "steps", "rate"}
     values = params.segments.model_dump(mode="json", include=names)
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).digest()
 

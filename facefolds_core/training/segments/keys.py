@@ -30,7 +30,10 @@ def likenesses(scene: Scene, params: SegmentParams) -> list[Float]:
             small = cv2.resize(store.image(camera, k), size, interpolation=cv2.INTER_AREA)
             found[k, position] = small.mean(-1)
     surface = scene.load_surface()
-    meshes = [] if surface is None else [surface[0].reshape(len(found), -1)]
+    meshes = []
+    if surface is not None:
+        step = -(-surface[0].shape[1] // params.vertices)
+        meshes = [np.ascontiguousarray(surface[0][:, ::step]).reshape(len(found), -1)]
     return [found.reshape(len(found), -1), *meshes]
 
 

@@ -42,7 +42,7 @@ export class Overlays {
     if (!wanted) return;
     if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
     const [decoder, all] = player.level ? [0, 0] : [weight.loaded, weight.total]; // before the first picture it comes too
-    const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.bytes + all));
+    const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.first + all));
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
     this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded + decoder)}`;
