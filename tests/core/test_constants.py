@@ -125,6 +125,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "captures/picture.py": ("_HEAD",),
         "model/manifolds.py": ("CHUNK",),
         "model/segmented.py": ("KEPT",),
+        "spill.py": ALL,
         "model/radiance.py": ("RAYS_AT_ONCE", "TEXELS_AT_ONCE"),
         "rendering/intersection.py": ("MISS", "_PAIRS_AT_ONCE"),
         "scoring/model_view.py": ("CROSSINGS_AT_ONCE",),
