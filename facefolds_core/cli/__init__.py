@@ -19,6 +19,7 @@ COMMANDS = {
     "view": "Play an asset in a browser.",
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
+    "vectors": "Tiny assets and the pictures that a player must show; compares a player's.",
     "export": "Write an asset as another program can read it.",
     "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
@@ -26,6 +27,7 @@ COMMANDS = {
     "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "run": "Many subjects, or a grid of parameters, at once: here or on a cluster.",
+    "mattes": "Cut the subject out of a capture's pictures: to look at, correct, and train with.",
     "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
     "recommend": "The best configuration within a budget, of such a table.",
@@ -36,8 +38,10 @@ COMMANDS = {
 
 EXTRAS = {
     "submission": "train",
+    "vectors": "train",
     "scores": "train",
     "report": "report",
+    "mattes": "train",
     "waterfall": "train",
     "run": "cluster",
     "collect": "pipeline",

@@ -63,4 +63,4 @@ def command(
             seconds = time.perf_counter() - start
             typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
         if not subjects:
-            typer.echo(f"report: {make_index(data, evaluated_subjects(data))}, all subjects")
+            typer.echo(f"report: {make_index(data)}, all subjects")

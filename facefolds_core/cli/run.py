@@ -52,7 +52,8 @@ def command(
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
-            _record(root, outcomes, remote or (scheduler is not None and _has_remote(root)))
+            pull = remote or (scheduler is not None and _has_remote(root))
+            _record(root, outcomes, pull, everybody=set(names) == set(params.subjects))
         _print_table(outcomes)
         if any(outcome.error for outcome in outcomes):
             raise typer.Exit(1)
@@ -94,11 +95,11 @@ def _has_remote(root: Path) -> bool:
     return Config(str(root / ".dvc"))["core"].get("remote") is not None
 
 
-def _record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> None:
+def _record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> None:
     good = [outcome for outcome in outcomes if not outcome.error]
     if not good:
         return
-    ran, error = record(root, good, pull)
+    ran, error = record(root, good, pull, everybody and len(good) == len(outcomes))
     if ran:
         typer.echo(f"run: note: not found in the cache, so made here: {', '.join(ran)}")
     if error:

@@ -38,6 +38,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
+from facefolds_core.params.matte import CutOutParams, MatteParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -70,6 +71,7 @@ __all__ = [
     "CollapseParams",
     "CompressParams",
     "CrfSearchParams",
+    "CutOutParams",
     "DecimateParams",
     "DivergenceParams",
     "EnvironmentParams",
@@ -82,6 +84,7 @@ __all__ = [
     "HoldoutEvery",
     "LevelParams",
     "LossParams",
+    "MatteParams",
     "MeshCodec",
     "MeshParams",
     "MeterParams",
@@ -112,6 +115,7 @@ __all__ = [
     "VideoCodec",
     "VolumeLevel",
     "VolumeParams",
+    "VoteParams",
     "WallParams",
     "WarningParams",
     "merged",

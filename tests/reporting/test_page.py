@@ -159,8 +159,21 @@ def test_frames_have_one_name_everywhere(subject: SubjectFolders) -> None:
 
 def test_the_index_lists_all_subjects(subject: SubjectFolders) -> None:
     page_of(subject)
-    page = make_index(subject.root.parent, [subject.root]).read_text()
-    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page
+    page = make_index(subject.root.parent).read_text()
+    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page and ">evaluated<" in page
+
+
+def test_the_index_says_how_far_the_others_are(tmp_path: Path) -> None:
+    for name in ("waiting", "trained"):
+        write_json(tmp_path / ".config" / name / "subject.json", {})
+    for stage, seconds in (("capture", 2.0), ("normalize", 3.0), ("train", 70.0)):
+        write_json(tmp_path / ".timings" / "trained" / f"{stage}.json", {"seconds": seconds})
+    page = make_index(tmp_path).read_text()
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", line) for line in page.splitlines() if '<th scope="row"' in line]
+    assert [(row[0], row[2], row[-2]) for row in rows] == [
+        ("trained", "made up to train", "75\N{NO-BREAK SPACE}s"),
+        ("waiting", "not begun", "–"),
+    ]
 
 
 def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:
