@@ -44,8 +44,8 @@ class VoteParams(Section):
     """Optical depth of a voxel of the starting volume from which on it belongs to the subject's body,"""
 
     near: Length = 0.04
-    """and only what lies within this of the body can be the subject's, units: in the shadow that the head throws for all
-    other pictures, one picture's bookshelf would be undisputed."""
+    """and only what lies within this of the body can be the subject's, units: in the shadow that the head throws for
+    all others, one picture's bookshelf would be undisputed."""
 
     grow: Natural = 4
     """A cut-out may reach this far beyond the silhouette of what the pictures agree on, pixels: hair."""
