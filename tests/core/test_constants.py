@@ -72,7 +72,8 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "training/explicit/shading_kernel.py": ("_scatter",),
         "training/explicit/kernels_gpu.py": ("_put", "LAYERS"),
         "training/explicit/state.py": ("UNSEEN_LOGIT",),
-        "training/volume/kernel.py": ("PARTS", "BLOCK", "CLEAR", "OPAQUE", "LIMIT"),
+        "training/volume/look_kernel.py": ("CLEAR", "OPAQUE"),
+        "training/volume/kernel.py": ("PARTS", "BLOCK", "LIMIT"),
     },
     "guard against a division by zero, rounding, or too little to work on": {
         "asset/draco.py": ("DEGENERATE",),
@@ -122,7 +123,10 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "serving.py": ALL,
     },
     "how much is done at a time: memory and speed, never the result": {
-        "gpu.py": ("THREADS",),
+        "gpu.py": ("THREADS", "_most"),
+        "training/explicit/state_gpu.py": ("SUMS",),
+        "training/volume/steps_gpu.py": ("SUMS", "AT_ONCE"),
+        "model/radial_gpu.py": ("LAYERS",),
         "export/sampling.py": ("DIRECTIONS_AT_ONCE",),
         "captures/developing.py": ALL,
         "captures/picture.py": ("_HEAD",),

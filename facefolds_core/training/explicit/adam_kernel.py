@@ -1,4 +1,6 @@
-"""Activation of the texture grids and their Adam step, compiled for CPUs. Reference: `reference.py`."""
+"""Activation of the texture grids and their Adam step, compiled for CPUs; GPUs: `kernels_gpu.py`.
+
+Reference: `reference.py`."""
 
 from __future__ import annotations
 
@@ -62,7 +64,7 @@ def adam_step(  # type: ignore[no-untyped-def]
         adam_texel(k, static, own, texture, gradient, rates, keep, correct, decay)
 
 
-@compiled
+@inlined  # a call with so many arrays costs
 def adam_texel(
     k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, keep: Any, correct: Any, decay: Any
 ) -> None:

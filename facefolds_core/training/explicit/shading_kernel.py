@@ -1,4 +1,4 @@
-"""Shading of stored crossings, forwards and backwards, compiled for CPUs. Reference: `reference.py`.
+"""Shading of stored crossings, forwards and backwards, compiled for CPUs; GPUs: `*_gpu.py`. Reference: `reference.py`.
 
 For how threads share the work see `facefolds_core.scatter`."""
 
@@ -115,7 +115,7 @@ def _shade(
     return total
 
 
-@compiled
+@inlined  # a call with so many arrays costs
 def shade_ray(
     k: Any,
     p: Any,
