@@ -16,7 +16,7 @@ from facefolds_core.params import CompressParams, LevelParams
 
 
 class Resampled:
-    """Textures at another size, premultiplied area means (export/textures.py); what was asked for is kept."""
+    """Textures at another size, premultiplied, by least squares (export/textures.py); what was asked for is kept."""
 
     def __init__(self, textures: Textures, size: int) -> None:
         self._textures, self._size = textures, size
