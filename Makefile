@@ -6,6 +6,8 @@
 # make report  set up, then make a page about every subject that has scores: data/<subject>/report.html (or SUBJECT=folder)
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
+# make hero    set up, then film the embedded actor at full size, run the pipeline and pack the asset: dist/hero (hours; it can be interrupted)
+# make docs    set up, then make the documents a site: site/index.html (with the player on the first page after `make hero`)
 # make package dist/facefolds-player-*.tgz: the web player as an npm package, with types (nothing is published)
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/guide/engines.md (about 400 MB; needs Python 3.11)
@@ -23,7 +25,7 @@ PLAYER := viewer/dist/index.html
 WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
 PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: repro check test nightly view report lint lint-player wheel package bench charts blender clean
+.PHONY: repro check test nightly view report hero docs lint lint-player wheel package bench charts blender clean
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
@@ -47,8 +49,15 @@ $(PLAYER): $(shell find viewer/src viewer/public -type f) viewer/package-lock.js
 	@command -v npm >/dev/null || { echo "the web player is built with Node.js 18 or newer: apt-get install nodejs npm (Debian, Ubuntu) or dnf install nodejs, then run the same command again"; exit 1; }
 	cd viewer && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 
-report: $(READY)
+report: $(READY) $(if $(shell command -v npm),$(PLAYER)) # the page shows the asset with the player
 	$(BIN)/facefolds report $(SUBJECT)
+
+hero: $(READY) $(PLAYER)
+	$(BIN)/python -m bench.hero
+
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html"
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -97,4 +106,4 @@ blender: .venv-blender/.installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config data/.timings data/.locks dvc.lock
+	rm -rf site $(VENV) .venv-blender bench/browser/node_modules viewer/node_modules viewer/dist .dvc/tmp .dvc/cache data/*/ data/.code data/.config data/.timings data/.locks dvc.lock

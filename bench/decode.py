@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import deque
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -37,8 +38,7 @@ def main(
         for file in files:
             with av.open(str(file)) as container:
                 container.streams.video[0].thread_type = "AUTO"
-                for _ in container.decode(video=0):
-                    pass
+                deque(container.decode(video=0), 0)
         times.append((time.perf_counter(), time.process_time()))
         subject = Subject.model_validate({"source": source, "path": str(folder), "front": front, "holdout": []})
         capture = SOURCES[source].read(folder, subject, CaptureParams())

@@ -72,7 +72,7 @@ def shoot(film: Film, cache: Path) -> Shots:
         subject = Subject(source="actor", path="", holdout=tuple(c.name for c in [*rig[11::12], *extremes]))
         with TemporaryDirectory() as raw:
             write_capture(raw, params, options=film.options, rig=ActorRig((*rig, *extremes)))
-            capture = read_multiface(Path(raw), subject, params.fps)
+            capture = read_multiface(Path(raw), subject, params.frame_rate)
             write_plan(plan_scene(capture, "actor", subject, NormalizeParams(), folder), NormalizeParams())
     return read_shots(folder)
 

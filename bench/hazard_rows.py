@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bench.hazard_film import EXTREMES, Film, Shots, keep_cameras, keep_frames, map_cameras, map_images
 from bench.results import Cell
 from facefolds_core.captures.actor import ActorOptions
+from facefolds_core.captures.images import Colour, corrected_colour, to_8bit
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.frame_store import Image
 from facefolds_core.geometry.cameras import Camera
@@ -94,11 +95,7 @@ def exposure(shots: Shots, stops: float, random: Random) -> Shots:
 
 def exposed(image: Image, gain: NDArray[np.float64]) -> Image:
     """A picture with `gain` (3,) times the light, before sRGB's curve."""
-    x = image / 255.0
-    linear = np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4) * gain
-    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
-    result: Image = np.rint(255 * curved.clip(0, 1)).astype(np.uint8)
-    return result
+    return to_8bit(corrected_colour(image.astype(np.float32), Colour(np.diag(gain), np.zeros(3), linear=True)))
 
 
 def missing_frames(shots: Shots, count: float, random: Random) -> Shots:
@@ -138,10 +135,6 @@ def wrong_radius(shots: Shots, factor: float, random: Random) -> Shots:
     return replace(shots, surface=(centre + np.float32(factor) * (shots.surface[0] - centre), shots.surface[1]))
 
 
-def _subject(**options: float) -> Film:
-    return Film(ActorOptions(**options))
-
-
 ODD_SIZES = {n: Film(height=h, width=w) for n, h, w in ((1.0, 97, 65), (2.0, 113, 53), (3.0, 71, 89))}
 """About as many pixels as 96 x 64."""
 RATE = (("mlp", "lr_manifold"), ("explicit", "volume.learning_rate"))
@@ -153,16 +146,16 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard("one-off", "one camera far off", (4, 8, 16), "{} px", disturb=one_camera_off),
     Hazard("exposure", "exposure, white balance", (0.15, 0.3, 0.6), "{} stops", disturb=exposure),
     Hazard("frames", "missing frames", (1, 2, 3), "{} of 4", disturb=missing_frames),
-    Hazard("blur", "motion blur", (1 / 60, 1 / 30, 1 / 15), "{} s", film=lambda s: _subject(shutter=s)),
+    Hazard("blur", "motion blur", (1 / 60, 1 / 30, 1 / 15), "{} s", film=lambda s: Film(ActorOptions(shutter=s))),
     *(
         Hazard(key, title, strengths, unit, film=film, truth=film)
         for key, title, strengths, unit, film in (
-            ("motion", "head motion", (0.03, 0.1, 0.3), "{} rad", lambda s: _subject(head_motion=s)),
-            ("room", "cluttered room", (0.25, 0.5, 1), "{}", lambda s: _subject(clutter=s)),
-            ("hair", "thin hair", (0.5, 0.2, 0.05), "x {}", lambda s: _subject(hair_density=s)),
-            ("nose", "protruding nose", (10, 20, 40), "+{} mm", lambda s: _subject(nose=s)),
-            ("object", "object before the face", (8, 16, 24), "{} mm", lambda s: _subject(ball=s)),
-            ("gloss", "glossy skin", (2, 4, 8), "x {}", lambda s: _subject(gloss=s)),
+            ("motion", "head motion", (0.03, 0.1, 0.3), "{} rad", lambda s: Film(ActorOptions(head_motion=s))),
+            ("room", "cluttered room", (0.25, 0.5, 1), "{}", lambda s: Film(ActorOptions(clutter=s))),
+            ("hair", "thin hair", (0.5, 0.2, 0.05), "x {}", lambda s: Film(ActorOptions(hair_density=s))),
+            ("nose", "protruding nose", (10, 20, 40), "+{} mm", lambda s: Film(ActorOptions(nose=s))),
+            ("object", "object before the face", (8, 16, 24), "{} mm", lambda s: Film(ActorOptions(ball=s))),
+            ("gloss", "glossy skin", (2, 4, 8), "x {}", lambda s: Film(ActorOptions(gloss=s))),
         )
     ),
     Hazard("centre", "centre guessed wrong", (0.05, 0.1, 0.2), "{} units", world=wrong_centre),

@@ -27,7 +27,7 @@ from bench.hazard_rows import CLEAN, FILM, HAZARDS, Hazard
 from bench.results import Cell, Store, commit_name, mean, now
 from bench.run import Project, own_params, score_model, training_of
 from bench.tables import hazard_tables, replace_between
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json
 from facefolds_core.paths import SubjectFolders
@@ -42,20 +42,14 @@ SEEDS = {"fast": 3, "paper": 1}
 """Of the film, without --seeds: with these the matrix takes less than an hour on two idle cores."""
 CUT: dict[str, dict[str, Any]] = {
     "fast": {
-        "iterations": 240,
-        "volume": {"levels": [{"resolution": n, "iterations": 50} for n in (40, 64)], "rays": 4096},
+        **{
+            "iterations": 240,
+            "volume": {"levels": [{"resolution": n, "iterations": 50} for n in (40, 64)], "rays": 4096},
+        }
     },
     "paper": {
-        "manifold_width": 64,
-        "output_scale": 1.0,
-        "lr_manifold": 1e-4,
-        "texture_layers": 3,
-        "texture_width": 64,
-        "lr_texture": 4e-3,
-        "search_samples": 16,
-        "rays": 512,
-        "iterations": 250,
-        "decay_interval": 250,
+        **{"manifold_width": 64, "output_scale": 1.0, "lr_manifold": 1e-4, "search_samples": 16, "rays": 512},
+        **{"texture_layers": 3, "texture_width": 64, "lr_texture": 4e-3, "iterations": 250, "decay_interval": 250},
     },
 }
 """What is cut of the film's trainings so that a cell takes some seconds. `paper` keeps its twelve layers, their spacing
@@ -119,10 +113,11 @@ def disturbed(hazard: Hazard, strength: float, seed: int, source: Shots | None, 
     random = np.random.default_rng([seed, crc32(hazard.key.encode())])
     start = random.bit_generator.state
     parts = []
-    for film, split in ((hazard.film, "train"), (hazard.truth, "holdout")):
+    wanted: tuple[tuple[Any, Split], ...] = (hazard.film, "train"), (hazard.truth, "holdout")
+    for film, split in wanted:
         random.bit_generator.state = start
         shots = source or shoot(film(strength) if film else Film(), cache)
-        parts.append(hazard.world(of_split(shots, "train" if split == "train" else "holdout"), strength, random))
+        parts.append(hazard.world(of_split(shots, split), strength, random))
     return hazard.disturb(parts[0], strength, random), parts[1]
 
 
@@ -154,9 +149,8 @@ def scored(model: Path, scene: Scene, truth: Scene) -> dict[str, Any]:
     times = dict(enumerate(np.interp(truth.times, scene.times, np.arange(scene.num_frames)).tolist()))
     values = list(score_model(model, truth, times, Perceptual(None, None, ()), torch.device("cpu")))
     key = "psnr_subject" if any(v["psnr_subject"] is not None for _, _, v in values) else "psnr"
-    views = {
-        name: mean([v[key] for at, _, v in values if at == name]) for name in dict.fromkeys(at for at, _, _ in values)
-    }
+    seen = dict.fromkeys(at for at, _, _ in values)
+    views = {name: mean([v[key] for at, _, v in values if at == name]) for name in seen}
     inner = [name for name in views if name not in EXTREMES]
     return {"psnr": mean([views[name] for name in inner]), "views": views, "flat": flat(truth, inner)}
 

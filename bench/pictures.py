@@ -1,6 +1,6 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
-python -m bench.pictures              makes docs/images/face.webp, actor.jpg, report.jpg from data/actor
+python -m bench.pictures              makes docs/images/face.webp, actor.jpg, limits.jpg, report.jpg from data/actor
 python -m bench.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
 What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium.
@@ -8,7 +8,6 @@ What each was made from stands in docs/images/made.json; report.jpg needs `facef
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -17,14 +16,19 @@ import numpy as np
 import typer
 from PIL import Image
 
+from bench.players import chromium
 from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
+from facefolds_core.captures.actor import ActorOptions, camera_at, render
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.cli.render import shrink
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
 from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from tests.chromium import FLAGS
 
 IMAGES = ROOT / "docs" / "images"
 RECORD = "made.json"
@@ -32,8 +36,11 @@ FILM: dict[str, Any] = {"size": [384, 480], "pictures": 48, "milliseconds": 90, 
 FILM |= {"field_of_view": 18.5, "target": [-0.1, 0.0, -0.035], "background": [22, 24, 29], "samples": 2}
 """A turntable in which the film plays over and over, slower than it was filmed: 11 frames a second, not 30."""
 SHEET: dict[str, Any] = {"quality": 88}
-PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patience": 2000, "quality": 82}
-"""CSS pixels: a desktop, and a phone beside it; milliseconds until the page's films are decoded."""
+PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patience": 6000, "quality": 82}
+"""CSS pixels: a desktop, and a phone beside it; milliseconds until the player in it plays."""
+LIMITS: dict[str, Any] = {"size": [500, 768], "panel": [216, 264], "gap": 6, "frame": 2, "quality": 85}
+LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 380, 216]]}
+"""Azimuth and elevation in degrees, then left, top and width of what is cut out of a picture of `size`, pixels."""
 
 
 class Picture(NamedTuple):
@@ -54,18 +61,38 @@ def film(subject: Path, out: Path) -> None:
         for index, eye in enumerate(turntable(start, FILM["pictures"], FILM["sweep"])):
             camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
             rgb = renderer.render(camera, index % shown.num_frames, background)[0]
-            means = rgb.reshape(height, samples, width, samples, 3).mean((1, 3))
-            pictures.append(Image.fromarray(np.rint(np.clip(means, 0, 1) * 255).astype(np.uint8)))
-    timing = {"duration": FILM["milliseconds"], "loop": 0}
-    pictures[0].save(
-        out, "WEBP", save_all=True, append_images=pictures[1:], quality=FILM["quality"], method=6, **timing
-    )
+            pictures.append(Image.fromarray(shrink(rgb, samples)))
+    options = {"duration": FILM["milliseconds"], "loop": 0, "quality": FILM["quality"], "method": 6}
+    pictures[0].save(out, "WEBP", save_all=True, append_images=pictures[1:], **options)
 
 
 def sheet(subject: Path, out: Path) -> None:
     """Truth, model, asset and error, as `evaluate` draws them."""
     picture = open_picture(subject / "evaluation" / "contact_sheet.png")
     picture.convert("RGB").save(out, "JPEG", quality=SHEET["quality"], optimize=True)
+
+
+def limits(subject: Path, out: Path) -> None:
+    """What an asset lacks, three times truth and asset side by side, both in the actor's room."""
+    shown, scene = read_asset(subject / "asset").full, read_scene(subject / "scene")
+    (width, height), panel, frame, gap = LIMITS["size"], LIMITS["panel"], LIMITS["frame"], LIMITS["gap"]
+    shots = []
+    with OpenGLRenderer(shown, Glossy.of(shown)) as renderer:
+        for azimuth, elevation, left, top, wide in LIMITS["views"]:
+            camera = camera_at("limit", azimuth, elevation, width, height)
+            truth, room = (
+                render(camera, float(scene.times[frame]), ActorOptions(away=away)).rgb for away in (0.0, 1.0)
+            )
+            drawn = renderer.render(camera.transformed(scene.from_capture), frame, room / 255.0)[0]
+            box = (left, top, left + wide, top + wide * panel[1] // panel[0])
+            for rgb in (truth, np.rint(np.clip(drawn, 0, 1) * 255).astype(np.uint8)):
+                shots.append(Image.fromarray(rgb).crop(box).resize(panel, Image.Resampling.LANCZOS))
+    # Wider gaps between the three than within a pair.
+    places = [(panel[0] + gap) * k + 3 * gap * (k // 2) for k in range(len(shots))]
+    whole = Image.new("RGB", (places[-1] + panel[0], panel[1]), "white")
+    for left, shot in zip(places, shots, strict=True):
+        whole.paste(shot, (left, 0))
+    whole.save(out, "JPEG", quality=LIMITS["quality"], optimize=True)
 
 
 def page(subject: Path, out: Path) -> None:
@@ -76,21 +103,18 @@ def page(subject: Path, out: Path) -> None:
     """
     from playwright.sync_api import sync_playwright
 
-    report = subject / "report.html"
-    if not report.exists():
+    if not (report := subject / "report.html").exists():
         raise UserError("no report", file=report, remedy=f"run `facefolds report {subject}` first")
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        raise UserError("no browser", expected="chromium or google-chrome", remedy="apt-get install chromium")
+    browser = chromium()
     shots = []
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        started = playwright.chromium.launch(executable_path=browser, args=list(FLAGS))
         for width in PAGE["widths"]:
-            tab = chromium.new_page(viewport={"width": width, "height": PAGE["height"]})
+            tab = started.new_page(viewport={"width": width, "height": PAGE["height"]})
             tab.goto(report.resolve().as_uri())
             tab.wait_for_timeout(PAGE["patience"])
             shots.append(open_picture(tab.screenshot()).convert("RGB"))
-        chromium.close()
+        started.close()
     whole = Image.new("RGB", (sum(shot.width + PAGE["gap"] for shot in shots) - PAGE["gap"], PAGE["height"]), "white")
     for index, shot in enumerate(shots):
         whole.paste(shot, (sum(before.width + PAGE["gap"] for before in shots[:index]), 0))
@@ -100,6 +124,7 @@ def page(subject: Path, out: Path) -> None:
 PICTURES = {
     "face.webp": Picture("asset/manifest.json", FILM, film),
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
+    "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
 }
 
@@ -127,12 +152,12 @@ def make(name: str, subject: Path, images: Path = IMAGES) -> None:
         UserError: if the subject lacks what it is made from.
     """
     picture = PICTURES[name]
-    if not (subject / picture.source).exists():
-        raise UserError("nothing to make a picture from", file=subject / picture.source, remedy="run `make repro`")
+    if not (source := subject / picture.source).exists():
+        raise UserError("nothing to make a picture from", file=source, remedy="run `make repro`")
     with atomic_file(images / name) as temporary:
         picture.make(subject, temporary)
     record = read_json(images / RECORD) if (images / RECORD).exists() else {}
-    digests = {"sha256": file_sha256(images / name), "source": file_sha256(subject / picture.source)}
+    digests = {"sha256": file_sha256(images / name), "source": file_sha256(source)}
     record[name] = {"commit": commit_name(), **digests, "options": picture.options}
     write_json(images / RECORD, dict(sorted(record.items())))
 

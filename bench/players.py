@@ -81,6 +81,18 @@ def sample_splats(asset: Asset, count: int) -> NDArray[np.void]:
     return splats
 
 
+def chromium() -> str:
+    """Where the browser lies.
+
+    Raises:
+        UserError: if there is none.
+    """
+    path = find_browser()
+    if path is None:
+        raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
+    return path
+
+
 def build_pages(out: Path) -> None:
     """The pages, bundled, with the player; npm installs what is missing, once.
 
@@ -199,9 +211,7 @@ def main(
         counts = [int(count) for count in splats.split(",") if count]
         rows, folders = prepare([read_asset(folder) for folder in assets], counts, place / "site" / "heads")
         wanted = [parse_size(text, film=False) for text in sizes.split(",")]
-        path, flags, found = find_browser(), [*FLAGS, "--disable-gpu-vsync"], []
-        if path is None:
-            raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
+        path, flags, found = chromium(), [*FLAGS, "--disable-gpu-vsync"], []
         with serving(place / "site", folders) as address, sync_playwright() as playwright:
             for row in rows:
                 with playwright.chromium.launch(executable_path=path, args=flags) as browser:

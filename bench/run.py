@@ -58,8 +58,8 @@ class Project:
             done = subprocess.run(command, cwd=self.root, env=environment, capture_output=True, text=True, check=False)
             if done.returncode:
                 said = [line for line in f"{done.stdout}\n{done.stderr}".splitlines() if line.strip()]
-                errors = [line for line in said if line.startswith(f"{stage}: ")] or said[-3:]
-                message = " ".join(errors)[:300] or f"ended with {done.returncode}"
+                errors = " ".join([line for line in said if line.startswith(f"{stage}: ")] or said[-3:])[:300]
+                message = errors or f"ended with {done.returncode}"
                 raise UserError(message, place=f"{stage} of {self.subject}", file=self.root)
 
 

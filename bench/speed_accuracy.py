@@ -48,8 +48,7 @@ def score(project: Project, frames: int) -> Scores:
     found = [v for _, _, v in score_model(project.folders.model, scene, times, find_perceptual(device), device)]
     if not found:
         raise UserError("no held-out camera: there is nothing to score on", file=scene.folder / "scene.json")
-    masked = [v for v in found if v["psnr_subject"] is not None]
-    suffix = "_subject" if masked else ""
+    suffix = "_subject" if (masked := [v for v in found if v["psnr_subject"] is not None]) else ""
     values = {name: mean([v[name + suffix] for v in masked or found]) for name in METRICS}
     region = {"region": "subject" if masked else "frame", "images": len(masked or found)}
     return Scores.model_validate(region | values)
@@ -84,9 +83,8 @@ def measure(project: Project, blank: Measurement) -> Measurement:
 def describe(m: Measurement) -> str:
     """One line for the terminal."""
     cost = f"{m.seconds:.1f} s ({m.iterations} iterations, {m.peak_memory_bytes / 2**30:.2f} GiB)"
-    if m.scores is None:
-        return f"{m.subject}, {m.preset}: failed: {m.failure}"
-    return f"{m.subject}, {m.preset}: {m.scores.psnr:.2f} dB on the {m.scores.region} after {cost}"
+    good = m.scores and f"{m.scores.psnr:.2f} dB on the {m.scores.region} after {cost}"
+    return f"{m.subject}, {m.preset}: {good or f'failed: {m.failure}'}"
 
 
 def main(

@@ -165,8 +165,7 @@ def queue(
 ) -> None:
     """Queue an experiment a cell."""
     with report_user_errors("sweeps"):
-        names = list(RATES) if what == "rate" else [what]
-        if names[0] not in SWEEPS:
+        if (names := list(RATES) if what == "rate" else [what])[0] not in SWEEPS:
             raise UserError("no such sweep", found=what, expected=", ".join([*SWEEPS, "rate"]))
         if not re.fullmatch(r"([1-9]\d*(,[1-9]\d*)*)?", values):
             raise UserError("not a list of whole numbers", place="--values", expected="such as 64,32,16", found=values)

@@ -119,10 +119,8 @@ def _hazard_table(cells: Sequence[Cell], subject: str, preset: str) -> str:
         return f"{text} dB lost:\n\n{markdown(head, lines)}"
     found = dict.fromkeys((c.hazard, c.strength) for c in own if c.hazard != "clean")
     known = {hazard.key: hazard for hazard in ROWS}
-    rows = []
-    for key, strength in found:
-        hazard = known.get(key, Hazard(key, key, (0, 0, 0), "{} units"))
-        rows.append([hazard.title, hazard.label(strength), cell_text(loss_of(own, hazard, strength), True, 2)])
+    named = [(known.get(key, Hazard(key, key, (0, 0, 0), "{} units")), strength) for key, strength in found]
+    rows = [[h.title, h.label(strength), cell_text(loss_of(own, h, strength), True, 2)] for h, strength in named]
     return f"{text} dB lost:\n\n{markdown(['', 'strength', 'dB lost'], rows)}" if rows else text
 
 
@@ -199,18 +197,14 @@ def readme_table(data: Path) -> str:
         "cameras, frames, pixels",
         "held out (degrees from front)",
     ]
-    return markdown(
-        [*head, "triangles", "meshes + video (+ reflection)", "training"], [_readme_row(path) for path in files]
-    )
+    head += ["triangles", "meshes + video (+ reflection)", "training"]
+    return markdown(head, [_readme_row(path) for path in files])
 
 
 def _readme_row(path: Path) -> list[str]:
     metrics, scene = read_json(path), read_json(path.parent / "scene" / "scene.json")
-    key, cost, preset = (
-        metrics["headline"],
-        metrics["cost"],
-        read_json(path.parent / "model" / "training.json")["preset"],
-    )
+    key, cost = metrics["headline"], metrics["cost"]
+    preset = read_json(path.parent / "model" / "training.json")["preset"]
     held = {c["name"]: _from_front(c["w2c"]) for c in scene["cameras"] if c["split"] == "holdout"}
     largest = max(scene["cameras"], key=lambda camera: camera["width"] * camera["height"])
     filmed = [len(scene["cameras"]), len(scene["frame_ids"]), f"{largest['height']} x {largest['width']}"]
@@ -232,8 +226,7 @@ def _readme_row(path: Path) -> list[str]:
 
 def _from_front(w2c: Sequence[Sequence[float]]) -> float:
     """Degrees between the direction in which a camera stands and the front, +x."""
-    matrix = np.array(w2c)
-    centre = -matrix[:, :3].T @ matrix[:, 3]
+    centre = -np.array(w2c)[:, :3].T @ np.array(w2c)[:, 3]
     return float(np.degrees(np.arccos(centre[0] / np.linalg.norm(centre))))
 
 

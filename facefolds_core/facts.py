@@ -72,6 +72,8 @@ WORDS = {
     "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
     "from what the images show (is its scale or its place wrong?)",
     "diverged": "level {level}: diverged, begun again with learning rate {rate:.3g}",
+    "specks_cleared": "{count} patches of texels beside the subject made transparent, each under {share:.0%} of it "
+    "(train.pruning.speck_share)",
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
@@ -84,6 +86,8 @@ WORDS = {
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
     "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
+    "in_segments": "{frames} frames, trained as {segments} segments over a base of {keys} key frames (fit.json: "
+    "key_frames)",
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
     "mattes help (docs/guide/subjects.md)",

@@ -46,7 +46,7 @@ class SubjectFolders:
 
     @property
     def checkpoints(self) -> Path:
-        """train, while it runs: not an output of any stage, so that an interrupted run finds it again."""
+        """train and bake: not an output of any stage, so that a later run takes over what it would make again."""
         return self.root / "checkpoints"
 
     @property

@@ -35,6 +35,8 @@ _TYPES = {
     ".webm": "video/webm",
     ".mp4": "video/mp4",
     ".m4a": "audio/mp4",
+    ".mpd": "application/dash+xml",
+    ".m3u8": "application/vnd.apple.mpegurl",
 }
 """Of what the machine's own table may have otherwise: browsers refuse modules and wasm of another type."""
 

@@ -23,6 +23,7 @@ def bake(folders: SubjectFolders) -> str:
             folders.resampled / steps.TEXTURES,
             params,
             temporary,
+            folders.checkpoints / "baked",
         )
     if rays == 0:
         return f"textures as they were resampled, in {folders.textures}"

@@ -26,7 +26,7 @@ def five_cameras(size: int) -> list[Camera]:
 
 def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
     error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
-    return -10 * np.log10(max(error, 1e-12))
+    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 def expected_pictures(

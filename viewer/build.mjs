@@ -57,6 +57,13 @@ await build({
   define: { ...common.define, "import.meta.url": "document.baseURI" },
   plugins: [
     {
+      name: "no-hls", // for what is fetched: here all is at hand
+      setup(plugged) {
+        plugged.onResolve({ filter: /^hls\.js/ }, () => ({ path: "hls.js", namespace: "none" }));
+        plugged.onLoad({ filter: /.*/, namespace: "none" }, () => ({ contents: "export default null;" }));
+      },
+    },
+    {
       name: "draco-files",
       setup(plugged) {
         plugged.onResolve({ filter: /^draco-files$/ }, () => ({ path: "draco-files", namespace: "texts" }));

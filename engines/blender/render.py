@@ -22,6 +22,9 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+sys.path.insert(0, str(Path(__file__).parent))  # Blender runs the script without its folder
+from reflection import Gloss, read_gloss, reflected
+
 ASSET_TO_BLENDER = Matrix(((0, 1, 0), (-1, 0, 0), (0, 0, 1)))
 """Of the asset's points (x forward, y to the subject's left, z up), after the GLB's root node and the importer."""
 FLIP = Matrix(((1, 0, 0), (0, -1, 0), (0, 0, -1)))
@@ -32,13 +35,14 @@ CROSSINGS = 8
 """Of one layer by one ray at most, for the number of transparent bounces."""
 
 
-def prepare(file: Path, background: tuple[float, float, float], samples: int) -> None:
+def prepare(file: Path, background: tuple[float, float, float], samples: int, asset: Path | None = None) -> None:
     """An empty scene with the asset's layers as they are to be blended.
 
     Args:
         file: what `facefolds export glb` or `usd` wrote; of USD, the first frame is shown.
         background: stored (sRGB) values in [0, 1]; behind the layers.
         samples: x samples a pixel; with 1, a pixel is what the ray through its centre sees.
+        asset: the folder of the asset that a GLB was made of, for its reflection; None leaves it out.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if file.suffix.startswith(".usd"):
@@ -46,9 +50,10 @@ def prepare(file: Path, background: tuple[float, float, float], samples: int) ->
     else:
         bpy.ops.import_scene.gltf(filepath=str(file))
     layers = [thing for thing in bpy.data.objects if thing.type == "MESH"]
+    gloss = None if asset is None else read_gloss(asset)
     for layer in layers:
         for slot in layer.material_slots:
-            blend_as_stored(slot.material)
+            blend_as_stored(slot.material, gloss, int(layer.name.removeprefix("layer_")[:2]))
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -70,17 +75,23 @@ def prepare(file: Path, background: tuple[float, float, float], samples: int) ->
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*background, 1.0)
 
 
-def blend_as_stored(material: Any) -> None:
+def blend_as_stored(material: Any, gloss: Gloss | None, layer: int) -> None:
     """Unlit: emission of the texture's stored colour, mixed with transparency by its alpha.
 
     Of each layer only the nearest crossing counts, which a material cannot know. Back sides are left out instead: where
     a ray comes out through a fold of the sheet, they are what would count twice.
+
+    Args:
+        gloss: what is reflected besides; None for nothing.
+        layer: its index, outermost 0.
     """
     tree = material.node_tree
     images = sorted(images_of(tree))
     tree.nodes.clear()
     nodes = [texture_node(tree, *one) for one in images]
     colour = nodes[0].outputs["Color"]
+    if gloss is not None:
+        colour = reflected(tree, colour, gloss, layer)
     alpha = nodes[0].outputs["Alpha"] if len(nodes) == 1 else nodes[1].outputs["Color"]  # grey
     emission, clear = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeBsdfTransparent")
     mix, out = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeOutputMaterial")
@@ -178,6 +189,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--field-of-view", type=float, default=30.0, help="degrees, of the shorter side")
     parser.add_argument("--background", type=float, nargs=3, default=(0.086, 0.094, 0.114), help="RGB in 0..1")
     parser.add_argument("--samples", type=int, default=2, help="anti-aliasing: samples x samples a pixel")
+    parser.add_argument("--reflection", type=Path, metavar="ASSET", help="folder of the asset that a GLB was made of")
     parser.add_argument("--views", type=Path, help="JSON list of cameras with their files, instead of --out")
     given = parser.parse_args(arguments)
     if not given.file.is_file():
@@ -190,7 +202,9 @@ def main(arguments: list[str]) -> None:
         width, height = (int(part) for part in given.size.split("x"))
         view = orbit(given.azimuth, given.elevation, given.distance, (width, height), given.field_of_view)
         views = [view | {"file": str(given.out.resolve())}]
-    prepare(given.file, tuple(given.background), given.samples)
+    if given.reflection and (given.file.suffix != ".glb" or not (given.reflection / "manifest.json").is_file()):
+        parser.error("--reflection goes with a .glb, and names the folder with manifest.json")
+    prepare(given.file, tuple(given.background), given.samples, given.reflection)
     for view in views:
         render(view)
 

@@ -6,6 +6,7 @@ nonsense from data, and keep a damaged number from asking for all of a machine's
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from facefolds_core.asset.manifest_base import Row, Vector
 from facefolds_core.asset.manifest_extras import Photo
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
+from facefolds_core.asset.segments import segment_problems
 from facefolds_core.geometry.meshes import TexturedMesh
 
 FARTHEST = 1e3
@@ -56,7 +58,7 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         return [*problems, f"more than {MOST_LAYERS} levels, layers of a level, or photos"]
     for level in manifest.levels:
         problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
-    problems += _order_problems(manifest)
+    problems += _order_problems(manifest) + _switchable_problems(manifest)
     problems += _coordinate_problems(manifest.coordinates)
     problems += _track_problems(manifest) + _extent_problems(manifest)
     for photo in manifest.photos:
@@ -107,6 +109,30 @@ def _track_problems(manifest: Manifest) -> list[str]:
     if not problems and np.abs(track.translations).max() > FARTHEST:
         problems.append(f"track: the head is more than {FARTHEST:g} units away")
     return problems
+
+
+def _switchable_problems(manifest: Manifest) -> list[str]:
+    """Whether levels that say so differ in nothing but their videos and the size of these."""
+    sets: dict[str, list[Level]] = {}
+    for level in manifest.levels:
+        if level.switchable is not None:
+            sets.setdefault(level.switchable, []).append(level)
+    return [
+        f"level {one.name} is not {levels[0].name} at another size: they are not switchable"
+        for levels in sets.values()
+        for one in levels[1:]
+        if _but_size(one) != _but_size(levels[0])
+    ]
+
+
+def _but_size(level: Level) -> list[object]:
+    """What levels that can be switched share: meshes, and places in shares of the picture."""
+    texture = level.texture
+    width, height = texture.width, texture.height
+    found: list[object] = [[(file.file, file.sha256) for file in level.meshes], texture.keyframes]
+    for x, y, w, h in (texture.colour_rect, texture.alpha_rect, *(layer.texture_rect for layer in level.layers)):
+        found.append((Fraction(x, width), Fraction(y, height), Fraction(w, width), Fraction(h, height)))
+    return found + [(layer.mesh, layer.offset, layer.uv_window) for layer in level.layers]
 
 
 def _order_problems(manifest: Manifest) -> list[str]:
@@ -193,6 +219,7 @@ def _level_problems(level: Level) -> list[str]:
     low, high = FPS_RANGE
     if not low <= texture.fps <= high:
         problems.append(f"{texture.fps:g} frames a second, not within {low:g} and {high:g}")
+    problems += [f"{video.file}: {found}" for video in texture.videos for found in segment_problems(video, texture)]
     keys = texture.keyframes
     if keys[0] != 0 or keys[-1] >= texture.frames or any(a >= b for a, b in pairwise(keys)):
         problems.append("keyframes are not frames in order, 0 the first")

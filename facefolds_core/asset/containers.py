@@ -13,7 +13,7 @@ from typing import BinaryIO, Literal
 
 EBML = b"\x1a\x45\xdf\xa3"
 DOCTYPE_WEBM = b"\x42\x82\x84webm"
-PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl"}
+PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf"}
 ENTRY_BYTES = {b"stts": 8, b"ctts": 8, b"stsc": 12, b"stco": 4, b"co64": 8, b"stss": 4}
 """Sizes of the entries of the tables that count them at byte 4."""
 DEEPEST = 8
@@ -32,22 +32,32 @@ def container_of(path: Path) -> Literal["mp4", "webm"]:
         OSError: if it cannot be read.
     """
     with path.open("rb") as file:
-        head = file.read(64)
-        if head.startswith(EBML):
-            if DOCTYPE_WEBM not in head:
-                raise ContainerError("a Matroska file that is no WebM")
-            return "webm"
-        if head[4:8] != b"ftyp":
-            raise ContainerError("neither an MP4 nor a WebM file")
-        if head[8:12] == b"qt  ":
-            raise ContainerError("a QuickTime file, no MP4")
-        size = file.seek(0, 2)
-        _check_boxes(file, 0, size, size)
-        return "mp4"
+        return kind_of(file)
 
 
-def _check_boxes(file: BinaryIO, start: int, stop: int, size: int) -> None:
+def kind_of(file: BinaryIO, fragments: bool = False) -> Literal["mp4", "webm"]:
+    """As `container_of`, of an open file.
+
+    Args:
+        fragments: whether an MP4 may be in fragments: its header and those that are wanted.
+    """
+    head = file.read(64)
+    if head.startswith(EBML):
+        if DOCTYPE_WEBM not in head:
+            raise ContainerError("a Matroska file that is no WebM")
+        return "webm"
+    if head[4:8] != b"ftyp":
+        raise ContainerError("neither an MP4 nor a WebM file")
+    if head[8:12] == b"qt  ":
+        raise ContainerError("a QuickTime file, no MP4")
+    size = file.seek(0, 2)
+    _check_boxes(file, size, fragments)
+    return "mp4"
+
+
+def _check_boxes(file: BinaryIO, size: int, fragments: bool) -> None:
     """Walk the boxes of an MP4 of `size` bytes, those of the sample tables with their claims."""
+    start, stop = 0, size
     waiting, boxes = [(start, stop, 0)], 0
     while waiting:
         start, stop, depth = waiting.pop()
@@ -55,10 +65,12 @@ def _check_boxes(file: BinaryIO, start: int, stop: int, size: int) -> None:
             boxes += 1
             if boxes > MOST_BOXES or depth > DEEPEST:
                 raise ContainerError("an MP4 with too many boxes")
-            if kind in (b"moof", b"mvex"):
+            if kind in (b"moof", b"mvex") and not fragments:
                 raise ContainerError("an MP4 in fragments")
             if kind in PARENTS:
                 waiting.append((inside, end, depth + 1))
+            elif kind == b"trun":
+                _check_run(file, inside, end, size)
             elif kind in ENTRY_BYTES or kind in (b"stsz", b"stz2"):
                 _check_table(file, kind, inside, end, size)
 
@@ -77,6 +89,19 @@ def _boxes(file: BinaryIO, start: int, stop: int) -> Iterator[tuple[bytes, int, 
             raise ContainerError(f"its box {kind!r} has {length} bytes where {stop - start} are left")
         yield kind, inside, end
         start = end
+
+
+def _check_run(file: BinaryIO, inside: int, end: int, size: int) -> None:
+    """A run of a fragment (`trun`): flags in bytes 1 to 3 say what stands of each sample."""
+    file.seek(inside)
+    content = file.read(min(end - inside, 16))
+    if len(content) < 8:
+        raise ContainerError("its table trun is cut off")
+    flags, count = struct.unpack_from(">I", content)[0] & 0xFFFFFF, struct.unpack_from(">I", content, 4)[0]
+    header = 8 + 4 * (flags & 1) + 4 * bool(flags & 4)
+    entry = 4 * sum(bool(flags & bit) for bit in (0x100, 0x200, 0x400, 0x800))
+    if count > size or header + count * entry > end - inside:
+        raise ContainerError(f"its table trun claims {count} pictures")
 
 
 def _check_table(file: BinaryIO, kind: bytes, inside: int, end: int, size: int) -> None:

@@ -55,9 +55,12 @@ class CroppedLayer:
 
 
 def crop_layers(
-    meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: Textures, frames: int
+    meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: Textures, frames: int, unit: int = 1
 ) -> tuple[CroppedLayer, ...]:
     """The layers that show anything, outermost first.
+
+    Args:
+        unit: a divisor of R, of which the crops' numbers are multiples.
 
     Raises:
         UserError: if none does.
@@ -69,7 +72,7 @@ def crop_layers(
             alpha = np.maximum(alpha, textures.image(layer, frame)[..., 3])
         shown = _shown_faces(mesh, alpha > ALPHA_BOUND)
         if shown.any():
-            cropped.append(_crop(layer, mesh, mesh.faces[shown], window, len(alpha)))
+            cropped.append(_crop(layer, mesh, mesh.faces[shown], window, len(alpha), unit))
     if not cropped:
         raise UserError(
             "every layer is transparent",
@@ -91,11 +94,15 @@ def _shown_faces(mesh: TexturedMesh, holds: NDArray[np.bool_]) -> NDArray[np.boo
     return np.asarray(area[bottom, right] - area[top, right] - area[bottom, left] + area[top, left] > 0)
 
 
-def _crop(layer: int, mesh: TexturedMesh, faces: NDArray[np.int32], window: Window, size: int) -> CroppedLayer:
+def _crop(
+    layer: int, mesh: TexturedMesh, faces: NDArray[np.int32], window: Window, size: int, unit: int
+) -> CroppedLayer:
     used, compact = np.unique(faces, return_inverse=True)
     st = mesh.st[used].astype(np.float64) * size
     left, top = np.clip(np.floor(st.min(0) - 0.5), 0, size - 1).astype(int).tolist()
     right, bottom = np.clip(np.ceil(st.max(0) + 0.5), 1, size).astype(int).tolist()
+    left, top = left // unit * unit, top // unit * unit
+    right, bottom = -(-right // unit) * unit, -(-bottom // unit) * unit
     width, height = right - left, bottom - top
     local = np.clip((st - (left, top)) / (width, height), 0, 1).astype(np.float32)
     u0, u1, v0, v1 = window

@@ -16,6 +16,7 @@ from pydantic import Field
 from facefolds_core.asset.codecs import CodecName
 from facefolds_core.asset.manifest_base import (
     UV,
+    ByteRange,
     Count,
     ExtensionName,
     FileName,
@@ -30,7 +31,7 @@ from facefolds_core.asset.manifest_base import (
     StoredFile,
     Vector,
 )
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pose, Poster
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pose, Poster, Stream
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 
@@ -86,12 +87,20 @@ class Layer(Part):
     uv_window: tuple[UV, UV, UV, UV]
 
 
+class Segment(ByteRange):
+    """A closed group of pictures: `frames` of them, from where the segment before ends."""
+
+    frames: Count
+
+
 class Video(StoredFile):
     """One encoding of the textures' pictures.
 
     Attributes:
         mime: MIME type with codec string, as browsers take it.
         level: of the codec, that a decoder must support.
+        init: of a video in segments, its header.
+        segments: of a video that is to be fetched by parts; each can be decoded with the header alone.
     """
 
     container: Literal["mp4", "webm"]
@@ -99,6 +108,8 @@ class Video(StoredFile):
     mime: str
     level: Annotated[str, Field(pattern=r"^[1-7](\.[0-3])?$")]
     pixel_format: Literal["yuv420p"] = "yuv420p"
+    init: Maybe[ByteRange] = None
+    segments: Maybe[Annotated[tuple[Segment, ...], Field(min_length=1)]] = None
 
 
 class Bounds(Part):
@@ -188,9 +199,11 @@ class Level(Part):
         reflection: what gloss adds; absent where there is none.
         bytes: of all its files.
         meshes: the files that the layers' meshes are bytes of, usually one.
+        switchable: levels of the same name here differ in nothing but their videos and the size of these.
     """
 
     name: Name
+    switchable: Maybe[Name] = None
     meshes: Annotated[tuple[StoredFile, ...], Field(min_length=1)]
     layers: Annotated[tuple[Layer, ...], Field(min_length=1)]
     texture: Texture
@@ -222,6 +235,7 @@ class Manifest(Part):
         extensions_used, extensions_required: names of extensions; who does not know a required one refuses the asset.
         bounds: of the meshes; absent where they are not known.
         levels: coarsest first; the last is the full one.
+        stream: for players of DASH and HLS; absent where there are no segments.
         audio: of the sequence.
         photos: for comparison.
         track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
@@ -240,6 +254,7 @@ class Manifest(Part):
     compositing: Compositing = Compositing()
     bounds: Maybe[Bounds] = None
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
+    stream: Maybe[Stream] = None
     audio: Audio | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
@@ -261,8 +276,9 @@ class Manifest(Part):
         return Track(np.array(quaternions, float), np.array(translations, float))
 
     def files(self) -> list[tuple[str, int, str]]:
-        """(name, bytes, sha256) of every file but the manifest."""
+        """(name, bytes, sha256) of every file but the manifest, each once."""
         others: list[StoredFile] = [*self.photos]
+        others += [] if self.stream is None else [self.stream.dash, *self.stream.hls]
         others += [one for one in (self.audio, self.poster) if one is not None]
-        found = [entry for level in self.levels for entry in level.files()]
+        found = list(dict.fromkeys(entry for level in self.levels for entry in level.files()))  # some are shared
         return found + [(other.file, other.bytes, other.sha256) for other in others]

@@ -69,6 +69,14 @@ class StoredFile(Part):
     sha256: Sha256
 
 
+class ByteRange(Part):
+    """Some bytes of a file."""
+
+    offset: Offset
+    bytes: Count
+    sha256: Sha256
+
+
 def without_absent(schema: dict[str, Any]) -> None:
     """Of a JSON schema, in place: keys marked `ABSENT` are not required, and null is none of their values."""
     for part in [schema, *schema.get("$defs", {}).values()]:

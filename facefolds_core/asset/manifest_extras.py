@@ -95,3 +95,15 @@ class FilmedView(Part):
         if value[1] > value[0] + 360:
             raise ValueError("at most a full turn")
         return value
+
+
+class Stream(Part):
+    """The same videos, and the sound, for players of DASH and HLS.
+
+    Attributes:
+        dash: the manifest (MPD).
+        hls: the main playlist, and those of the tracks that it names.
+    """
+
+    dash: StoredFile
+    hls: Annotated[tuple[StoredFile, ...], Field(min_length=1)]

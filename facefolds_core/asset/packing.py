@@ -52,6 +52,7 @@ class AtlasLayout:
         width, height: of the picture, even.
         colour_rect, alpha_rect: of the two images in the picture, of one size, at even places.
         rects: of each layer within the colour image and, the same, within the alpha image.
+        unit: cells and gutters are so many times as large as they need to be, for `scaled`.
     """
 
     width: int
@@ -59,10 +60,11 @@ class AtlasLayout:
     colour_rect: Rect
     alpha_rect: Rect
     rects: tuple[Rect, ...]
+    unit: int = 1
 
     @classmethod
-    def pack(cls, sizes: Sequence[tuple[int, int]]) -> AtlasLayout:
-        """The layout that the writer uses for N textures of (width, height) texels.
+    def pack(cls, sizes: Sequence[tuple[int, int]], unit: int = 1) -> AtlasLayout:
+        """The layout that the writer uses for N textures of (width, height) texels, multiples of `unit`.
 
         Of the packings for WIDTHS_TRIED greatest widths, each as low as HEIGHT_SLACK allows, the one of least area
         among those of at most HARDWARE_SIDE a side, if there are any, else of LARGE_SIDE, else of MAX_SIDE; among
@@ -70,7 +72,8 @@ class AtlasLayout:
         """
         import rpack  # readers do not need it
 
-        cells = [(cell_size(width) // MACROBLOCK, cell_size(height) // MACROBLOCK) for width, height in sizes]
+        block = MACROBLOCK * unit
+        cells = [(cell_size(width, unit) // block, cell_size(height, unit) // block) for width, height in sizes]
         narrow, wide = max(width for width, _ in cells), sum(width for width, _ in cells)
         widths = sorted({round(float(w)) for w in np.geomspace(narrow, wide, WIDTHS_TRIED)})
         area, tall = sum(width * height for width, height in cells), max(height for _, height in cells)
@@ -83,28 +86,40 @@ class AtlasLayout:
                     places = rpack.pack(cells, max_width=width, max_height=bound)
                 except rpack.PackingImpossibleError:
                     continue
-                layouts.append(cls._placed(sizes, cells, places))
+                layouts.append(cls._placed(sizes, cells, places, unit))
                 break
         limits = (HARDWARE_SIDE, LARGE_SIDE, MAX_SIDE)
         return min(layouts, key=lambda it: (sum(it.long_side > side for side in limits), it.pixels, it.long_side))
 
     @classmethod
     def _placed(
-        cls, sizes: Sequence[tuple[int, int]], cells: Sequence[tuple[int, int]], places: Sequence[tuple[int, int]]
+        cls,
+        sizes: Sequence[tuple[int, int]],
+        cells: Sequence[tuple[int, int]],
+        places: Sequence[tuple[int, int]],
+        unit: int,
     ) -> AtlasLayout:
+        block, gutter, least = MACROBLOCK * unit, GUTTER * unit, MIN_SIDE * unit
         columns = max(x + width for (x, _), (width, _) in zip(places, cells, strict=True))
         rows = max(y + height for (_, y), (_, height) in zip(places, cells, strict=True))
-        width, height = max(columns * MACROBLOCK, MIN_SIDE), max(rows * MACROBLOCK, MIN_SIDE // 2)
+        width, height = max(columns * block, least), max(rows * block, least // 2)
         return cls(
             width=width,
             height=2 * height,
             colour_rect=(0, 0, width, height),
             alpha_rect=(0, height, width, height),
             rects=tuple(
-                (x * MACROBLOCK + GUTTER, y * MACROBLOCK + GUTTER, w, h)
-                for (x, y), (w, h) in zip(places, sizes, strict=True)
+                (x * block + gutter, y * block + gutter, w, h) for (x, y), (w, h) in zip(places, sizes, strict=True)
             ),
+            unit=unit,
         )
+
+    def scaled(self, factor: int) -> AtlasLayout:
+        """The same layout with a `factor`-th of the pixels a side; `factor` divides the unit."""
+        whole = [self.colour_rect, self.alpha_rect, *self.rects]
+        colour, alpha, *layers = ((x // factor, y // factor, w // factor, h // factor) for x, y, w, h in whole)
+        width, height, unit = self.width // factor, self.height // factor, self.unit // factor
+        return AtlasLayout(width, height, colour, alpha, tuple(layers), unit)
 
     @property
     def pixels(self) -> int:
@@ -142,15 +157,16 @@ class AtlasLayout:
         return found
 
 
-def cell_size(side: int) -> int:
+def cell_size(side: int, unit: int = 1) -> int:
     """Pixels along one side of the cell of a texture with `side` texels along it: whole macroblocks."""
-    return -(-(side + 2 * GUTTER) // MACROBLOCK) * MACROBLOCK
+    return -(-(side + 2 * GUTTER * unit) // (MACROBLOCK * unit)) * MACROBLOCK * unit
 
 
-def fill_cell(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def fill_cell(texture: NDArray[np.uint8], unit: int = 1) -> NDArray[np.uint8]:
     """A texture (h, w, C) with its border repeated to fill its cell."""
-    after = [cell_size(side) - side - GUTTER for side in texture.shape[:2]]
-    return np.pad(texture, ((GUTTER, after[0]), (GUTTER, after[1]), (0, 0)), mode="edge")
+    gutter = GUTTER * unit
+    after = [cell_size(side, unit) - side - gutter for side in texture.shape[:2]]
+    return np.pad(texture, ((gutter, after[0]), (gutter, after[1]), (0, 0)), mode="edge")
 
 
 def check_layout(layout: AtlasLayout, resolution: int) -> None:

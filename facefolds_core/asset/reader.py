@@ -19,6 +19,7 @@ from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
+from facefolds_core.asset.segments import decode_segments
 from facefolds_core.asset.stored import check_file, is_folder, read_slice, refuse_changed
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
@@ -121,6 +122,8 @@ class AssetLevel:
         """
         texture = self.entry.texture
         video = texture.videos[self.video]
+        if video.segments is not None:
+            return decode_segments(self.folder, video, texture, start)
         refuse_changed(self._path, video.bytes, video.sha256, REMEDY)
         return decode_video(self._path, (texture.width, texture.height), texture.fps, start)
 

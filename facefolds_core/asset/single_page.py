@@ -44,7 +44,7 @@ def shipped(manifest: Manifest, level: Level) -> Manifest:
     texture = level.texture.model_copy(update={"videos": level.texture.videos[:1]})
     dropped = sum(video.bytes for video in level.texture.videos[1:])
     one = level.model_copy(update={"texture": texture, "bytes": level.bytes - dropped})
-    return manifest.model_copy(update={"levels": (one,)})
+    return manifest.model_copy(update={"levels": (one,), "stream": None})
 
 
 def write_single_page(out: Path, asset: Path, manifest: Manifest, level: Level, player: Path) -> int:

@@ -15,6 +15,7 @@ from facefolds_core.asset.manifest_extras import Picture as StoredPicture
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import layer_bytes
+from facefolds_core.asset.segments import decode_segments, probe_segments
 from facefolds_core.asset.stored import check_file, is_folder, leads_out
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
@@ -75,7 +76,7 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
         yield from _mesh_problems(folder, level, whole, manifest.coordinates.sphere_centre)
         for video in level.texture.videos:
             if video.file in whole:
-                found = _video_problems(folder / video.file, video, level.texture)
+                found = _video_problems(folder, video, level.texture)
                 yield from (f"{video.file}: {problem}" for problem in found)
     pictures: list[StoredPicture | Reflection] = [
         *manifest.photos,
@@ -137,10 +138,10 @@ def _layer(folder: Path, layer: Layer) -> tuple[TexturedMesh | None, list[str]]:
     return mesh, [f"{len(flat)} faces without area, the first is face {flat[0]}"] if len(flat) else []
 
 
-def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
-    problems = []
+def _video_problems(folder: Path, video: Video, texture: Texture) -> list[str]:
+    path, problems = folder / video.file, []
     try:
-        facts = probe_video(path)
+        facts = probe_video(path) if video.segments is None else probe_segments(folder, video, texture)
         pairs: list[tuple[str, object, object]] = [
             ("codec", facts.codec, video.codec),
             ("container", facts.container, video.container),
@@ -156,7 +157,10 @@ def _video_problems(path: Path, video: Video, texture: Texture) -> list[str]:
         if problems:
             return problems
         frames = 0
-        for picture in decode_video(path, (texture.width, texture.height), texture.fps):
+        size = texture.width, texture.height
+        whole = video.segments is None
+        pictures = decode_video(path, size, texture.fps) if whole else decode_segments(folder, video, texture)
+        for picture in pictures:
             if frames == 0 and _colourful(picture, texture):
                 problems.append("there are colours in its alpha_rect: it may stand in colour_rect's place")
             frames += 1

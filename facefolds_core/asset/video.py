@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 import av
 import numpy as np
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset.codecs import CODECS, Codec, Stream
 from facefolds_core.asset.colour import BLACK, NEUTRAL, alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
-from facefolds_core.asset.containers import container_of
+from facefolds_core.asset.containers import container_of, kind_of
 from facefolds_core.asset.packing import GUTTER, MAX_PIXELS, AtlasLayout, cut, fill_cell
 from facefolds_core.errors import UserError
 from facefolds_core.scheduling import kept_scheduling
@@ -73,8 +73,8 @@ def pack_frame(textures: Sequence[NDArray[np.uint8]], layout: AtlasLayout) -> Pi
     cr = cb.copy()
     top = layout.alpha_rect[1]
     for texture, (x, y0, _, _) in zip(textures, layout.rects, strict=True):
-        cell = fill_cell(texture)
-        left, up = x - GUTTER, y0 - GUTTER
+        cell = fill_cell(texture, layout.unit)
+        left, up = x - GUTTER * layout.unit, y0 - GUTTER * layout.unit
         down, right = up + cell.shape[0], left + cell.shape[1]
         half = (slice(up // 2, down // 2), slice(left // 2, right // 2))
         y[up:down, left:right], cb[half], cr[half] = rgb_to_yuv420(cell[..., :3])
@@ -151,17 +151,23 @@ def _describe(stream: Any, size: tuple[int, int], fps: Fraction) -> None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[Any, Any, str]]:
+def _opened(path: Path, part: BinaryIO | None = None) -> Iterator[tuple[Any, Any, str]]:
     """(container, its video stream, "mp4" or "webm").
+
+    Args:
+        part: the header and some fragments of the file, in the place of the file.
 
     Raises:
         UserError: if the file is missing or is not a video; also for errors of FFmpeg inside the block.
     """
     try:
-        kind = container_of(path)
+        kind = container_of(path) if part is None else kind_of(part, fragments=True)
         options = {"err_detect": STRICT["err_detect"]}
         with av.open(
-            f"file:{path}", format=FORMATS[kind], container_options=options, stream_options=cast(Any, [STRICT])
+            f"file:{path}" if part is None else _rewound(part),
+            format=FORMATS[kind],
+            container_options=options,
+            stream_options=cast(Any, [STRICT]),
         ) as container:
             if not container.streams.video:
                 raise _damaged(path, "it has no video stream")
@@ -175,6 +181,11 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any, str]]:
         raise _damaged(path, str(error)) from None
 
 
+def _rewound(part: BinaryIO) -> BinaryIO:
+    part.seek(0)
+    return part
+
+
 def _damaged(path: Path, found: str) -> UserError:
     return UserError("damaged texture video", file=path, found=found, remedy="make the asset again, or copy it again")
 
@@ -185,20 +196,24 @@ def _codec(name: str, path: Path) -> Codec:
     return CODECS[name]
 
 
-def probe_video(path: Path) -> VideoFacts:
+def probe_video(path: Path, part: BinaryIO | None = None, rate: Fraction | None = None, frames: int = 0) -> VideoFacts:
     """Read a video's header.
+
+    Args:
+        part: of a file in fragments, its header and the first of them; then `rate` and `frames` of the whole, too.
 
     Raises:
         UserError: if it cannot be opened, or its codec is none of `CODECS`.
     """
-    with _opened(path) as (container, stream, kind):
+    with _opened(path, part) as (container, stream, kind):
         context = stream.codec_context
         codec, size = context.codec.canonical_name, (context.width, context.height)
-        rate = stream.average_rate or Fraction(0)
-        seconds = (container.duration or 0) / av.time_base
-        bits = 8 * path.stat().st_size / seconds if seconds else 0.0
+        seconds = (container.duration or 0) / av.time_base if rate is None else frames / rate
+        rate = (stream.average_rate if rate is None else rate) or Fraction(0)
+        bits = float(8 * path.stat().st_size / seconds) if seconds else 0.0
         facts = Stream(bytes(context.extradata or b""), size, rate, bits)
         level, mime = _codec(codec, path).level_and_mime(facts)
+        mime = mime.replace("video/webm", f"video/{kind}")
         return VideoFacts(
             codec=codec,
             container=kind,
@@ -223,22 +238,26 @@ def key_frames(path: Path) -> list[int]:
         return [number for number, packet in enumerate(packets) if packet.is_keyframe]
 
 
-def decode_video(path: Path, size: tuple[int, int], fps: float, start: int = 0) -> Iterator[Picture]:
+def decode_video(
+    path: Path, size: tuple[int, int], fps: float, start: int = 0, part: BinaryIO | None = None
+) -> Iterator[Picture]:
     """Decode the pictures from frame `start` on, one at a time; strictly: damage that the decoder notices is an error.
 
     Args:
         size: (width, height) that the pictures must have.
         fps: frames a second, by which time stamps become frame numbers.
         start: first frame wanted; decoding starts at the key frame before it.
+        part: the header and some fragments of the file, in the place of the file; not before the key frame before
+            `start`.
 
     Raises:
         UserError: if the file is damaged, its size is another, or a frame is missing.
     """
-    with _opened(path) as (container, stream, _):
+    with _opened(path, part) as (container, stream, _):
         if (stream.codec_context.width, stream.codec_context.height) != size:
             found = f"{stream.codec_context.width} x {stream.codec_context.height}"
             raise _damaged(path, f"pictures of {found} pixels instead of {size[0]} x {size[1]}")
-        if start:
+        if start and part is None:
             container.seek(round(start / fps / stream.time_base), stream=stream, backward=True)
         previous = None
         for frame in _strictly_decoded(container, stream, path):

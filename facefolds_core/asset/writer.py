@@ -17,6 +17,7 @@ from facefolds_core import __version__
 from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
 from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
 from facefolds_core.asset.draco import MeshSettings, encode_mesh
+from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import (
     Bounds,
     Coordinates,
@@ -33,7 +34,6 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
-from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -130,12 +130,16 @@ class LevelContent:
         textures: of which the layers' crops ship.
         frames: K.
         fps: frames a second; 0 for a static scene.
+        unit: the layout can be scaled down by it and its divisors; one of the crops' numbers.
+        placed: the layout, where it is not to be chosen.
     """
 
     layers: Sequence[CroppedLayer]
     textures: Textures
     frames: int
     fps: float
+    unit: int = 1
+    placed: AtlasLayout | None = None
 
     @cached_property
     def layout(self) -> AtlasLayout:
@@ -144,7 +148,9 @@ class LevelContent:
         Raises:
             UserError: if they do not fit into one.
         """
-        layout = AtlasLayout.pack([layer.crop[2:] for layer in self.layers])
+        if self.placed is not None:
+            return self.placed
+        layout = AtlasLayout.pack([layer.crop[2:] for layer in self.layers], self.unit)
         check_layout(layout, self.textures.image(self.layers[0].source, 0).shape[0])
         return layout
 
@@ -165,18 +171,29 @@ class LevelContent:
 
 
 def write_level(
-    folder: Path, name: str, content: LevelContent, params: AssetSettings, crfs: Mapping[CodecName, int] | None = None
+    folder: Path,
+    name: str,
+    content: LevelContent,
+    params: AssetSettings,
+    crfs: Mapping[CodecName, int] | None = None,
+    shared: Level | None = None,
 ) -> Level:
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
     Args:
         crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
+        shared: a level of the same layers whose meshes are this one's, too.
 
     Raises:
         UserError: if the textures do not fit into one video, or an encoder refuses them.
     """
     layout = content.layout
-    meshes, entries = _write_layers(folder / f"{name}_meshes.bin", content.layers, layout, params)
+    if shared is None:
+        meshes, entries = _write_layers(folder / f"{name}_meshes.bin", content.layers, layout, params)
+    else:
+        meshes = shared.meshes[0]
+        pairs = zip(shared.layers, layout.rects, strict=True)
+        entries = tuple(layer.model_copy(update={"texture_rect": rect}) for layer, rect in pairs)
     videos = []
     for codec in (CODECS[codec] for codec in params.video.codec):
         path = folder / f"{name}.{codec.container}"
@@ -239,61 +256,3 @@ def _video_entry(path: Path, codec: Codec) -> Video:
         mime=facts.mime,
         level=facts.level,
     )
-
-
-def check_inputs(meshes: Sequence[TexturedMesh], windows: Sequence[Window], textures: FrameStore) -> int:
-    """The number K of frames of layers that can be an asset's.
-
-    Raises:
-        UserError: if they cannot, or do not belong together.
-    """
-    frames = _check_textures(textures, len(meshes))
-    if len(windows) != len(meshes):
-        raise UserError(
-            "the meshes and the texture windows do not belong together",
-            expected=f"{len(meshes)} windows",
-            found=len(windows),
-            remedy="run `dvc repro` to make both again",
-        )
-    for index, mesh in enumerate(meshes):
-        _check_mesh(mesh, f"layer {index}")
-    return frames
-
-
-def _check_textures(textures: FrameStore, layers: int) -> int:
-    """The number K of frames of a store that holds N x K square RGBA textures."""
-    remedy = "run `dvc repro` to make the textures again"
-    if textures.channels != 4 or textures.height != textures.width:
-        raise UserError(
-            "the textures are not square RGBA images",
-            file=textures.path,
-            found=f"{textures.height} x {textures.width} x {textures.channels}",
-            remedy=remedy,
-        )
-    keys = textures.keys()
-    frames = 1 + max((frame for _, frame in keys), default=-1)
-    if frames == 0 or keys != [(layer, frame) for layer in range(layers) for frame in range(frames)]:
-        raise UserError(
-            "the texture store is not complete",
-            file=textures.path,
-            expected=f"{layers} layers x {frames} frames",
-            found=f"{len(keys)} images",
-            remedy=remedy,
-        )
-    return frames
-
-
-def _check_mesh(mesh: TexturedMesh, place: str) -> None:
-    problem = None
-    if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
-        problem = "no faces"
-    elif mesh.st.shape != (len(mesh.vertices), 2):
-        problem = f"texture coordinates {mesh.st.shape} for {len(mesh.vertices)} vertices"
-    elif not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.st).all()):
-        problem = "numbers that are not finite"
-    elif mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        problem = "faces that name vertices which are not there"
-    elif mesh.st.min() < 0 or mesh.st.max() > 1:
-        problem = f"texture coordinates from {mesh.st.min():g} to {mesh.st.max():g}, outside [0, 1]"
-    if problem:
-        raise UserError("a layer's mesh cannot be written", place=place, found=problem, remedy="run `dvc repro` again")

@@ -28,7 +28,9 @@ def command(
     subjects: Annotated[str, typer.Option(help="Names, with commas. Left out: all of params.yaml.")] = "",
     sweep: Annotated[Path | None, typer.Option(help="YAML: keys and lists of values; every combination runs.")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="At once. 0: one for two cores.", min=0)] = 0,
-    scheduler: Annotated[str | None, typer.Option(help="tcp://HOST:8786, or slurm, pbs, sge, lsf, ...")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="tcp://HOST:8786, ssh:HOST,HOST, or slurm, pbs, sge, lsf, ...")
+    ] = None,
     memory: Annotated[str, typer.Option(help="What a job needs: 14GB. Left out: not looked at.")] = "0",
     gpu: Annotated[int, typer.Option(help="GPUs that a job needs.", min=0)] = 0,
     remote: Annotated[bool, typer.Option("--remote", help="Results through DVC's default remote in any case.")] = False,
@@ -50,7 +52,8 @@ def command(
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
-            _record(root, outcomes, remote or (scheduler is not None and _has_remote(root)))
+            pull = remote or (scheduler is not None and _has_remote(root))
+            _record(root, outcomes, pull, everybody=set(names) == set(params.subjects))
         _print_table(outcomes)
         if any(outcome.error for outcome in outcomes):
             raise typer.Exit(1)
@@ -92,11 +95,11 @@ def _has_remote(root: Path) -> bool:
     return Config(str(root / ".dvc"))["core"].get("remote") is not None
 
 
-def _record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> None:
+def _record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> None:
     good = [outcome for outcome in outcomes if not outcome.error]
     if not good:
         return
-    ran, error = record(root, good, pull)
+    ran, error = record(root, good, pull, everybody and len(good) == len(outcomes))
     if ran:
         typer.echo(f"run: note: not found in the cache, so made here: {', '.join(ran)}")
     if error:

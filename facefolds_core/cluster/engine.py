@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,9 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import dask
 import dask.system
 import psutil
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, LocalCluster, SSHCluster, as_completed
 
 from facefolds_core.cluster.job import Job, Outcome, do, end_all
 from facefolds_core.cluster.project import snapshot
@@ -23,16 +25,19 @@ QUEUES = ("slurm", "pbs", "sge", "lsf", "oar", "moab", "htcondor")
 """Job queues that dask-jobqueue speaks to; `~/.config/dask/jobqueue.yaml` says how they are used here."""
 
 
+SSH = "ssh:"
+
+
 @contextmanager
 def cluster_of(scheduler: str | None, workers: int, root: Path) -> Iterator[Client]:
     """A client of the cluster that was asked for.
 
     Args:
-        scheduler: address of one that runs; one of QUEUES; None for this machine.
-        workers: jobs at once on this machine, or of the queue's jobs.
+        scheduler: address of one that runs; one of QUEUES; "ssh:HOST,HOST"; None for this machine.
+        workers: jobs at once on this machine or on each of the hosts, or of the queue's jobs.
 
     Raises:
-        UserError: if nobody answers at the address.
+        UserError: if nobody answers at the address, or a host does not let us in.
     """
     if scheduler is None:
         scratch = root / ".dvc" / "tmp" / "jobs"
@@ -57,6 +62,10 @@ def cluster_of(scheduler: str | None, workers: int, root: Path) -> Iterator[Clie
         with kind() as cluster, Client(cluster) as client:
             cluster.scale(jobs=workers)
             yield client
+    elif scheduler.startswith(SSH):
+        with _over_ssh(scheduler.removeprefix(SSH).split(","), workers) as cluster, Client(cluster) as client:
+            client.wait_for_workers(1)
+            yield client
     else:
         try:
             client = Client(scheduler, timeout="20s")
@@ -64,11 +73,25 @@ def cluster_of(scheduler: str | None, workers: int, root: Path) -> Iterator[Clie
             raise UserError(
                 "no Dask scheduler there",
                 found=f"{scheduler}: {error}",
-                expected=f"an address as `dask scheduler` prints it (tcp://...), or one of {', '.join(QUEUES)}",
+                expected=f"what `dask scheduler` prints (tcp://...), ssh:HOST,HOST, or one of {', '.join(QUEUES)}",
                 remedy="start `dask scheduler` and workers (docs/guide/clusters.md), or leave --scheduler out",
             ) from None
         with client:
             yield client
+
+
+def _over_ssh(hosts: Sequence[str], workers: int) -> Any:
+    """A scheduler on the first host, workers on all, as `~/.ssh/config` reaches them, with this Python's path there."""
+    options = {"nthreads": workers, "memory_limit": 0, "resources": dask.config.get("distributed.worker.resources", {})}
+    try:
+        return SSHCluster([hosts[0], *hosts], worker_options=options)
+    except Exception as error:  # asyncssh's are many, and Dask wraps some of them in plain ones
+        raise UserError(
+            "no Dask cluster over SSH",
+            found=f"{', '.join(hosts)}: {error or type(error).__name__}",
+            expected=f"hosts that SSH reaches without a password, with the project's environment at {sys.prefix}",
+            remedy="try `ssh HOST uname`; mend ~/.ssh/config (docs/guide/clusters.md)",
+        ) from None
 
 
 def resources_here() -> dict[str, float]:

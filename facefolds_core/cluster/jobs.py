@@ -109,7 +109,7 @@ def how_to_repeat(job: Job, cell: Mapping[str, Any] | None, folder: Path) -> str
     return f"facefolds run --subjects {job.subject} --sweep {path} --to {stage} --out {path.with_suffix('.csv')}"
 
 
-def record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> tuple[list[str], str]:
+def record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> tuple[list[str], str]:
     """What good jobs made into the project's folder: their parts of dvc.lock, files from the cache; and a `dvc repro`,
     which looks whether all is there, and makes what is not.
 
@@ -117,11 +117,13 @@ def record(root: Path, outcomes: Sequence[Outcome], pull: bool) -> tuple[list[st
 
     Args:
         pull: the results came through DVC's default remote.
+        everybody: they are of all subjects that there are: then the stage's name alone is the target, since DVC reads
+            dvc.lock again for each one.
 
     Returns:
         stages that ran nevertheless, and an error, or "".
     """
-    targets = [outcome.job.target for outcome in outcomes]
+    targets = list(dict.fromkeys(o.job.target.split("@")[0] if everybody else o.job.target for o in outcomes))
     put_together(root, [outcome.lock for outcome in outcomes])
     fetch = ["pull" if pull else "checkout", "--with-deps", "--force", *targets]
     look = ["repro", *(["--pull"] if pull else []), *targets]

@@ -162,6 +162,13 @@ def _finished(shown: Float) -> Image:
     return image
 
 
+def baked_frame(baker: Baker, textures: FrameStore, samples: FrameStore, frame: int, iterations: int) -> Image:
+    """(N, size, size, 4) of one frame; `textures` and `samples` as in `baked_rows`."""
+    layers = sorted({layer for layer, _ in textures})
+    own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
+    return baker.frame(own, theirs, iterations)
+
+
 def baked_rows(
     baker: Baker, textures: FrameStore, samples: FrameStore, iterations: int, progress: bool = True
 ) -> Iterator[tuple[int, int, Image]]:
@@ -174,8 +181,7 @@ def baked_rows(
     Yields:
         (layer, frame, (size, size, 4) uint8).
     """
-    layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
+    frames = sorted({frame for _, frame in textures})
     for frame in progress_bar(frames, desc="bake", unit="frame", disable=not progress):
-        own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
-        for layer, image in zip(layers, baker.frame(own, theirs, iterations), strict=True):
+        for layer, image in enumerate(baked_frame(baker, textures, samples, frame, iterations)):
             yield layer, frame, image

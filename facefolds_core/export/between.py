@@ -182,5 +182,6 @@ def at_frame_rate(store: FrameStore, factor: int, folder: Path, params: BetweenP
         return
     with TemporaryDirectory(dir=folder, prefix=".between-") as scratch:
         path = Path(scratch) / "textures.arrow"
-        write_frames(path, (store.height, store.width, store.channels), between_rows(store, factor, params))
+        rows = between_rows(store, factor, params)
+        write_frames(path, (store.height, store.width, store.channels), rows, packed=True)
         yield FrameStore(path)

@@ -13,6 +13,8 @@ What shows follows its frames; what does not stays constant, and what lies betwe
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,16 +51,36 @@ def texel_weights(
 
 
 def held_rows(
-    textures: FrameStore, weights: NDArray[np.float32], price: float, progress: bool = True
+    textures: FrameStore,
+    weights: NDArray[np.float32],
+    price: float,
+    folder: Path,
+    memory: int,
+    progress: bool = True,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-    """All textures, held; all frames of one layer are in memory at a time.
+    """All textures, held, layer by layer.
+
+    Args:
+        folder: where all frames of one layer lie meanwhile, if `memory` (bytes) cannot hold them.
 
     Yields:
         (layer, frame, (S, S, 4) uint8).
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
-    for layer in progress_bar(layers, desc="hold", unit="layer", disable=not progress):
-        images = np.stack([textures.image(layer, frame) for frame in frames])
-        hold(images, weights[layer], price)
-        for frame, image in zip(frames, images, strict=True):
-            yield layer, frame, image
+    shape = (len(frames), textures.height, textures.width, 4)
+    rows = max(1, min(textures.height, memory // (len(frames) * textures.width * 4)))
+    with TemporaryDirectory(dir=folder, prefix=".hold-") as scratch:
+        images = (
+            np.empty(shape, np.uint8)
+            if rows == textures.height
+            else np.memmap(Path(scratch) / "layer", np.uint8, "w+", shape=shape)
+        )
+        for layer in progress_bar(layers, desc="hold", unit="layer", disable=not progress):
+            for position, frame in enumerate(frames):
+                images[position] = textures.image(layer, frame)
+            for top in range(0, textures.height, rows):
+                block = np.ascontiguousarray(images[:, top : top + rows])
+                hold(block, np.ascontiguousarray(weights[layer, top : top + rows]), price)
+                images[:, top : top + rows] = block
+            for frame, image in zip(frames, images, strict=True):
+                yield layer, frame, image

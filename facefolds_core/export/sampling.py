@@ -208,5 +208,5 @@ def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool
             np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
             yield layer, frame, image
 
-    write_frames(path, (grids.resolution, grids.resolution, 4), rows())
+    write_frames(path, (grids.resolution, grids.resolution, 4), rows(), packed=True)
     return opacity

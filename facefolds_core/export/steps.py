@@ -10,13 +10,18 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.export.bake import Baker, Codes, baked_rows, gather_rays
+from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
 from facefolds_core.export.collapse import decimate_sheets, decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
+from facefolds_core.export.kept import KeptFrames, digest_of, digests_of_frames
 from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.sampling import sample_grids, write_textures
@@ -28,6 +33,8 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
 from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams
+from facefolds_core.progress import progress
+from facefolds_core.source_code import digest_of_packages
 
 TEXTURES = "textures.arrow"
 """Name of a frame store of textures, N layers x K frames, in its folder."""
@@ -95,6 +102,7 @@ def bake(
     textures: Path,
     params: BakeParams,
     folder: Path,
+    kept: Path | None = None,
 ) -> int:
     """Textures fitted to the meshes that ship, into `folder`/textures.arrow.
 
@@ -102,6 +110,7 @@ def bake(
         cameras: for training.
         samples, textures: frame stores of the textures as they were sampled, and at the size that ships. They are let
             go before the texels are held.
+        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
 
     Returns:
         of how many rays they are a fit; 0 if they were left as they are.
@@ -113,12 +122,14 @@ def bake(
     if params.iterations == 0:
         shutil.copyfile(textures, path)
         return 0
-    rays = _fit(cameras, grids, meshes, FrameStore(samples), FrameStore(textures), params, path)
+    common = digest_of_input(cameras, grids, meshes, params)
+    rays = _fit(cameras, grids, meshes, FrameStore(samples), FrameStore(textures), params, path, common, kept)
     baked = FrameStore(path)
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
         weights = texel_weights(rays, baked, len(cameras), params)
-        write_frames(path, (baked.height, baked.width, 4), held_rows(baked, weights, params.hold))
+        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20)
+        write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
         baked.path.unlink()
     return len(rays)
 
@@ -131,6 +142,8 @@ def _fit(
     textures: FrameStore,
     params: BakeParams,
     path: Path,
+    common: bytes,
+    kept: Path | None,
 ) -> Codes:
     """Write the fitted textures; the rays on the meshes that ship. What else was gathered is let go."""
     sheets = grid_sheets(grids, None).sheets
@@ -138,8 +151,31 @@ def _fit(
     rays = gather_rays(cameras, meshes, sheets)
     baker = Baker(meshes, sheets, rays, textures.height, params)
     shape = (textures.height, textures.width, 4)
-    write_frames(path, shape, baked_rows(baker, textures, samples, params.iterations))
+    frames = sorted({frame for _, frame in textures})
+    with progress(total=len(frames), desc="bake", unit="frame") as bar:
+
+        def make(frame: int) -> NDArray[np.uint8]:
+            return baked_frame(baker, textures, samples, frame, params.iterations)
+
+        earlier = KeptFrames(kept)
+        digests = digests_of_frames(common, (textures, samples), frames)
+        rows = earlier.rows(digests, len(meshes), make, lambda: bar.update())
+        write_frames(path, shape, rows, packed=True)
+    earlier.keep(path, digests)
     return rays.shipped
+
+
+def digest_of_input(
+    cameras: Sequence[Camera], grids: Grids, meshes: Sequence[TexturedMesh], params: BakeParams
+) -> bytes:
+    """Of all that every frame is fitted with, and of the code that does it."""
+    parts: dict[str, Any] = {"iterations": params.iterations, "damping": params.damping, "light": params.min_light}
+    parts |= {f"grids {name}": value for name, value in vars(grids).items() if isinstance(value, np.ndarray)}
+    for i, mesh in enumerate(meshes):
+        parts |= {f"mesh {i} {name}": value for name, value in vars(mesh).items()}
+    for i, camera in enumerate(cameras):
+        parts[f"camera {i}"] = (camera.K.tobytes(), camera.w2c.tobytes(), camera.width, camera.height)
+    return digest_of({**parts, "code": digest_of_packages("export", "rendering", "geometry")})
 
 
 def _check_match(meshes: Sequence[TexturedMesh], sheets: Sheets, textures: FrameStore, samples: FrameStore) -> None:

@@ -109,7 +109,7 @@ def resample_store(source: Path, target: Path, size: int, progress: bool = True)
     """
     store = FrameStore(source)
     _check_complete(store)
-    write_frames(target, (size, size, 4), texture_rows(store, size, progress))
+    write_frames(target, (size, size, 4), texture_rows(store, size, progress), packed=True)
     return store
 
 

@@ -70,14 +70,19 @@ class GridTextures(nn.Module):
         """The texels themselves."""
         return TexelGrid(self.window, self.shape)
 
+    def frame(self, index: int) -> tuple[Tensor, Tensor]:
+        """What frame `index` adds: colour [H, W, 3], and to the logits of alpha [H, W, N]."""
+        return self.frame_colour[index], self.frame_alpha[index]
+
     def image(self, layer: int, time: float) -> Tensor:
         """RGBA [H, W, 4] of one layer at one time, at the texels."""
         time = min(max(float(time), 0.0), self.num_frames - 1.0)
         before = int(time)
         after, fraction = min(before + 1, self.num_frames - 1), time - before
         own = self.layers[:, :, layer]
-        moving = torch.lerp(self.frame_colour[before], self.frame_colour[after], fraction)
-        fading = torch.lerp(self.frame_alpha[before, :, :, layer], self.frame_alpha[after, :, :, layer], fraction)
+        (colour_0, alpha_0), (colour_1, alpha_1) = self.frame(before), self.frame(after)
+        moving = torch.lerp(colour_0, colour_1, fraction)
+        fading = torch.lerp(alpha_0[..., layer], alpha_1[..., layer], fraction)
         rgb = (self.colour + own[..., :3] + moving).clamp(0, 1)
         return torch.cat([rgb, torch.sigmoid(own[..., 3:] + fading[..., None])], -1)
 

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import re
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union
 
 import torch
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
-from torch import Tensor
 
-from facefolds_core.errors import UserError, disk_error, is_disk_error
-from facefolds_core.files import atomic_file, read_json, write_json
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json, write_json
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.reflection import Reflection, ReflectionShape
+from facefolds_core.model.segmented import SegmentedTextures, segment_file
+from facefolds_core.model.tensor_files import check_tensors, read_tensors, write_tensors
 from facefolds_core.model.textures import MlpTextures
-from facefolds_core.reading import check_regular, no_memory
+from facefolds_core.reading import check_regular
 from facefolds_core.registry import MODELS
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"
@@ -90,6 +87,7 @@ class ExplicitSpec(BaseModel):
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
         reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
+        segments: frames in each file of `segmented.py`; absent where all frames are in model.safetensors.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
     """
 
@@ -105,7 +103,16 @@ class ExplicitSpec(BaseModel):
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
     reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
+    segments: Annotated[
+        tuple[Annotated[int, Field(ge=1)], ...] | None, Field(min_length=1, exclude_if=lambda shape: shape is None)
+    ] = None
     fingerprint: str = ""
+
+    @model_validator(mode="after")
+    def _all_frames(self) -> ExplicitSpec:
+        if self.segments is not None and sum(self.segments) != self.num_frames:
+            raise ValueError(f"segments of {sum(self.segments)} frames, but num_frames is {self.num_frames}")
+        return self
 
 
 @cache
@@ -127,10 +134,13 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
     if spec.reflection is not None:
         rows, columns, environment = spec.reflection
         reflection = Reflection(ReflectionShape((rows, columns), environment))
-    return RadianceManifolds(
-        RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers),
-        GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection),
-    )
+    textures: GridTextures
+    if spec.segments is None:
+        textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
+    else:
+        textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
+    manifolds = RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers)
+    return RadianceManifolds(manifolds, textures)
 
 
 def build_mlp(spec: ModelSpec) -> RadianceManifolds:
@@ -157,77 +167,25 @@ def build_mlp(spec: ModelSpec) -> RadianceManifolds:
     return RadianceManifolds(manifolds, textures)
 
 
-def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:
-    """Write a safetensors file, whole or not at all.
-
-    Raises:
-        OSError: where the disk fails, as for every other file; safetensors has an error of its own for it.
-    """
-    tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    with atomic_file(path) as temporary:
-        try:
-            save_file(tensors, str(temporary), metadata=metadata)
-        except SafetensorError as error:
-            number = re.search(r"os error (\d+)", str(error))
-            if number is None:
-                raise
-            code = int(number[1])
-            raise OSError(code, os.strerror(code)) from None
-
-
-def read_tensors(path: Path, remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Tensors and metadata of a safetensors file, on the CPU.
-
-    Raises:
-        UserError: if the file is missing or damaged.
-    """
-    check_regular(path, remedy)
-    try:
-        with safe_open(str(path), "pt") as file:
-            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
-    except MemoryError:
-        raise no_memory(path) from None
-    except (SafetensorError, OSError, ValueError, OverflowError, RuntimeError) as error:
-        if is_disk_error(error):
-            raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
-        raise UserError(
-            "damaged file", file=path, expected="a whole safetensors file", found=str(error), remedy=remedy
-        ) from None
-
-
-def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: Path, remedy: str) -> None:
-    """Compare names, shapes and finiteness.
-
-    Raises:
-        UserError: at the first difference, naming the tensor.
-    """
-    for name in sorted(set(found) ^ set(expected)):
-        raise UserError(
-            "the file does not belong to this configuration",
-            file=path,
-            place=name,
-            expected="this tensor" if name in expected else "no such tensor",
-            found="no such tensor" if name in expected else "this tensor",
-            remedy=remedy,
-        )
-    for name, tensor in found.items():
-        if tensor.shape != expected[name].shape:
-            raise UserError(
-                "the file does not belong to this configuration",
-                file=path,
-                place=name,
-                expected=f"shape {tuple(expected[name].shape)}",
-                found=f"shape {tuple(tensor.shape)}",
-                remedy=remedy,
-            )
-        if tensor.is_floating_point() and not tensor.isfinite().all():
-            raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
-
-
 def save_model(model: RadianceManifolds, spec: Spec, folder: Path) -> None:
-    """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place)."""
+    """Write `model.safetensors` and `model.json` into `folder` (the caller moves a whole folder into place).
+
+    Segments are linked where their files are still there and the disk can, else written anew.
+    """
+    if isinstance(model.textures, SegmentedTextures):
+        _save_segments(model.textures, folder)
     write_tensors(folder / "model.safetensors", model.state_dict(), {"spec": spec.model_dump_json()})
     write_json(folder / "model.json", spec.model_dump(mode="json"))
+
+
+def _save_segments(textures: SegmentedTextures, folder: Path) -> None:
+    segment_file(folder, 0).parent.mkdir()
+    for number, path in enumerate(textures.paths):
+        target = segment_file(folder, number)
+        try:
+            os.link(path, target)
+        except OSError:
+            write_tensors(target, textures.segment(number), {})
 
 
 def read_spec(folder: Path) -> Spec:
@@ -283,4 +241,6 @@ def load_model(folder: str | Path, device: torch.device | str = "cpu") -> Radian
         model = build_model(spec)
     check_tensors(tensors, model.state_dict(), path, _REMEDY)
     model.load_state_dict(tensors)
+    if isinstance(model.textures, SegmentedTextures):
+        model.textures.attach([segment_file(folder, i) for i in range(len(model.textures.lengths))], _REMEDY)
     return model.to(device).eval()

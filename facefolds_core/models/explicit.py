@@ -30,12 +30,12 @@ def build(spec: ExplicitSpec) -> RadianceManifolds:
 
 
 def fit(scene: Scene, params: Params, checkpoints: Path, log: Path) -> Trained:
-    from facefolds_core.training.explicit.loop import fit_explicit
+    from facefolds_core.training.segments.loop import fit_take
 
-    return fit_explicit(scene, params, log)
+    return fit_take(scene, params, checkpoints, log)
 
 
 def train(scene: Scene, params: Params, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    from facefolds_core.training.explicit.loop import train_explicit
+    from facefolds_core.training.segments.loop import train_take
 
-    return train_explicit(scene, params, folder, log)
+    return train_take(scene, params, folder, checkpoints, log)

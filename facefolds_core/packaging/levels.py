@@ -14,9 +14,12 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import CompressParams, LevelParams
 
+MOST_KEPT = 1024
+"""Textures: of some hundred frames, so that a long take does not fill the memory."""
+
 
 class Resampled:
-    """Textures at another size, premultiplied, by least squares (export/textures.py); what was asked for is kept."""
+    """Textures at another size, premultiplied, by least squares (export/textures.py); what was asked for last is kept."""
 
     def __init__(self, textures: Textures, size: int) -> None:
         self._textures, self._size = textures, size
@@ -26,6 +29,8 @@ class Resampled:
         """(size, size, 4)."""
         key = layer, frame
         if key not in self._kept:
+            if len(self._kept) >= MOST_KEPT:
+                del self._kept[next(iter(self._kept))]
             self._kept[key] = resample(self._textures.image(layer, frame), self._size)
         return self._kept[key]
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,22 +13,19 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.audio import encode_sound
-from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
-from facefolds_core.asset.manifest import Level, Manifest, Quality
+from facefolds_core.asset.inputs import check_inputs
+from facefolds_core.asset.manifest import Level, Manifest
 from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
-from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
-from facefolds_core.asset.video import decode_video, unpack_picture
+from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.writer import (
     FULL,
     AssetSource,
     LevelContent,
-    check_inputs,
     manifest_of,
-    write_level,
 )
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
@@ -37,16 +33,15 @@ from facefolds_core.export.between import at_frame_rate
 from facefolds_core.export.stores import Grids
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, level_params
-from facefolds_core.packaging.meshbits import resolved
-from facefolds_core.packaging.rate import search_crf
-from facefolds_core.packaging.views import ViewMeter, spread, training_cameras
-from facefolds_core.params import CompressParams, CrfSearchParams, LevelParams, VideoCodec
-from facefolds_core.rendering.reference import AssetCaster, composite
+from facefolds_core.packaging.poster import BACKGROUND, write_poster
+from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
+from facefolds_core.packaging.views import spread, training_cameras
+from facefolds_core.params import CompressParams, LevelParams
 
 
 @dataclass(frozen=True)
@@ -99,22 +94,30 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         atomic_folder(folder) as temporary,
         at_frame_rate(export.textures, factor, temporary, params.between) as textures,
     ):
-        layers = crop_layers(export.meshes, export.windows, textures, frames * factor)
-        full = LevelContent(layers, textures, frames * factor, source.fps * factor)
+        rate = source.fps * factor
+        streamed = is_streamed(params.stream, frames * factor, rate)
+        unit = stream_unit(params.levels, textures.image(0, 0).shape[0]) if streamed else 1
+        layers = crop_layers(export.meshes, export.windows, textures, frames * factor, unit)
+        full = LevelContent(layers, textures, frames * factor, rate, unit)
         meter = make_meter(full, cameras, params)
         levels = []
-        for coarse in params.levels:
-            content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
-            levels.append(_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras))
-        level = _level(temporary, FULL, full, params, meter, cameras)
+        if streamed:
+            *levels, level = write_rungs(temporary, full, params, meter, cameras)
+        else:
+            for coarse in params.levels:
+                content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
+                coded = coded_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras)
+                levels.append(coded)
+            level = coded_level(temporary, FULL, full, params, meter, cameras)
         if export.reflection is not None:
             picture = ReflectionPicture.of(export.reflection)
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
         photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(
-            temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params.jpeg_quality
-        )
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params)
+        if streamed:
+            made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
+            manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
         return write_manifest(manifest, temporary / MANIFEST_NAME)
 
 
@@ -130,40 +133,6 @@ def _check_order(levels: Sequence[LevelParams]) -> None:
             )
 
 
-def make_meter(content: LevelContent, cameras: Sequence[Camera], params: CompressParams) -> ViewMeter | None:
-    """The yardstick of the content's own textures and meshes; None without cameras."""
-    if not cameras:
-        return None
-    wanted = params.meter.frames
-    frames = {*spread(content.frames, wanted), *spread(min(content.frames, params.search.frames), wanted)}
-    meshes = [layer.mesh for layer in content.layers]
-    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames}, params.meter)
-
-
-def _level(
-    folder: Path,
-    name: str,
-    content: LevelContent,
-    params: CompressParams,
-    meter: ViewMeter | None,
-    cameras: Sequence[Camera],
-) -> Level:
-    """Write a level and measure it: against the full one before coding, by `meter`."""
-    params = params.model_copy(update={"mesh": resolved(params.mesh, content.layers, cameras)})
-    video = params.video
-    crfs = None
-    if meter is not None and video.target_psnr is not None and not video.lossless:
-        search, target = params.search, video.target_psnr
-        crfs = {codec: _crf(folder, content, CODECS[codec], video, meter, target, search) for codec in video.codec}
-    level = write_level(folder, name, content, params, crfs)
-    if meter is None:
-        return level
-    shown = read_level(folder, level)
-    psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
-    asked = None if crfs is None else video.target_psnr
-    return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3), target_psnr=asked)})
-
-
 def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:
     """Add the reflection to a level; each has its own copy, a few kB: a level is complete in itself."""
     path = folder / f"{level.name}_reflection.png"
@@ -172,30 +141,8 @@ def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> 
     return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 
-def _crf(
-    folder: Path,
-    content: LevelContent,
-    codec: Codec,
-    video: VideoCodec,
-    meter: ViewMeter,
-    target: float,
-    search: CrfSearchParams,
-) -> int:
-    layout = content.layout
-    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
-        path = Path(scratch) / f"trial.{codec.container}"
-
-        def quality(crf: int) -> float:
-            content.encode(path, codec, video, crf, min(content.frames, search.frames))
-            pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
-            wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
-            return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
-
-        return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf, search).crf
-
-
 def _with_extras(
-    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], jpeg_quality: int
+    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], params: CompressParams
 ) -> Manifest:
     """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
@@ -207,30 +154,18 @@ def _with_extras(
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
-        index = max(train, key=lambda index: _frontality(scene.camera_in_head(index, 0)))
-        poster = _poster(folder / "poster.jpg", manifest.full, scene.camera_in_head(index, 0), jpeg_quality)
-        update["poster"] = poster.model_copy(update={"w2c": _rows(scene.cameras[index].w2c)})
-    return manifest.model_copy(update=update)
-
-
-def _frontality(camera: Camera) -> float:
-    """How much a camera sees the subject from its front, +x: 1 at most."""
-    return float(camera.centre[0] / np.linalg.norm(camera.centre))
-
-
-def _poster(path: Path, level: Level, camera: Camera, jpeg_quality: int) -> Poster:
-    shown = read_level(path.parent, level)
-    rgb, _ = composite(AssetCaster(shown).cast(camera), shown.frame(0))
-    pixels = np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
-    Image.fromarray(pixels).save(path, quality=jpeg_quality)
-    return Poster(
+    path, first = folder / "poster.jpg", scene.cameras[0]
+    side = min(params.poster_side, max(first.width, first.height))
+    camera = write_poster(path, manifest, side, params.jpeg_quality)
+    update["poster"] = Poster(
         **_stored(path),
         width=camera.width,
         height=camera.height,
         K=_rows(camera.K),
         w2c=_rows(camera.w2c),
-        background=(0.0, 0.0, 0.0),
+        background=BACKGROUND,
     )
+    return manifest.model_copy(update=update)
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:

@@ -15,6 +15,7 @@ from facefolds_core.params.compress import (
     LevelParams,
     MeshCodec,
     MeterParams,
+    StreamParams,
     VideoCodec,
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
@@ -37,9 +38,11 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
+from facefolds_core.params.matte import CutOutParams, MatteParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
+from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
@@ -68,6 +71,7 @@ __all__ = [
     "CollapseParams",
     "CompressParams",
     "CrfSearchParams",
+    "CutOutParams",
     "DecimateParams",
     "DivergenceParams",
     "EnvironmentParams",
@@ -80,6 +84,7 @@ __all__ = [
     "HoldoutEvery",
     "LevelParams",
     "LossParams",
+    "MatteParams",
     "MeshCodec",
     "MeshParams",
     "MeterParams",
@@ -99,7 +104,9 @@ __all__ = [
     "SampleParams",
     "ScoreWarningParams",
     "Section",
+    "SegmentParams",
     "StartParams",
+    "StreamParams",
     "Subject",
     "SubjectParams",
     "TextureParams",
@@ -108,6 +115,7 @@ __all__ = [
     "VideoCodec",
     "VolumeLevel",
     "VolumeParams",
+    "VoteParams",
     "WallParams",
     "WarningParams",
     "merged",

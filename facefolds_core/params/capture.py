@@ -16,7 +16,12 @@ class CaptureParams(Section):
     """Number of cameras of the rig."""
 
     frames: Count = 12
-    """Number of frames: one period of its motion."""
+    """Number of frames, evenly spread over `seconds`."""
+
+    seconds: Annotated[float, Field(gt=0, le=3600)] = 1.5
+    """Of its take that are filmed, from the beginning. The take is 4 s long and loops; so do its first 1.5 s, a
+    greeting, a blink and a smile. Twelve frames of them are eight a second: each sound is seen, and the film is small.
+    """
 
     height: ImageSide = 192
     """Of the images, pixels."""
@@ -24,11 +29,11 @@ class CaptureParams(Section):
     width: ImageSide = 128
     """Of the images, pixels."""
 
-    fps: FrameRate = 30.0
-    """Frames a second."""
+    fps: FrameRate | None = None
+    """Frames a second at which it is played. null: as fast as it was filmed, frames / seconds."""
 
     head_motion: Annotated[float, Field(ge=0, le=45)] = 0.0
-    """Degrees by which the head turns to each side as it performs, with a nod of half as much."""
+    """Degrees by which the head turns to each side as it performs, with a nod and a lean of half as much."""
 
     seed: Seed = 0
     """Of the procedural skin, freckles and hair."""
@@ -38,6 +43,11 @@ class CaptureParams(Section):
 
     mattes: bool = False
     """Offer the true opacity of all cameras to the training. Off: it serves scoring only, as in a real capture."""
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames a second that the film plays at."""
+        return self.frames / self.seconds if self.fps is None else self.fps
 
 
 class MotionParams(Section):

@@ -109,6 +109,16 @@ class MeterParams(Section):
     """Of those that hit anything, drawn once."""
 
 
+class StreamParams(Section):
+    """Long takes as streams: videos that players fetch in segments, at the quality that the connection allows."""
+
+    beyond: Annotated[float, Field(ge=0, le=1e9)] = 20.0
+    """Seconds; an asset that is longer is written as a stream. 1e9: none is."""
+
+    segment_seconds: Annotated[float, Field(ge=0.1, le=60)] = 2.0
+    """Of a segment, rounded to whole frames: short ones switch and seek faster, long ones are smaller."""
+
+
 class BetweenParams(Section):
     """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""
 
@@ -173,8 +183,14 @@ class CompressParams(Section):
     """The asset plays at 1, 2 or 3 times the capture's frames a second; what lies between the capture's frames follows
     the motion (export/between.py)."""
 
+    stream: StreamParams = StreamParams()
+    """Segments, DASH and HLS for long takes."""
+
     glb: GlbParams = GlbParams()
     """One frame for programs that read glTF."""
+
+    poster_side: Annotated[int, Field(ge=16, le=4096)] = 720
+    """Pixels of the poster's longer side; no more than that of the capture's pictures."""
 
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
     """Of poster and photos, on JPEG's scale."""

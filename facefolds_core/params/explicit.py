@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.matte import MatteParams
 from facefolds_core.params.reflection import ReflectionParams
+from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.volume import (
     CameraParams,
@@ -145,6 +147,16 @@ class PruningParams(Section):
     some `rays_per_texel` a texel; all of them over the frames) are made transparent. A ray reads four a layer: its
     colour changes by no more than N / 255, and that only if all of them are just below."""
 
+    speck_opacity: Share = 0.3
+    """Of all layers together, in any frame: patches of texels that are more opaque are compared by size,"""
+
+    speck_share: Share = 0.02
+    """and those smaller than this share of the largest one are made transparent, with all that is farther than
+    `speck_reach` from the others: splinters beside the head, that cameras left over. 0 keeps them."""
+
+    speck_reach: Natural = 3
+    """Texels: the soft edge of what stays."""
+
 
 class DivergenceParams(Section):
     """When a level of training is begun again, and how often."""
@@ -199,6 +211,9 @@ class ExplicitParams(Section):
     warnings: WarningParams = WarningParams()
     """When it is said that something is not well."""
 
+    mattes: MatteParams = MatteParams()
+    """How mattes are found where somebody asks for them."""
+
     cameras: CameraParams = CameraParams()
     """What single cameras do differently."""
 
@@ -225,6 +240,9 @@ class ExplicitParams(Section):
 
     moving: MovingParams = MovingParams()
     """Of a head that turns."""
+
+    segments: SegmentParams = SegmentParams()
+    """Of takes that are too long to be trained at once."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""

@@ -105,6 +105,10 @@ class Subject(Overrides):
     """Of the ball about the centre that holds the subject, in the capture's unit of length: nothing beyond it is
     modelled, and nothing larger is tried. null takes `train.volume.reach`, and more where that cuts the subject off."""
 
+    mattes: str | None = None
+    """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png (`facefolds mattes` makes such); they
+    take the place of those that come with the capture. Relative paths start at the project's folder."""
+
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""
 

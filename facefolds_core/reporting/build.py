@@ -16,9 +16,10 @@ from facefolds_core.facts import worded
 from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
-from facefolds_core.reporting.facts import Facts, read_facts, read_metrics
+from facefolds_core.reporting.face import face
+from facefolds_core.reporting.facts import Facts, read_facts
 from facefolds_core.reporting.films import films
-from facefolds_core.reporting.verdicts import verdicts
+from facefolds_core.reporting.history import Comparison, compared
 from facefolds_core.scoring.panels import HEADLINES
 from facefolds_core.scoring.record import Record, View, read_record
 from facefolds_core.scoring.sheets import MAX_ERROR
@@ -46,31 +47,37 @@ class Subject:
     scene: Scene | None
     record: Record | None
     views: tuple[View, ...]
-    reference: dict[str, Any] | None = None
+    runs: list[Comparison]
+    player: Path | None
 
 
-def make_report(folders: SubjectFolders, reference: Path | None = None) -> Path:
+def make_report(folders: SubjectFolders, reference: Path | None = None, player: Path | None = None) -> Path:
     """Write `report.html` into the subject's folder; returns its path.
 
     Args:
         reference: metrics.json of another run, to be compared with.
+        player: folder of the built web player, to show the asset with.
 
     Raises:
         UserError: if the folder is not an evaluated subject's, or something in it is damaged.
     """
-    page = render_page(gather(folders, reference), folders.root.resolve().name)
+    page = render_page(gather(folders, reference, player), folders.root.resolve().name)
     path = folders.root / REPORT_NAME
     write_text(path, page)
     return path
 
 
-def gather(folders: SubjectFolders, reference: Path | None = None) -> Subject:
+def gather(folders: SubjectFolders, reference: Path | None, player: Path | None) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
     record = read_record(folders.evaluation, asset)
-    other = None if reference is None else read_metrics(reference)
-    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), other)
+    runs = compared(folders, facts.metrics, now(), reference)
+    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), runs, player)
+
+
+def now() -> str:
+    return datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")
 
 
 def chosen_views(record: Record) -> tuple[View, ...]:
@@ -121,11 +128,12 @@ def context(subject: Subject) -> dict[str, Any]:
     compared = comparisons(subject, places)
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
-        "made": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "made": now(),
+        "face": face(subject.asset, subject.player),
         "generator": manifest.generator,
         "of_what": HEADLINE_WORDS[key],
         "warnings": warnings(facts.metrics),
-        "verdicts": verdicts(facts.metrics, subject.reference) if subject.reference else [],
+        "runs": subject.runs,
         **films(record, scene),
         "tiles": tiles(subject, key),
         "summary": words.summary(facts, manifest, scene, seen),
@@ -197,10 +205,12 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
         known = [name for name in HEADLINES if getattr(view, name) is not None]
         values = [f"{words.number(getattr(view, name))} dB {HEADLINE_WORDS[name]}" for name in known]
         values += place_words(places.get(view.camera))
+        label = words.frame_label(subject.scene.frame_ids if subject.scene else (), view.frame)
         worst = subject.record is not None and view is subject.record.views[subject.record.worst]
         result.append(
             {
-                "name": f"{view.camera}, frame {view.frame}{' (the worst)' if worst else ''}",
+                "name": f"{view.camera}, frame {label}{', the worst' if worst else ''}",
+                "label": label,
                 "scores": ", ".join(values),
                 "worst": worst,
                 "camera": view.camera,
@@ -258,12 +268,12 @@ def layers(subject: Subject) -> dict[str, Any]:
 
 
 def frame_name(subject: Subject, frame: int) -> str:
-    """Of a frame of the asset: as the capture calls it; frames between those of the capture have numbers only."""
+    """Of a frame of the asset: as everywhere; frames between those of the capture have numbers only."""
     scene, asset = subject.scene, subject.asset
     step = asset.num_frames // scene.num_frames if scene else 0
     if scene is None or not step or frame % step:
-        return f"number {frame + 1}"
-    return scene.frame_ids[frame // step]
+        return f"number {frame + 1} of {asset.num_frames}"
+    return words.frame_label(scene.frame_ids, scene.frame_ids[frame // step])
 
 
 def textures(subject: Subject) -> dict[str, Any]:

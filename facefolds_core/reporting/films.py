@@ -7,6 +7,7 @@ from typing import Any
 from facefolds_core.captures.scene import Scene
 from facefolds_core.reporting.pictures import film as film_of
 from facefolds_core.reporting.tables import place_of
+from facefolds_core.reporting.words import frame_label
 from facefolds_core.scoring.record import Record
 
 MOST_FILM_BYTES = 8_000_000
@@ -24,7 +25,10 @@ def films(record: Record | None, scene: Scene | None) -> dict[str, Any]:
         size = path.stat().st_size if path.is_file() else room + 1
         if size <= room:
             room -= size
-            kept.append({"camera": film.camera, "fps": film.fps, "frames": film.frames, "src": film_of(path)})
+            labels = [frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
+            kept.append(
+                {"camera": film.camera, "fps": film.fps, "frames": film.frames, "labels": labels, "src": film_of(path)}
+            )
     view = record.views[record.worst]
     width, height = view.truth.shape[1], view.truth.shape[0]
     return {"films": kept, "films_left": len(record.films) - len(kept), "film_size": (2 * width, height)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -232,3 +233,8 @@ def summary(facts: Facts, manifest: Manifest, scene: Scene | None, seen: Seen | 
     ]
     said = [(heading, [sentence for sentence in group if sentence]) for heading, group in groups]
     return [(heading, group) for heading, group in said if group]
+
+
+def frame_label(frames: Sequence[str], name: str) -> str:
+    """A frame as it is called everywhere: the capture's name, and its place as the player counts, from 1."""
+    return f"{name} ({frames.index(name) + 1} of {len(frames)})" if name in frames else name

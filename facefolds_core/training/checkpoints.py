@@ -18,7 +18,7 @@ from torch import Tensor
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model.radiance import RadianceManifolds
-from facefolds_core.model.storage import check_tensors, read_tensors, write_tensors
+from facefolds_core.model.tensor_files import check_tensors, read_tensors, write_tensors
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.captures.actor import PERIOD, SEGMENT, make_rig, render, tracked_mesh, write_capture
+from facefolds_core.captures.actor import SEGMENT, make_rig, render, tracked_mesh, write_capture
 from facefolds_core.captures.actor.motion import pose_at
 from facefolds_core.captures.actor.shape import distance
 from facefolds_core.errors import UserError
@@ -59,7 +59,7 @@ def test_frame_list_names_segment_and_frame(written: Path) -> None:
 
 
 def test_stored_images_are_the_rendered_ones(written: Path) -> None:
-    picture = render(make_rig(PARAMS).cameras[1], 0.5 * PERIOD)
+    picture = render(make_rig(PARAMS).cameras[1], 0.5 * PARAMS.seconds)
     image = cv2.imread(str(written / f"images/{SEGMENT}/A001/000002.png"))
     mask = cv2.imread(str(written / f"masks/{SEGMENT}/A001/000002.png"), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(image[..., ::-1], picture.rgb)
@@ -106,14 +106,14 @@ def test_an_interrupted_capture_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_mesh_lies_on_the_surface() -> None:
-    time = 0.3 * PERIOD
+    time = 0.5
     pose = pose_at(time)
     distances = [distance(*map(float, vertex), pose) for vertex in tracked_mesh(time).vertices[::7]]
     assert np.abs(distances).max() < 0.1
 
 
 def test_mesh_keeps_its_topology_and_moves() -> None:
-    a, b = tracked_mesh(0.0), tracked_mesh(PERIOD / 3)
+    a, b = tracked_mesh(0.0), tracked_mesh(0.5)
     assert np.array_equal(a.faces, b.faces)
     assert np.array_equal(a.uv, b.uv)
     moved = np.linalg.norm(a.vertices - b.vertices, axis=1)

@@ -22,7 +22,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.export.stores import read_meshes
 from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
-from facefolds_core.model.storage import load_model, read_tensors
+from facefolds_core.model.storage import load_model
+from facefolds_core.model.tensor_files import read_tensors
 from facefolds_core.reading import remake
 from facefolds_core.reporting.facts import read_images, read_mapping
 from tests.captures.test_scene import scene

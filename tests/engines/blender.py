@@ -38,7 +38,9 @@ def find_blender() -> tuple[str, ...] | None:
     return None
 
 
-def pictures(file: Path, cameras: Sequence[Camera], background: float) -> dict[str, NDArray[np.float64]]:
+def pictures(
+    file: Path, cameras: Sequence[Camera], background: float, reflection: Path | None = None
+) -> dict[str, NDArray[np.float64]]:
     """What Blender renders, a sample a pixel: by camera's name, (H, W, 3) in [0, 1]."""
     start = find_blender()
     assert start is not None
@@ -50,6 +52,7 @@ def pictures(file: Path, cameras: Sequence[Camera], background: float) -> dict[s
         ]
         (Path(place) / "views.json").write_text(json.dumps(views))
         words = ["--views", f"{place}/views.json", "--background", *[str(background)] * 3, "--samples", "1"]
+        words += ["--reflection", str(reflection)] if reflection else []
         done = subprocess.run([*start, str(file), *words], capture_output=True, text=True, timeout=240, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         return {name: np.asarray(Image.open(file).convert("RGB")) / 255 for name, file in files.items()}

@@ -63,7 +63,8 @@ def test_weights_are_squared_derivatives() -> None:
         assert weights[layer, 2, 2, 1] == pytest.approx((by_alpha**2).mean(), rel=2e-2)
 
 
-def test_what_shows_moves_and_what_does_not_stays(tmp_path: Path) -> None:
+@pytest.mark.parametrize("memory", [1 << 20, 8 * 16 * 4 * 3, 1])
+def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path) -> None:
     """A trembling layer behind an opaque one becomes constant; the one in front, much looked at, stays as it is."""
     rng = np.random.default_rng(2)
     textures = rng.integers(100, 110, (2, 8, 16, 16, 4)).astype(np.uint8)
@@ -74,8 +75,9 @@ def test_what_shows_moves_and_what_does_not_stays(tmp_path: Path) -> None:
     store = FrameStore(path)
     weights = texel_weights(codes, store, 1)
     found = np.empty_like(textures)
-    for layer, frame, image in held_rows(store, weights, 1.0, progress=False):
+    for layer, frame, image in held_rows(store, weights, 1.0, tmp_path, memory, progress=False):
         found[layer, frame] = image
+    assert [p.name for p in tmp_path.iterdir()] == ["textures.arrow"]
     assert (found[0] == textures[0]).mean() > 0.99
     assert (found[1] == found[1, :1]).all()
     assert np.abs(found[1, 0] - textures[1].mean(0)).max() <= 0.5

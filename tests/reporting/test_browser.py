@@ -151,5 +151,50 @@ def test_any_frame_of_the_film_is_shown_by_its_name(open_report: Open) -> None:
     assert film.evaluate("v => v.paused")
     page.get_by_role("slider", name="Frame").fill("2")
     film.evaluate("v => !v.seeking || new Promise((done) => v.addEventListener('seeked', done))")
-    assert page.locator("#frame-name").inner_text() == "000002"
+    assert page.locator("#frame-name").inner_text() == f"000002 (3 of {FRAMES})"
     assert film.evaluate("v => Math.floor(v.currentTime * 30)") == 2
+    page.locator(".screen").press("ArrowLeft")
+    film.evaluate("v => !v.seeking || new Promise((done) => v.addEventListener('seeked', done))")
+    assert film.evaluate("v => Math.floor(v.currentTime * 30)") == 1
+
+
+def test_a_film_shows_both_halves_one_or_one_after_the_other(open_report: Open) -> None:
+    page = open_report()
+    wide = page.locator(".screen").bounding_box()
+    seen = {}
+    for how in ("photo", "asset", "blink"):
+        page.get_by_label("How to compare films").select_option(how)
+        seen[how] = page.locator("#film").evaluate(
+            "v => [getComputedStyle(v).transform, getComputedStyle(v).animationName]"
+        )
+    half = page.locator(".screen").bounding_box()
+    assert wide is not None and half is not None
+    assert half["width"] / half["height"] == pytest.approx(0.5 * wide["width"] / wide["height"], rel=0.02)
+    assert seen["photo"][0] == "none" and float(seen["asset"][0].split(",")[4]) < -50  # moved to the left by half
+    assert seen["blink"][1] == "other-half"
+
+
+def test_stills_are_zoomed_together_and_blink(open_report: Open) -> None:
+    page = open_report()
+    picture = page.locator(".view:visible .wipe")
+    before = picture.bounding_box()
+    page.get_by_label("Zoom", exact=True).select_option("4")
+    after = picture.bounding_box()
+    assert before is not None and after is not None
+    assert after["width"] == pytest.approx(4 * before["width"], rel=0.02)
+    pans = page.locator(".view:visible .pan")
+    pans.first.evaluate("p => { p.scrollLeft = 30; p.scrollTop = 40; }")
+    page.wait_for_function("() => document.querySelectorAll('.view:not([hidden]) .pan')[1].scrollLeft === 30")
+    assert pans.last.evaluate("p => [p.scrollLeft, p.scrollTop]") == [30, 40]
+    blink = page.get_by_role("button", name="Blink")
+    blink.click()
+    assert blink.get_attribute("aria-pressed") == "true"
+    assert page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).animationName") == "away"
+    blink.click()
+    assert page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).animationName") == "none"
+
+
+def test_it_prints_on_two_pages(open_report: Open) -> None:
+    page = open_report()
+    printed = page.pdf(format="A4", prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2

@@ -19,6 +19,7 @@ from facefolds_core.files import read_json, write_json
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import build
 from facefolds_core.reporting.build import make_report
+from facefolds_core.reporting.history import HISTORY_NAME
 from facefolds_core.reporting.index import make_index
 from facefolds_core.scoring.record import NAME
 from tests.assets import make_asset
@@ -116,7 +117,7 @@ def test_the_film_of_every_held_out_camera_is_in_it(subject: SubjectFolders) -> 
     page = page_of(subject)
     listed = json.loads(page.split('id="films-data">')[1].split("</script>")[0])
     assert [(film["camera"], len(film["frames"])) for film in listed] == [("cam3", FRAMES)]
-    assert page.index("<video") < page.index('class="tiles"')
+    assert page.index('id="compare"') < page.index("<video")
 
 
 def test_a_reference_run_gets_a_verdict(copy: SubjectFolders, tmp_path: Path) -> None:
@@ -124,14 +125,55 @@ def test_a_reference_run_gets_a_verdict(copy: SubjectFolders, tmp_path: Path) ->
     reference["asset"]["psnr_subject"] += 1
     write_json(tmp_path / "before.json", reference)
     page = make_report(copy, tmp_path / "before.json").read_text()
-    assert "Against the reference run" in page and ">worse</td>" in page
-    assert "Against the reference run" not in page_of(copy)
+    assert "Beside the reference: <a" in page and ">worse in PSNR of the subject</a>" in page and ">worse</td>" in page
+    assert "Beside the reference" not in page_of(copy)
+    shutil.copy(tmp_path / "before.json", copy.root / "reference.json")
+    assert ">worse in PSNR of the subject</a>" in page_of(copy)
+
+
+def test_the_run_before_gets_a_verdict(copy: SubjectFolders) -> None:
+    assert "the run before" not in page_of(copy)
+    metrics = json.loads(copy.metrics.read_text())
+    metrics["asset"]["psnr_subject"] += 1
+    write_json(copy.metrics, metrics)
+    for page in (page_of(copy), page_of(copy)):  # made again, it is no other run
+        assert "Beside the run before (" in page and ">better in PSNR of the subject</a>" in page
+
+
+def test_garbled_notes_of_earlier_runs_are_named(copy: SubjectFolders) -> None:
+    write_json(copy.root / HISTORY_NAME, [{"made": "today"}])
+    with pytest.raises(UserError, match="notes of earlier runs are garbled"):
+        make_report(copy)
+
+
+def test_frames_have_one_name_everywhere(subject: SubjectFolders) -> None:
+    """The capture's name, and the number that the player shows."""
+    page = page_of(subject)
+    listed = json.loads(page.split('id="films-data">')[1].split("</script>")[0])
+    names = [f"{k:06d} ({k + 1} of {FRAMES})" for k in range(FRAMES)]
+    assert listed[0]["labels"] == names
+    assert [f"cam3, frame {name}" in page for name in names] == [True] * FRAMES
+    assert f"Frame {names[FRAMES // 2]}, decoded" in page
+    assert f"camera cam3, frame {names[0]};" in page  # the worst, at the head
 
 
 def test_the_index_lists_all_subjects(subject: SubjectFolders) -> None:
     page_of(subject)
-    page = make_index(subject.root.parent, [subject.root]).read_text()
-    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page
+    page = make_index(subject.root.parent).read_text()
+    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page and ">evaluated<" in page
+
+
+def test_the_index_says_how_far_the_others_are(tmp_path: Path) -> None:
+    for name in ("waiting", "trained"):
+        write_json(tmp_path / ".config" / name / "subject.json", {})
+    for stage, seconds in (("capture", 2.0), ("normalize", 3.0), ("train", 70.0)):
+        write_json(tmp_path / ".timings" / "trained" / f"{stage}.json", {"seconds": seconds})
+    page = make_index(tmp_path).read_text()
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", line) for line in page.splitlines() if '<th scope="row"' in line]
+    assert [(row[0], row[2], row[-2]) for row in rows] == [
+        ("trained", "made up to train", "75\N{NO-BREAK SPACE}s"),
+        ("waiting", "not begun", "–"),
+    ]
 
 
 def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:
@@ -157,7 +199,7 @@ def test_the_worst_picture_is_shown_where_there_is_no_room_for_all(
     write_json(path, read_json(path) | {"worst": 2})
     page = page_of(copy)
     assert page.count("data:image/png") == 2
-    assert page.count("(the worst)") >= 1
+    assert page.count(", the worst</option>") >= 1
 
 
 def test_the_command_finds_the_subjects_that_have_scores(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from facefolds_core.errors import UserError
-from facefolds_core.model.storage import write_tensors
+from facefolds_core.model.tensor_files import write_tensors
 from facefolds_core.training import patience
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import check_space, patiently

@@ -51,6 +51,17 @@ def test_rays_know_what_is_behind_them_and_what_is_not() -> None:
     assert part.camera.tolist() == [0, 1] and np.isnan(part.plate[1]).all()
 
 
+def test_beside_the_subject_a_matte_makes_the_picture_the_plate() -> None:
+    """What is behind there is what is seen: nothing has to explain it, least of all the subject."""
+    camera = look_at_origin("c", 0, 0, 8)
+    matte = np.zeros((8, 8, 1), np.uint8)
+    matte[:, 4:] = 255
+    rays = rays_of([PosedPhoto(Photo(np.full((8, 8, 3), 102, np.uint8), matte=matte), camera, camera, 0)], 0.01, 0.7)
+    behind, unknown = rays.over(np.zeros_like(rays.colours))
+    np.testing.assert_array_equal(unknown, rays.matte > 0)
+    np.testing.assert_allclose(behind[~unknown], 0.4, atol=1e-6)
+
+
 def test_the_room_stays_where_the_head_turns(tmp_path: Path) -> None:
     """In every frame the room's rays are those of the first one; the head's turn with it."""
     still = make_scene(tmp_path, size=16, frames=3)

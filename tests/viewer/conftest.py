@@ -30,7 +30,8 @@ def player_folder(project_root: Path) -> Path:
     npm, source = shutil.which("npm"), project_root / "viewer"
     if npm is None:
         pytest.skip("no npm: the web player cannot be built (apt-get install nodejs npm)")
-    if not (source / "node_modules").is_dir():
+    installed = source / "node_modules" / ".package-lock.json"
+    if not installed.is_file() or installed.stat().st_mtime < (source / "package-lock.json").stat().st_mtime:
         subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=source, check=True)
     subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
     return source / "dist"

@@ -1,5 +1,6 @@
 /** Gets an asset's files, from a server or from memory: counts bytes, and refuses a file that is missing, short or changed. */
 import { PlayerError } from "./errors.js";
+import { Pace } from "./pace.js";
 
 const AGAIN = "Copy or make the asset again.";
 
@@ -19,6 +20,8 @@ export class Files {
     this.loaded = 0;
     this.onProgress = onProgress;
     this.abort = new AbortController();
+    this.pace = new Pace();
+    this.onTrouble = () => {}; // the connection fails while something plays
   }
 
   /** Gives up all that is being fetched. */
@@ -28,6 +31,11 @@ export class Files {
 
   address(name) {
     return new URL(name, this.folder).href;
+  }
+
+  /** An address that the page's own elements can take. */
+  addressFor({ name }) {
+    return this.address(name);
   }
 
   /** @returns {Promise<string>} a small text file of unknown size, never from a stale cache */
@@ -43,10 +51,11 @@ export class Files {
    * @returns {Promise<ArrayBuffer>}
    */
   async bytes(entry) {
-    const response = await this.#request(entry.name, {});
     const data = new Uint8Array(entry.bytes);
     let filled = 0;
+    this.pace.start();
     try {
+      const response = await this.#request(entry.name, {});
       for (const reader = response.body.getReader(); ;) {
         const { done, value } = await reader.read();
         if (done) break;
@@ -55,10 +64,49 @@ export class Files {
         this.#count(value.length);
       }
     } catch (cause) {
-      if (this.abort.signal.aborted) throw cause;
+      if (this.abort.signal.aborted || cause instanceof PlayerError) throw cause;
       throw await unreachable(this.address(entry.name), cause, this.abort.signal);
+    } finally {
+      this.pace.end(filled);
     }
     await checked(data.buffer, filled, entry, this.address(entry.name));
+    return data.buffer;
+  }
+
+  /**
+   * Some bytes of a file.
+   * @param {import("./manifest.js").FileEntry} entry
+   * @param {{offset: number, bytes: number, sha256: string}} part
+   * @param {AbortSignal} [signal] of who no longer needs it
+   * @returns {Promise<ArrayBuffer>}
+   */
+  async part(entry, { offset, bytes, sha256 }, signal = this.abort.signal) {
+    const both = AbortSignal.any([signal, this.abort.signal]);
+    const headers = { Range: `bytes=${offset}-${offset + bytes - 1}` };
+    const data = new Uint8Array(bytes);
+    let filled = 0;
+    this.pace.start();
+    try {
+      const response = await this.#request(entry.name, { headers }, both);
+      let before = response.status === 206 ? 0 : offset; // a server without ranges sends it all
+      for (const reader = response.body.getReader(); filled < bytes;) {
+        const { done, value } = await reader.read();
+        if (done) break;
+        this.#count(value.length);
+        const wanted = value.subarray(Math.min(before, value.length)).subarray(0, bytes - filled);
+        before -= Math.min(before, value.length);
+        data.set(wanted, filled);
+        filled += wanted.length;
+        if (filled === bytes) reader.cancel().catch(() => {});
+      }
+    } catch (cause) {
+      if (both.aborted) throw new DOMException("no longer wanted", "AbortError");
+      if (cause instanceof PlayerError) throw cause;
+      throw await unreachable(this.address(entry.name), cause, both);
+    } finally {
+      this.pace.end(filled);
+    }
+    await checked(data.buffer, filled, { name: entry.name, bytes, sha256 }, this.address(entry.name));
     return data.buffer;
   }
 
@@ -67,14 +115,14 @@ export class Files {
     this.onProgress();
   }
 
-  async #request(name, options) {
+  async #request(name, options, signal = this.abort.signal) {
     const file = this.address(name);
     let response;
     try {
-      response = await fetch(file, { ...options, signal: this.abort.signal });
+      response = await fetch(file, { ...options, signal });
     } catch (cause) {
-      if (this.abort.signal.aborted) throw cause;
-      throw await unreachable(file, cause, this.abort.signal);
+      if (signal.aborted) throw cause;
+      throw await unreachable(file, cause, signal);
     }
     if (!response.ok) throw missing(name, file, `the server says ${response.status}`);
     return response;
@@ -91,6 +139,8 @@ export class MemoryFiles {
     this.given = given;
     this.loaded = 0;
     this.onProgress = onProgress;
+    this.pace = new Pace();
+    this.onTrouble = () => {};
   }
 
   close() {}
@@ -109,10 +159,22 @@ export class MemoryFiles {
     return buffer;
   }
 
-  async #read(name) {
+  async part({ name }, { offset, bytes, sha256 }) {
+    const buffer = await this.#blob(name)
+      .slice(offset, offset + bytes)
+      .arrayBuffer();
+    await checked(buffer, buffer.byteLength, { name, bytes, sha256 }, name);
+    return buffer;
+  }
+
+  #blob(name) {
     const blob = this.given.get(name);
     if (!blob) throw missing(name, name, "it is not among the files given");
-    const buffer = await blob.arrayBuffer();
+    return blob;
+  }
+
+  async #read(name) {
+    const buffer = await this.#blob(name).arrayBuffer();
     this.loaded += buffer.byteLength;
     this.onProgress();
     return buffer;

@@ -3,6 +3,8 @@ import { Adaptation } from "./adapt.js";
 import { PlayerError } from "./errors.js";
 import { loadLevel } from "./levels.js";
 
+const CATCH_UP = 6; // times that a level that comes in while it plays asks for the frame that is due by then
+const SPARE = 0.7; // of the connection's bytes a second that a stream may take
 const HOPELESS = ["offline", "cors", "csp", "file"]; // another level would fail for the same reason
 
 export class LevelChoice {
@@ -64,8 +66,9 @@ export class LevelChoice {
   /** With `auto`: the finest level that can be loaded. */
   async #improve() {
     const names = this.choices.slice(this.choices.indexOf(this.player.level.info.name) + 1).reverse();
+    await this.#enoughSeen();
     for (const name of names) {
-      if (this.broken.has(name)) continue;
+      if (this.broken.has(name) || !this.#affordable(name)) continue;
       await this.#onScreen();
       if (this.player.closed || !this.auto) return;
       try {
@@ -77,6 +80,22 @@ export class LevelChoice {
         this.broken.add(name);
       }
     }
+  }
+
+  /** Whether the connection is fast enough for a level of a long take. Short ones come whole before they play. */
+  #affordable(name) {
+    const { files, manifest } = this.player;
+    const { videos, texture } = manifest.levels.find((level) => level.name === name);
+    if (!videos[0].segments || files.pace.rate === null) return true;
+    return (videos[0].bytes * texture.fps) / texture.frames <= SPARE * files.pace.rate;
+  }
+
+  /** Of a long take some seconds are fetched before the connection is judged: what it can do, and so that nothing waits. */
+  async #enoughSeen() {
+    const { player } = this;
+    const packets = player.level.source.packets;
+    if (!player.level.video.segments || !packets) return;
+    while (packets.busy && !player.closed) await new Promise((resolve) => setTimeout(resolve, 100));
   }
 
   /** Resolves when somebody sees the player, or it has gone. */
@@ -115,7 +134,8 @@ export class LevelChoice {
     this.wanted = name;
     let level = null;
     try {
-      level = await loadLevel(info, player.files, (error) => this.#videoFailed(level, error), this.refused);
+      const failed = (error) => this.#videoFailed(level, error);
+      level = await loadLevel(info, player.files, failed, this.refused, player.playback.frame, player.level);
     } catch (error) {
       if (this.wanted === name) this.wanted = player.level?.info.name ?? null;
       throw error;
@@ -124,10 +144,11 @@ export class LevelChoice {
     const { playback } = player;
     let picture;
     let frame;
-    do {
+    for (let tries = 0; tries < CATCH_UP || !playback.playing; ++tries) {
       frame = playback.frame;
       picture = await level.source.get(frame);
-    } while (frame !== playback.frame && !playback.playing);
+      if (frame === playback.frame) break; // else the clock has gone on meanwhile
+    }
     if (player.closed || this.wanted !== name) return level.dispose();
     this.adaptation.restart();
     player.swap(level, frame, picture);
@@ -141,7 +162,7 @@ export class LevelChoice {
     try {
       await this.#firstOf(this.#nearest(level.info.name).filter((name) => !this.broken.has(name)));
     } catch (failure) {
-      player.fail(failure.kind === "codec" ? failure : error);
+      player.fail(failure?.kind === "codec" ? failure : error);
     }
   }
 
@@ -159,7 +180,9 @@ export class LevelChoice {
     const late = there ? seconds : seconds + budget;
     const move = this.adaptation.note(seconds, late > 1.3 * budget ? late : player.busy, budget);
     const at = this.choices.indexOf(player.level.info.name);
-    const next = this.choices.filter((name, i) => !this.broken.has(name) && (move < 0 ? i < at : i > at));
+    const next = this.choices.filter(
+      (name, i) => !this.broken.has(name) && (move < 0 ? i < at : i > at && this.#affordable(name)),
+    );
     const name = move < 0 ? next.at(-1) : move > 0 ? next[0] : undefined;
     if (name) this.#show(name).catch((error) => player.fail(error));
   }

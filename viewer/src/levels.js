@@ -10,12 +10,14 @@ import { decodeMesh } from "./meshes.js";
  * @param {import("./files.js").Files} files
  * @param {(error: Error) => void} onVideoError
  * @param {Set<string>} refused videos not to try
+ * @param {number} at the frame to begin with
+ * @param {LoadedLevel | null} like a level that is there: what is the same is not loaded again
  * @returns {Promise<LoadedLevel>}
  */
-export async function loadLevel(info, files, onVideoError, refused) {
+export async function loadLevel(info, files, onVideoError, refused, at = 0, like = null) {
   const [geometries, opened, reflection] = await allOrNothing([
-    loadMeshes(info, files),
-    import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused)),
+    sameMeshes(info, like?.info) ? like.geometries : loadMeshes(info, files),
+    import("./video/open.js").then(({ openVideo }) => openVideo(info, files, onVideoError, refused, at)),
     info.reflection ? loadPicture(info.reflection.file, files) : null,
   ]); // prettier-ignore
   const dispose = () => {
@@ -23,6 +25,13 @@ export async function loadLevel(info, files, onVideoError, refused) {
     opened.source.close();
   };
   return { info, geometries, reflection, source: opened.source, video: opened.video, dispose };
+}
+
+/** Levels that can be switched share them. */
+function sameMeshes(one, other) {
+  const said = ({ meshes, layers }) =>
+    JSON.stringify([meshes.map(({ sha256 }) => sha256), layers.map(({ mesh }) => mesh)]);
+  return Boolean(other && one.meshes.every(({ sha256 }) => sha256) && said(one) === said(other));
 }
 
 /** Each file once; the layers' meshes are parts of them. */

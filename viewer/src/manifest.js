@@ -9,10 +9,12 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  * @typedef {[number, number, number, number]} Rect x, y, width, height in pixels, y down
  * @typedef {{name: string, bytes: number, sha256: string}} FileEntry
  * @typedef {{mesh: {name: string, offset: number, bytes: number}, vertices: number, triangles: number, rect: Rect, window: number[]}} LayerEntry
- * @typedef {FileEntry & {codec: string, mime: string}} VideoEntry
+ * @typedef {{offset: number, bytes: number, sha256: string}} Part of a file
+ * @typedef {FileEntry & {codec: string, mime: string, init: Part | null, segments: (Part & {frames: number})[] | null,
+ *   playlist: string}} VideoEntry `playlist` of HLS, where there are segments
  * @typedef {{width: number, height: number, colourRect: Rect, alphaRect: Rect, frames: number, fps: number}} TextureEntry
  * @typedef {{name: string, meshes: FileEntry[], layers: LayerEntry[], texture: TextureEntry, videos: VideoEntry[],
- *   reflection: ReflectionEntry | null, bytes: number}} Level
+ *   reflection: ReflectionEntry | null, bytes: number, first: number}} Level `first`: bytes before its first picture
  * @typedef {{file: FileEntry, window: number[], environment: Rect, gloss: Rect, offset: Rect, normals: Rect,
  *   scales: number[]}} ReflectionEntry `scales` of environment, gloss and offset
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
@@ -92,11 +94,25 @@ function readManifest(value) {
     audio: value.audio
       ? { ...readFile(value.audio, value.audio.file, "audio"), mime: String(value.audio.mime ?? "") }
       : null,
-    poster: value.poster ? readFile(value.poster, value.poster.file, "poster") : null,
+    poster: value.poster ? readPoster(value.poster) : null,
+    bounds: value.bounds ? readBounds(value.bounds) : null,
     photos: (value.photos ?? []).map(readPhoto),
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
     view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
   };
+}
+
+/** What may show the same as the first picture: with its camera, and what is behind the layers. */
+function readPoster(entry) {
+  const { K, w2c, background, width, height } = entry;
+  const camera = K && w2c && background ? { K, w2c, width, height, background } : null;
+  return { ...readFile(entry, entry.file, "poster"), camera };
+}
+
+function readBounds({ min, max }) {
+  const [low, high] = [min, max].map((corner) => list(corner, "bounds").map(Number));
+  check([...low, ...high].every(Number.isFinite) && low.length === 3 && high.length === 3, "bounds is no box");
+  return { low, high, centre: low.map((v, i) => (v + high[i]) / 2) };
 }
 
 function readLevel(level, index) {
@@ -107,6 +123,7 @@ function readLevel(level, index) {
     ...readFile(video, video.file, `${place}.texture.videos[${i}]`),
     codec: String(video.codec),
     mime: String(video.mime),
+    ...readSegments(video, texture.frames, `${place}.texture.videos[${i}]`),
   }));
   check(videos.length > 0, `${place}.texture.videos is empty`);
   const layers = list(level.layers, `${place}.layers`).map((layer, i) => readLayer(layer, `${place}.layers[${i}]`));
@@ -127,7 +144,30 @@ function readLevel(level, index) {
     videos,
     reflection,
     bytes: count(level.bytes, `${place}.bytes`),
+    first: bytesBefore(meshes, videos[0]),
   };
+}
+
+function readSegments({ init, segments, file }, frames, place) {
+  if (!segments) return { init: null, segments: null, playlist: "" };
+  const part = (value, where) => ({
+    offset: count(value?.offset + 1, `${where}.offset`) - 1,
+    bytes: count(value.bytes, `${where}.bytes`),
+    sha256: String(value.sha256 ?? ""),
+  });
+  const read = list(segments, `${place}.segments`).map((segment, i) => ({
+    ...part(segment, `${place}.segments[${i}]`),
+    frames: count(segment.frames, `${place}.segments[${i}].frames`),
+  }));
+  const total = read.reduce((sum, segment) => sum + segment.frames, 0);
+  check(total === frames, `${place}.segments hold ${total} frames of ${frames}`);
+  return { init: part(init, `${place}.init`), segments: read, playlist: file.replace(/\.mp4$/, ".m3u8") };
+}
+
+/** Of the files of a level what its first picture needs. */
+function bytesBefore(meshes, { bytes, init, segments }) {
+  const video = segments ? init.bytes + segments[0].bytes : bytes;
+  return meshes.reduce((sum, file) => sum + file.bytes, video);
 }
 
 function readTexture(texture, place) {

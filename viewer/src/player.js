@@ -59,23 +59,34 @@ export class Player extends EventTarget {
   async load(files, want = "auto") {
     this.files = files;
     files.onProgress = () => this.say("progress");
+    files.onTrouble = (error) => this.fail(error);
+    import("./video/open.js").catch(() => {}); // wanted soon; said where a level waits for it
+    startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
     const text = await files.text("manifest.json");
     this.manifest = parseManifest(text, files.address("manifest.json"));
     this.say("progress");
-    startDecoder(files.onProgress).catch(() => {}); // said where a mesh waits for it
     this.view.setFilmed(this.manifest.view);
+    if (this.manifest.bounds) this.#settle(this.manifest.bounds);
     const { frames, fps } = this.manifest.levels.at(-1).texture;
     Object.assign(this.playback, { frames, fps });
     await this.detail.load(want, () => this.manifest.audio && this.#loadSound(this.manifest.audio));
   }
 
+  /** Of a long take the browser fetches the sound by itself, as it plays. */
   async #loadSound(entry) {
     try {
-      this.sound = new Sound(await this.files.bytes(entry), entry.mime);
+      const address = this.manifest.levels[0].videos[0].segments && this.files.addressFor?.(entry);
+      this.sound = address ? new Sound(address) : Sound.of(await this.files.bytes(entry), entry.mime);
       this.say("change");
     } catch (error) {
       this.fail(error);
     }
+  }
+
+  /** The first view fits what there is. */
+  #settle(box) {
+    this.home = box;
+    this.view.setHome(box);
   }
 
   /** Names of the levels that this machine can show, coarsest first. */
@@ -90,10 +101,7 @@ export class Player extends EventTarget {
     this.renderer.setLevel(level);
     this.#showLayers();
     this.#show(frame, picture);
-    if (!old) {
-      this.home = this.renderer.bounds();
-      this.view.setHome(this.home);
-    }
+    if (!old && !this.home) this.#settle(this.renderer.bounds());
     this.draw();
     old?.dispose();
     if (!old) this.say("ready");
@@ -176,6 +184,7 @@ export class Player extends EventTarget {
     this.view.resize(w, h, below);
     if (this.home) this.view.setHome(this.home);
     if (this.level) this.draw(); // at once: setting the size has emptied the canvas
+    this.say("resized");
   }
 
   /** Off the screen nothing is drawn, decoded or fetched. */

@@ -1,4 +1,4 @@
-/** What a layer's pixel is: docs/reference/asset-format.md, "A player in seven steps". Stored values in, stored values out. */
+/** What a layer's pixel is: docs/reference/asset-format.md, "A player in eight steps". Stored values in, stored values out. */
 
 /** Shared by all passes of a layer, so that their depths are equal bit for bit. */
 export const VERTEX = `#version 300 es

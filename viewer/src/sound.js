@@ -4,9 +4,14 @@ const DRIFT = 0.12; // s
 
 export class Sound {
   /** @param {ArrayBuffer} buffer an audio file that the browser knows @param {string} mime "" if it is not known */
-  constructor(buffer, mime = "") {
-    this.audio = new Audio(URL.createObjectURL(new Blob([buffer], { type: mime.split(";")[0] })));
-    this.audio.preload = "auto";
+  static of(buffer, mime) {
+    return new Sound(URL.createObjectURL(new Blob([buffer], { type: mime.split(";")[0] })));
+  }
+
+  /** @param {string} address of an audio file */
+  constructor(address) {
+    this.audio = new Audio(address);
+    this.audio.preload = address.startsWith("blob:") ? "auto" : "none";
     this.muted = true; // until somebody asks for sound: browsers refuse it before a click
   }
 

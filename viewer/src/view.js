@@ -4,7 +4,7 @@ import { connectGestures } from "./gestures.js";
 import { bounded, clamp, resisted, strength, unwound } from "./limits.js";
 import { transformed } from "./matrices.js";
 
-const FIELD_OF_VIEW = 30; // degrees, of the shorter side
+const FIELD_OF_VIEW = 30; // degrees; facefolds_core/packaging/poster.py has this and the next
 const HALF = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
 const FILLED = 0.92; // of the free part of the canvas, by what there is
 const EASE = 0.07; // s in which most of a movement is done
@@ -27,6 +27,7 @@ export class View {
     this.free = false; // limits are off: the layers are pulled apart
     this.inset = 0; // part of the height that the controls take, from below
     this.size = [1, 1];
+    this.shape = [1, 1]; // width and height of what the first view fits
     this.swaying = 0; // s since it began; 0: still
     this.eases = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.gestures = connectGestures(surface, this);
@@ -82,9 +83,12 @@ export class View {
     return this.swaying ? slow * SWAY.degrees * Math.sin(t) : 0;
   }
 
-  /** The first view: all that there is, from the front. @param {{low: number[], high: number[], centre: number[]}} box */
+  /**
+   * The first view: all that there is, from the front, and from the same place whatever the canvas is like, so that the
+   * asset's poster shows the same. @param {{low: number[], high: number[], centre: number[]}} box */
   setHome({ low, high, centre }) {
-    const away = this.distanceFor(high[1] - low[1], high[2] - low[2]);
+    this.shape = [high[1] - low[1], high[2] - low[2]];
+    const away = this.distanceFor(...this.shape);
     const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
     this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
     if (this.atHome && !this.exact) this.reset();
@@ -93,7 +97,7 @@ export class View {
   /** From how far something of that width and height fills the free part of the canvas. */
   distanceFor(across, tall) {
     const [width, height] = this.#room();
-    return (Math.min(width, height) * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
+    return (this.#side() * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
   }
 
   reset() {
@@ -189,7 +193,13 @@ export class View {
   /** Units of the scene in a CSS pixel at the target. */
   #unit() {
     const scale = this.surface.clientHeight / this.size[1] || 1;
-    return (2 * HALF * this.goal.distance) / (Math.min(...this.#room()) * scale);
+    return (2 * HALF * this.goal.distance) / (this.#side() * scale);
+  }
+
+  /** Of the square, in pixels, that the field of view is of: one that holds what there is fits the canvas just so. */
+  #side() {
+    const [[width, height], [across, tall]] = [this.#room(), this.shape];
+    return Math.min(width / across, height / tall) * Math.max(across, tall);
   }
 
   /** Pixels that the controls leave. */
@@ -219,11 +229,28 @@ export class View {
     const far = Math.max(0.1, depth + 1.05 * bounds.radius);
     const near = Math.max(0.005, far / 500, depth - 1.05 * bounds.radius);
     if (camera) return { view, projection: projectionOf(camera, width, height, near, far) };
-    const [w, h] = this.#room();
-    const scale = Math.min(width / this.size[0], height / this.size[1]);
-    const focal = (Math.min(w, h) * scale) / (2 * HALF);
-    const K = [[focal, 0, width / 2], [0, focal, (height - (this.size[1] - h) * scale) / 2], [0, 0, 1]]; // prettier-ignore
+    const K = this.#intrinsics(width, height);
     return { view, projection: projectionOf({ K, width, height }, width, height, near, far) };
+  }
+
+  #intrinsics(width, height) {
+    const hidden = this.size[1] - this.#room()[1];
+    const scale = Math.min(width / this.size[0], height / this.size[1]);
+    const focal = (this.#side() * scale) / (2 * HALF);
+    return [[focal, 0, width / 2], [0, focal, (height - hidden * scale) / 2], [0, 0, 1]]; // prettier-ignore
+  }
+
+  /**
+   * Where a picture would lie on the canvas to show what the view does.
+   * @param {{K: number[][], w2c: number[][]}} camera that took it
+   * @returns {{scale: number, left: number, top: number} | null} pixels of the canvas; null: it shows something else
+   */
+  placeOf({ K, w2c }) {
+    const [mine, its] = [orbitView(this.now), viewOf(w2c)];
+    if (this.exact || mine.some((v, i) => Math.abs(v - its[i]) > 2e-3)) return null;
+    const own = this.#intrinsics(...this.size);
+    const scale = own[0][0] / K[0][0];
+    return { scale, left: own[0][2] - scale * K[0][2], top: own[1][2] - scale * K[1][2] };
   }
 
   /** @param {number} inset pixels of the height that the controls take, from below */

@@ -6,6 +6,7 @@ import { eyeOf, transformed } from "../src/matrices.js";
 import { Adaptation } from "../src/adapt.js";
 import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
+import { Pace } from "../src/pace.js";
 import { Playback } from "../src/playback.js";
 import { droppedAsset } from "../src/ui/drop.js";
 import { matrixOf } from "../src/track.js";
@@ -198,6 +199,32 @@ test("manifests of older versions are read", () => {
   for (const spoilt of [{ levels: 1 }, { levels: [1] }, { levels: [{}] }])
     assert.throws(() => parseManifest(JSON.stringify({ ...older(2), ...spoilt }), "x"), /damaged/);
   assert.throws(() => parseManifest(JSON.stringify({ ...older(1), layers: 1 }), "x"), /damaged/);
+});
+
+test("segments are read, and must hold all frames", () => {
+  const value = manifest();
+  const [video] = value.levels[0].texture.videos;
+  const part = (offset, more = {}) => ({ offset, bytes: 3, sha256: "0", ...more });
+  Object.assign(video, { init: part(0), segments: [part(3, { frames: 1 }), part(6, { frames: 1 })] });
+  const [level] = parseManifest(JSON.stringify(value), "x").levels;
+  assert.equal(level.videos[0].segments[1].offset, 6);
+  assert.equal(level.videos[0].playlist, "full.m3u8");
+  assert.equal(level.first, 10 + 6); // meshes, header and first segment
+  video.segments[1].frames = 2;
+  assert.throws(() => parseManifest(JSON.stringify(value), "x"), /3 frames of 2/);
+});
+
+test("the connection's pace is that of the seconds in which something came", () => {
+  const pace = new Pace();
+  assert.equal(pace.rate, null);
+  pace.start(0);
+  pace.start(500); // two at once
+  pace.end(100000, 1000);
+  pace.end(100000, 2000);
+  assert.equal(pace.rate, 100000);
+  pace.start(60000); // the pause between counts for nothing
+  pace.end(900000, 63000);
+  assert.ok(pace.rate > 200000 && pace.rate < 300000);
 });
 
 test("a newer manifest that says so is read without what it added", () => {

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
-from facefolds_core.captures.actor.motion import PERIOD, head_pose
+from facefolds_core.captures.actor.motion import head_pose
 from facefolds_core.captures.actor.render import ActorOptions, Picture, render
 from facefolds_core.captures.actor.rig import ActorRig, make_rig
 from facefolds_core.files import atomic_folder
@@ -25,8 +25,8 @@ Progress = Callable[[], None]
 
 
 def frame_times(params: CaptureParams) -> NDArray[np.float64]:
-    """(frames,) seconds within the performance: one full cycle, so that the clip loops (of 12 frames: k / 30)."""
-    return np.arange(params.frames) / params.frames * PERIOD
+    """(frames,) seconds within the take: evenly spread, the last one a step before the end, so that the film loops."""
+    return np.arange(params.frames) / params.frames * params.seconds
 
 
 def options_of(params: CaptureParams) -> ActorOptions:

@@ -1,4 +1,4 @@
-"""Scalar building blocks in head millimetres: interpolation, distances, value noise. All compiled."""
+"""Scalar building blocks in head millimetres: interpolation, distances, rays, value noise. All compiled."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def mix(a: Vector, b: Vector, t: float) -> Vector:
 @compiled
 def smooth_min(a: float, b: float, k: float) -> float:
     """Polynomial smooth minimum (Quilez): differs from min(a, b) where |a - b| < k, by k / 4 at most."""
-    h = max(k - abs(a - b), 0.0) / k
-    return min(a, b) - h * h * k * 0.25
+    h = max(k - abs(a - b), 0.0)
+    return min(a, b) - h * h * (0.25 / k)
 
 
 @compiled
@@ -42,11 +42,15 @@ def smooth_max(a: float, b: float, k: float) -> float:
 @compiled
 def ellipsoid(x: float, y: float, z: float, rx: float, ry: float, rz: float) -> float:
     """Approximate signed distance to an ellipsoid at the origin (Quilez): exact to first order at the surface."""
-    k0 = math.sqrt((x / rx) ** 2 + (y / ry) ** 2 + (z / rz) ** 2)
-    k1 = math.sqrt((x / (rx * rx)) ** 2 + (y / (ry * ry)) ** 2 + (z / (rz * rz)) ** 2)
-    if k1 < 1e-9:
+    # Radii are constants where this is called: their reciprocals are, too, once it is built in there.
+    ix, iy, iz = 1.0 / rx, 1.0 / ry, 1.0 / rz
+    x, y, z = x * ix, y * iy, z * iz
+    square = x * x + y * y + z * z
+    x, y, z = x * ix, y * iy, z * iz
+    slope = math.sqrt(x * x + y * y + z * z)
+    if slope < 1e-9:
         return -min(rx, ry, rz)
-    return k0 * (k0 - 1.0) / k1
+    return (square - math.sqrt(square)) / slope
 
 
 @compiled
@@ -78,3 +82,17 @@ def value_noise(x: float, y: float, z: float, seed: int) -> float:
     c = hash3(i, j, k + 1, seed) * (1 - u) + hash3(i + 1, j, k + 1, seed) * u
     d = hash3(i, j + 1, k + 1, seed) * (1 - u) + hash3(i + 1, j + 1, k + 1, seed) * u
     return (a * (1 - v) + b * v) * (1 - w) + (c * (1 - v) + d * v) * w
+
+
+@compiled
+def span(o: Vector, d: Vector, centre: Vector, radius: float, spread: float) -> tuple[float, float]:
+    """Distances at which the cone about the ray (o, d), `spread` mm wider a mm, enters a sphere and has left it.
+
+    They are the same where it passes by; neither is negative.
+    """
+    x, y, z = o[0] - centre[0], o[1] - centre[1], o[2] - centre[2]
+    b = x * d[0] + y * d[1] + z * d[2]
+    radius += spread * (max(-b, 0.0) + radius)
+    root = b * b - (x * x + y * y + z * z - radius * radius)
+    half = math.sqrt(root) if root > 0.0 else 0.0
+    return max(-b - half, 0.0), max(-b + half, 0.0)

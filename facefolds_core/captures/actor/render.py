@@ -14,12 +14,14 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.hair import STEP, density, envelope, hair_colour
+from facefolds_core.captures.actor.hair import march
+from facefolds_core.captures.actor.hair import reach as hair_reach
 from facefolds_core.captures.actor.motion import BALL, NOSE, head_pose, pose_at
-from facefolds_core.captures.actor.noise import Vector
+from facefolds_core.captures.actor.noise import Vector, span
 from facefolds_core.captures.actor.room import room_colour
 from facefolds_core.captures.actor.shade import surface_colour
-from facefolds_core.captures.actor.shape import normal, surface, trace
+from facefolds_core.captures.actor.shape import AROUND, RADIUS, normal, surface, trace
+from facefolds_core.captures.actor.shape import reach as shape_reach
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.jit import compiled, kernel
 
@@ -29,8 +31,8 @@ _DIFFERENT = 0.1
 """Neighbours that differ by more than this in a colour or in opacity are sampled more finely."""
 EXPOSURES = 5
 """Sharp pictures in one that is exposed for a while."""
-_BOUND = 480.0
-"""Everything opaque lies within this distance of the head's origin, mm."""
+_TILE = 4
+"""Pixels: the rays of so large a square start together, where the first of them may meet something."""
 
 # Unit direction to the light (head standing still: x to its left, y up, z forward) and colour. The key light comes from
 # above, in front of the left cheek; then a fill from the window's side and two rims from behind.
@@ -93,45 +95,50 @@ class Picture:
 
 
 @compiled
-def _hair(
-    o: Vector, d: Vector, far: float, lights: Array, amount: float, gloss: float, seed: int
-) -> tuple[float, float, float, float]:
-    """March a ray through the hair up to `far`: (red, green, blue) of the hair times its cover, and transmittance."""
-    red, green, blue, through = 0.0, 0.0, 0.0, 1.0
-    b = o[0] * d[0] + (o[1] - 5.0) * d[1] + (o[2] + 10.0) * d[2]
-    c = o[0] * o[0] + (o[1] - 5.0) ** 2 + (o[2] + 10.0) ** 2 - 150.0**2
-    root = b * b - c
-    if amount <= 0.0 or root <= 0.0:
-        return red, green, blue, through
-    t, stop = -b - math.sqrt(root), min(-b + math.sqrt(root), far)
-    view = (-d[0], -d[1], -d[2])
-    while t < stop:
-        x, y, z = o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]
-        outside = envelope(x, y, z)
-        if outside > 10.0:
-            t += max(0.8 * (outside - 8.0), STEP)
-            continue
-        step = min(STEP, stop - t)
-        half = t + 0.5 * step
-        x, y, z = o[0] + half * d[0], o[1] + half * d[1], o[2] + half * d[2]
-        extinction, depth, locks, fine = density(x, y, z, amount, seed)
-        if extinction > 1e-4:
-            cover = 1.0 - math.exp(-extinction * step)
-            r, g, bl = hair_colour(x, y, z, view, depth, locks, fine, lights, gloss)
-            red += through * cover * r
-            green += through * cover * g
-            blue += through * cover * bl
-            through *= 1.0 - cover
-            if through < 0.01:
-                return red, green, blue, 0.0
-        t += step
-    return red, green, blue, through
+def _ray(u: float, v: float, to_world: Array, centre: Array, frame: Array) -> tuple[Vector, Vector, Vector, float]:
+    """The ray through continuous image coordinates (u, v): direction in the world; origin, direction in the head; mm
+    along the ray a mm along the optical axis.
+    """
+    wx = to_world[0, 0] * u + to_world[0, 1] * v + to_world[0, 2]
+    wy = to_world[1, 0] * u + to_world[1, 1] * v + to_world[1, 2]
+    wz = to_world[2, 0] * u + to_world[2, 1] * v + to_world[2, 2]
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    w = (wx / length, wy / length, wz / length)
+    # Into the head's frame: X = R^T (X_w - t).
+    a = (centre[0] - frame[0, 3], centre[1] - frame[1, 3], centre[2] - frame[2, 3])
+    return w, _turned(frame, a), _turned(frame, w), length
+
+
+@compiled
+def _turned(frame: Array, a: Vector) -> Vector:
+    """R^T a."""
+    return (
+        frame[0, 0] * a[0] + frame[1, 0] * a[1] + frame[2, 0] * a[2],
+        frame[0, 1] * a[0] + frame[1, 1] * a[1] + frame[2, 1] * a[2],
+        frame[0, 2] * a[0] + frame[1, 2] * a[1] + frame[2, 2] * a[2],
+    )
+
+
+@compiled
+def _starts(i: int, j: int, to_world: Array, centre: Array, frame: Array, pose: Array) -> tuple[float, float]:
+    """For a tile of pixels: how far along its rays there is no surface, and how far no hair."""
+    u, v = (j + 0.5) * _TILE, (i + 0.5) * _TILE
+    _, o, d, _ = _ray(u, v, to_world, centre, frame)
+    spread = 0.0
+    for a in range(2):
+        for b in range(2):
+            # Samples lie up to 0.38 beyond a pixel's centre, so within the tile.
+            _, _, e, _ = _ray(u + (a - 0.5) * _TILE, v + (b - 0.5) * _TILE, to_world, centre, frame)
+            cosine = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
+            spread = max(spread, math.sqrt(max(1.0 - cosine * cosine, 0.0)))
+    return shape_reach(o, d, 1.02 * spread, pose), hair_reach(o, d, 1.02 * spread)
 
 
 @compiled
 def _sample(
     u: float,
     v: float,
+    starts: tuple[float, float],
     to_world: Array,
     centre: Array,
     frame: Array,
@@ -140,43 +147,30 @@ def _sample(
     settings: Array,
     seed: int,
 ) -> tuple[float, float, float, float, float]:
-    """One ray through continuous image coordinates (u, v): colour, opacity, distance along the ray (inf for none)."""
-    wx = to_world[0, 0] * u + to_world[0, 1] * v + to_world[0, 2]
-    wy = to_world[1, 0] * u + to_world[1, 1] * v + to_world[1, 2]
-    wz = to_world[2, 0] * u + to_world[2, 1] * v + to_world[2, 2]
-    length = math.sqrt(wx * wx + wy * wy + wz * wz)
-    wx, wy, wz = wx / length, wy / length, wz / length
-    # Into the head's frame: X = R^T (X_w - t).
-    ax, ay, az = centre[0] - frame[0, 3], centre[1] - frame[1, 3], centre[2] - frame[2, 3]
-    o = (
-        frame[0, 0] * ax + frame[1, 0] * ay + frame[2, 0] * az,
-        frame[0, 1] * ax + frame[1, 1] * ay + frame[2, 1] * az,
-        frame[0, 2] * ax + frame[1, 2] * ay + frame[2, 2] * az,
-    )
-    d = (
-        frame[0, 0] * wx + frame[1, 0] * wy + frame[2, 0] * wz,
-        frame[0, 1] * wx + frame[1, 1] * wy + frame[2, 1] * wz,
-        frame[0, 2] * wx + frame[1, 2] * wy + frame[2, 2] * wz,
-    )
+    """One ray through continuous image coordinates (u, v): colour, opacity, depth of the surface (inf for none).
+
+    Args:
+        starts: distances along the ray before which there is no surface, and no hair.
+    """
+    w, o, d, length = _ray(u, v, to_world, centre, frame)
     gloss, amount, colourfulness, clutter = settings[0], settings[1], settings[2], settings[3]
-    b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
-    root = b * b - (o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - _BOUND * _BOUND)
     hit = math.inf
+    if starts[0] < math.inf:
+        _, far = span(o, d, AROUND, RADIUS, 0.0)
+        hit = trace(o[0], o[1], o[2], d[0], d[1], d[2], starts[0], far, pose)
     red, green, blue, through = 0.0, 0.0, 0.0, 1.0
-    if root > 0.0:
-        half = math.sqrt(root)
-        hit = trace(o[0], o[1], o[2], d[0], d[1], d[2], max(-b - half, 0.0), -b + half, pose)
-        red, green, blue, through = _hair(o, d, hit, lights, amount, gloss, seed)
+    if starts[1] < hit:
+        red, green, blue, through = march(o, d, starts[1], hit, lights, amount, gloss, seed)
     if through <= 0.0:
-        return red, green, blue, 1.0, hit
+        return red, green, blue, 1.0, hit / length
     if hit < math.inf:
         p = (o[0] + hit * d[0], o[1] + hit * d[1], o[2] + hit * d[2])
         _, material = surface(p[0], p[1], p[2], pose)
         n = normal(p[0], p[1], p[2], pose)
         r, g, bl = surface_colour(p, n, (-d[0], -d[1], -d[2]), material, pose, lights, gloss, seed)
-        return red + through * r, green + through * g, blue + through * bl, 1.0, hit
-    r, g, bl = room_colour(centre[0], centre[1], centre[2], wx, wy, wz, colourfulness, clutter)
-    return red + through * r, green + through * g, blue + through * bl, 1.0 - through, hit
+        return red + through * r, green + through * g, blue + through * bl, 1.0, hit / length
+    r, g, bl = room_colour(centre[0], centre[1], centre[2], w[0], w[1], w[2], colourfulness, clutter)
+    return red + through * r, green + through * g, blue + through * bl, 1.0 - through, math.inf
 
 
 @compiled
@@ -202,30 +196,41 @@ def _render_samples(
     lights: Array,
     settings: Array,
     seed: int,
-) -> tuple[Array, Array]:
-    """(H, W, 5) red, green, blue, opacity and ray distance at pixel centres, and (H, W, 4) anti-aliased."""
+) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
+    """Anti-aliased rgb (H, W, 3) and opacity (H, W), and depth (H, W) at pixel centres."""
+    starts = np.empty(((height - 1) // _TILE + 1, (width - 1) // _TILE + 1, 2))
+    for i in prange(starts.shape[0]):
+        for j in range(starts.shape[1]):
+            starts[i, j] = _starts(i, j, to_world, centre, frame, pose)
     first = np.empty((height, width, 5))
     for i in prange(height):
         for j in range(width):
-            r, g, b, a, t = _sample(j + 0.5, i + 0.5, to_world, centre, frame, pose, lights, settings, seed)
+            start = (starts[i // _TILE, j // _TILE, 0], starts[i // _TILE, j // _TILE, 1])
+            r, g, b, a, t = _sample(j + 0.5, i + 0.5, start, to_world, centre, frame, pose, lights, settings, seed)
             first[i, j, 0], first[i, j, 1], first[i, j, 2] = min(r, 1.0), min(g, 1.0), min(b, 1.0)
             first[i, j, 3], first[i, j, 4] = a, t
-    smooth = np.empty((height, width, 4))
+    rgb = np.empty((height, width, 3), np.uint8)
+    opacity, depth = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     for i in prange(height):
+        smooth = np.empty(4)
         for j in range(width):
-            smooth[i, j] = first[i, j, :4]
+            smooth[:] = first[i, j, :4]
             if _differs(first, i, j):
+                start = (starts[i // _TILE, j // _TILE, 0], starts[i // _TILE, j // _TILE, 1])
                 for k in range(3):
                     # A triangle about the centre, turned so that no two samples share a row or a column.
                     angle = 2.0 * math.pi * (k / 3.0 + 0.04)
                     u, v = j + 0.5 + 0.38 * math.cos(angle), i + 0.5 + 0.38 * math.sin(angle)
-                    r, g, b, a, _ = _sample(u, v, to_world, centre, frame, pose, lights, settings, seed)
-                    smooth[i, j, 0] += min(r, 1.0)
-                    smooth[i, j, 1] += min(g, 1.0)
-                    smooth[i, j, 2] += min(b, 1.0)
-                    smooth[i, j, 3] += a
-                smooth[i, j] *= 0.25
-    return first, smooth
+                    r, g, b, a, _ = _sample(u, v, start, to_world, centre, frame, pose, lights, settings, seed)
+                    smooth[0] += min(r, 1.0)
+                    smooth[1] += min(g, 1.0)
+                    smooth[2] += min(b, 1.0)
+                    smooth[3] += a
+                smooth *= 0.25
+            for c in range(3):
+                rgb[i, j, c] = int(np.rint(255.0 * smooth[c]))
+            opacity[i, j], depth[i, j] = smooth[3], first[i, j, 4]
+    return rgb, opacity, depth
 
 
 def render(camera: Camera, time: float, options: ActorOptions | None = None, seed: int = 0) -> Picture:
@@ -249,7 +254,7 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
     lights[:, :3] = _LIGHTS[:, :3] @ np.diag([1.0, -1.0, -1.0]) @ rotation
     to_world = np.ascontiguousarray(camera.rotation.T @ np.linalg.inv(camera.K))
     settings = np.array([options.gloss, options.hair_density, options.room_colour, options.clutter])
-    first, smooth = _render_samples(
+    rgb, opacity, depth = _render_samples(
         camera.height,
         camera.width,
         to_world,
@@ -260,13 +265,7 @@ def render(camera: Camera, time: float, options: ActorOptions | None = None, see
         settings,
         seed,
     )
-    rays = camera.rays()[1]
-    along_axis = rays @ camera.forward
-    return Picture(
-        rgb=np.rint(255 * np.clip(smooth[..., :3], 0, 1)).astype(np.uint8),
-        opacity=np.clip(smooth[..., 3], 0, 1).astype(np.float32),
-        depth=(first[..., 4] * along_axis).astype(np.float32),
-    )
+    return Picture(rgb, opacity, depth)
 
 
 def _exposed(camera: Camera, time: float, options: ActorOptions, seed: int) -> Picture:

@@ -11,9 +11,9 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams
 
 DISTANCE = 1000.0
-TARGET = (0.0, -12.0, 0.0)
+TARGET = (0.0, -30.0, 0.0)
 """What the cameras look at, head frame, mm."""
-_FIELD = (226.0, 345.0)
+_FIELD = (240.0, 366.0)
 """Width and height in mm at the head that fit into every picture."""
 _MAX_AZIMUTH = 75.0
 _ELEVATIONS = (-25.0, 35.0)

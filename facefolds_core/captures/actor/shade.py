@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.hair import envelope
+from facefolds_core.captures.actor.clothes import shirt_paint
+from facefolds_core.captures.actor.hair import envelope, roots
 from facefolds_core.captures.actor.motion import BLINK, BROW, GAZE_X, GAZE_Y
 from facefolds_core.captures.actor.noise import Vector, clamp, hash3, mix, smoothstep, value_noise
 from facefolds_core.captures.actor.shape import (
@@ -101,12 +102,12 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     if zr > 40.0 and yr < -40.0:
         lip = lip_mask(xr, yr)
         wrinkle = value_noise(xr / 1.3, yr / 7.0, 0.5, seed + 3)
-        colour = mix(colour, (0.70 + 0.06 * wrinkle, 0.33, 0.30), 0.80 * lip)
-        gloss += 0.55 * lip * (0.5 + wrinkle)
+        colour = mix(colour, (0.70 + 0.06 * wrinkle, 0.35, 0.32), 0.74 * lip)
+        gloss += 0.40 * lip * (0.5 + wrinkle)
         height, edge, _ = mouth_gap(x, pose)
         if abs(x) < MOUTH_HALFWIDTH + 3.0:
             line = abs(y - edge) if height < 1.0 else 99.0
-            colour = mix(colour, (0.22, 0.07, 0.06), 0.85 * smoothstep(1.5, 0.3, line) * smoothstep(27.0, 23.0, abs(x)))
+            colour = mix(colour, (0.22, 0.07, 0.06), 0.85 * smoothstep(1.5, 0.3, line) * smoothstep(26.0, 22.0, ax))
             if abs(y - edge + 0.5 * height) < 0.5 * height - 0.3 and z < 84.0:
                 # Inside the mouth.
                 colour = mix((0.42, 0.10, 0.10), (0.10, 0.02, 0.02), smoothstep(84.0, 60.0, z))
@@ -117,7 +118,7 @@ def _skin_paint(x: float, y: float, z: float, pose: NDArray[np.float64], seed: i
     nostril = math.exp(-(((ax - 6.2) / 3.0) ** 2) - ((yr + 45.5) / 1.8) ** 2) * smoothstep(85.0, 88.0, zr)
     nostril *= smoothstep(98.0, 95.0, zr)
     colour = mix(colour, (0.20, 0.07, 0.05), 0.9 * clamp(1.4 * nostril, 0.0, 1.0))
-    scalp = smoothstep(-1.0, -7.0, envelope(x, y, z))
+    scalp = roots(x, y, z, seed)
     return mix(colour, (0.17, 0.10, 0.06), 0.9 * scalp), gloss * (1.0 - scalp)
 
 
@@ -168,7 +169,7 @@ def _teeth_paint(x: float, y: float, z: float) -> Vector:
     """Ivory, a dark line between neighbours, darker to the back."""
     angle = math.atan2(x, max(z - 64.0, 0.1)) * 21.0
     gap = abs((angle / 7.0) % 1.0 - 0.5) * 2.0
-    light = (1.0 - 0.45 * smoothstep(0.8, 1.0, 1.0 - gap)) * (0.45 + 0.55 * smoothstep(70.0, 84.0, z))
+    light = (1.0 - 0.30 * smoothstep(0.9, 1.0, 1.0 - gap)) * (0.45 + 0.60 * smoothstep(68.0, 82.0, z))
     return 0.93 * light, 0.89 * light, 0.80 * light
 
 
@@ -185,8 +186,7 @@ def paint(
     if material == TEETH:
         return _teeth_paint(x, y, z), 0.6, 60.0
     if material == SHIRT:
-        knit = 0.94 + 0.12 * value_noise(x / 2.5, y / 6.0, z / 2.5, seed + 51)
-        return (0.16 * knit, 0.25 * knit, 0.40 * knit), 0.05, 10.0
+        return shirt_paint(x, y, z, seed), 0.05, 10.0
     if material == PROP:
         stripe = smoothstep(-0.3, 0.3, math.sin(0.45 * (x + y)))
         return mix((0.82, 0.68, 0.16), (0.14, 0.34, 0.30), stripe), 0.1, 20.0
@@ -208,12 +208,12 @@ def occlusion(x: float, y: float, z: float, n: Vector, pose: NDArray[np.float64]
 def shadow(x: float, y: float, z: float, lx: float, ly: float, lz: float, pose: NDArray[np.float64]) -> float:
     """Soft shadow towards a light, 0 to 1 (Quilez's penumbra estimate)."""
     lit, t = 1.0, 4.0
-    for _ in range(8):
+    for _ in range(6):
         d = distance(x + t * lx, y + t * ly, z + t * lz, pose)
         lit = min(lit, 5.0 * d / t)
-        if lit < 0.02 or t > 90.0:
+        if lit < 0.02 or t > 60.0:
             break
-        t += clamp(d, 3.0, 20.0)
+        t += clamp(d, 4.0, 25.0)
     return smoothstep(0.0, 1.0, lit)
 
 
@@ -239,7 +239,7 @@ def surface_colour(
     """
     albedo, shine, exponent = paint(p[0], p[1], p[2], material, pose, seed)
     open_sky = occlusion(p[0], p[1], p[2], n, pose)
-    under_hair = 0.50 + 0.50 * smoothstep(-3.0, 9.0, envelope(p[0], p[1], p[2]))
+    under_hair = 0.55 + 0.45 * smoothstep(-4.0, 8.0, envelope(p[0], p[1], p[2]))
     # Light scattered in skin reddens where it grazes.
     wrap = 0.30 if material == SKIN else 0.1
     up = 0.5 + 0.5 * n[1]

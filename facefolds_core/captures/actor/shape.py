@@ -4,7 +4,7 @@ The eyes lie at y = 0, the mouth at y = -67, the chin at y = -114, the top of th
 approximate (blended ellipsoids), right to first order at the surface and never much too long, so that sphere tracing
 with a shortened step finds the first crossing.
 
-The jaw and the smile move the face by a warp: a point is carried back to the rest pose and measured there. The mouth
+Jaw, smile and pucker move the face by a warp: a point is carried back to the rest pose and measured there. The mouth
 and the eyes open as slots cut into the skin.
 """
 
@@ -15,9 +15,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.actor.motion import BALL, BLINK, BROW, JAW, NOSE, SMILE
-from facefolds_core.captures.actor.noise import Vector, clamp, cone, ellipsoid, smooth_max, smooth_min, smoothstep
+from facefolds_core.captures.actor.clothes import CUT_MARGIN, bust, shirt
+from facefolds_core.captures.actor.motion import BALL, BLINK, BROW, JAW, NOSE, PUCKER, SMILE
+from facefolds_core.captures.actor.noise import Vector, clamp, cone, ellipsoid, smooth_max, smooth_min, smoothstep, span
 from facefolds_core.jit import compiled
+
+AROUND: Vector = (0.0, -25.0, 20.0)
+RADIUS = 240.0
+"""A sphere that holds all that is opaque, mm; a prop before the face, too."""
 
 SKIN, EYE, TEETH, TONGUE, SHIRT, PROP = range(6)
 """Materials."""
@@ -62,9 +67,9 @@ def eye_slot(ex: float, ey: float, blink: float) -> float:
 @compiled
 def mouth_gap(x: float, pose: NDArray[np.float64]) -> tuple[float, float, float]:
     """The opening of the mouth at x: (height in mm, y of its upper edge, half its width)."""
-    half = MOUTH_HALFWIDTH - 3.0 * pose[JAW] + 3.5 * pose[SMILE]
+    half = MOUTH_HALFWIDTH - 3.0 * pose[JAW] + 3.5 * pose[SMILE] - 7.5 * pose[PUCKER]
     s = x / half
-    height = _JAW_DROP * pose[JAW] * max(1.0 - s * s, 0.0) ** 0.75
+    height = _JAW_DROP * pose[JAW] * max(1.0 - s * s, 0.0) ** (0.75 - 0.2 * pose[PUCKER])
     return height, MOUTH_Y + 1.5 * pose[JAW] * max(1.0 - s * s, 0.0) + 4.0 * pose[SMILE] * s * s, half
 
 
@@ -82,6 +87,11 @@ def to_rest(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
             z += 0.22 * shift
     if z > 20.0 and y < 15.0:
         ax = abs(x)
+        # Rounded lips are narrower and stand out.
+        if pose[PUCKER] > 0.0 and y < -20.0:
+            pucker = pose[PUCKER] * math.exp(-((ax / 30.0) ** 2) - ((y - MOUTH_Y) / 17.0) ** 2)
+            x *= 1.0 + 0.38 * pucker
+            z -= 6.5 * pucker
         smile = pose[SMILE] * math.exp(-(((ax - 27.0) / 17.0) ** 2) - ((y - MOUTH_Y - 3.0) / 15.0) ** 2)
         x -= math.copysign(3.5, x) * smile
         y -= 4.0 * smile
@@ -186,18 +196,6 @@ def _teeth(x: float, y: float, z: float, centre: float, halfheight: float) -> fl
 
 
 @compiled
-def shirt(x: float, y: float, z: float) -> float:
-    """Signed distance to the shoulders with a round collar, mm."""
-    ax = abs(x)
-    d = ellipsoid(ax - 62.0, y + 262.0, z + 38.0, 135.0, 84.0, 74.0)
-    d = smooth_min(d, ellipsoid(x, y + 300.0, z + 25.0, 130.0, 130.0, 95.0), 25.0)
-    tilt = y + 172.0 + 0.22 * (z + 36.0)
-    # A rounded disc that the neck pierces, so that nothing shows between them.
-    beyond = max(math.sqrt(x * x + (z + 36.0) ** 2) - 56.0, 0.0)
-    return smooth_min(d, math.sqrt(beyond * beyond + tilt * tilt) - 7.0, 12.0)
-
-
-@compiled
 def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[float, int]:
     """Signed distance to all that is opaque, mm, and the material that is nearest."""
     xr, yr, zr = to_rest(x, y, z, pose)
@@ -225,8 +223,12 @@ def surface(x: float, y: float, z: float, pose: NDArray[np.float64]) -> tuple[fl
             tongue = ellipsoid(x, y - MOUTH_Y + 0.8 * middle + 5.0, z - 62.0, 15.0, 7.0, 18.0)
             if tongue < d:
                 d, material = tongue, TONGUE
-    if y < -110.0:
-        cloth = shirt(x, y, z)
+    if y < -120.0:
+        cut = bust(x, y, z)
+        if y < -145.0:
+            # The neck ends inside of the clothes; the chin never comes down here.
+            d = max(d, cut + CUT_MARGIN)
+        cloth = shirt(x, y, z, cut)
         if cloth < d:
             d, material = cloth, SHIRT
     if pose[BALL] > 0.0:
@@ -256,16 +258,36 @@ def normal(x: float, y: float, z: float, pose: NDArray[np.float64]) -> Vector:
 
 
 @compiled
+def reach(o: Vector, d: Vector, spread: float, pose: NDArray[np.float64]) -> float:
+    """How far along all rays of a cone about (o, d), `spread` mm wider a mm, there surely is no surface; inf: all."""
+    t, far = span(o, d, AROUND, RADIUS, spread)
+    while t < far:
+        clear = distance(o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2], pose) - spread * t
+        if clear < 1.0:
+            return t
+        t += max(0.8 * clear, 1.0)
+    return math.inf
+
+
+@compiled
 def trace(
     ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, near: float, far: float, pose: NDArray[np.float64]
 ) -> float:
-    """Distance along the unit ray to the first crossing of the surface, inf where there is none before `far`."""
-    t = near
+    """Distance along the unit ray to the first crossing of the surface, inf where there is none before `far`.
+
+    Sphere tracing; close to the surface the last two distances tell how steeply the ray meets it, and the next step
+    goes where the line through them is zero: half as many steps. From below the surface it steps back, once.
+    """
+    t, step, before, turned = near, 0.0, 0.0, False
     for _ in range(160):
         d = distance(ox + t * dx, oy + t * dy, oz + t * dz, pose)
-        if d < 0.03:
+        if d < 0.03 and (d > -0.03 or turned):
             return t
-        t += d * (0.97 if d > 12.0 else 0.8)
+        turned |= d < 0.0
+        slope = (before - d) / step if step != 0.0 else 9.0
+        step = d * (0.97 if d > 12.0 else 0.8) if d > 3.0 or slope > 1.25 else d / max(slope, 0.4)
+        before = d
+        t += step
         if t > far:
             break
     return math.inf

@@ -11,4 +11,4 @@ from facefolds_core.params import CaptureParams, Subject
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
     """As `read_multiface`, at the rate that the actor was filmed with."""
-    return read_multiface(root, subject, params.fps)
+    return read_multiface(root, subject, params.frame_rate)

@@ -4,6 +4,7 @@ crossings. Under two minutes, so that an interrupted run simply starts again."""
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from dvclive.live import Live
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.model.grids import GridTextures
@@ -26,6 +27,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
+from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
@@ -59,6 +61,30 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
         UserError: if an image is missing, nothing stands out from the background, or training diverges even at small
             learning rates.
     """
+    return fit_with_surroundings(scene, params, log, place)[0]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a training found out beside the model, and what frames are fitted with that come later.
+
+    Attributes:
+        splits: of the scene's cameras; of those that contradict the others "out".
+        gains: (C, 3) of the training cameras that are left.
+        background: (C, pixels, 3) float32, of the same.
+        rate: the learning rate that it ended with.
+    """
+
+    splits: tuple[Split, ...]
+    gains: NDArray[np.float64]
+    background: NDArray[np.float32]
+    rate: float
+
+
+def fit_with_surroundings(
+    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None
+) -> tuple[Trained, Surroundings]:
+    """`fit_explicit`, and what else was found out."""
     check_images(scene)
     device = pick_device(params.device)
     began = time.perf_counter()
@@ -87,7 +113,10 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
         time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
     )
     draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
-    return Trained(model, spec, report, trainer.summary(spec), draw)
+    assert trainer.state is not None
+    background = trainer.state.background.cpu().numpy()
+    surroundings = Surroundings(cameras.scene.splits, cameras.gains, background, trainer.rate)
+    return Trained(model, spec, report, trainer.summary(spec), draw), surroundings
 
 
 class _Trainer:
@@ -254,11 +283,7 @@ class _Trainer:
         state, n = self.state, self.params.layers
         state.forget_moments()
         assert self.views is not None
-        least = self.params.pruning.texel_opacity
-        hidden = state.contributions(self.views, self._stride()) < least
-        hidden |= state.beside(self.params.start.beside_opacity)
-        state.hide(hidden)
-        self.events.append(fact("texels_cleared", share=float(hidden.float().mean()), least=least))
+        self.events += clear_texels(state, self.views, self._stride(), self.params)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.

@@ -225,12 +225,19 @@ class TextureState:
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
-        for logits in (self.layers[0, ..., 3], self.frame_alpha[0, frame]):
-            if self.device.type == "cpu":
-                smoothed = torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape))
-            else:
-                smoothed = smooth_reference(logits, *self.shape)
-            logits.copy_(smoothed)
+        self._smooth(self.layers[0, ..., 3])
+        self.smooth_frame(frame)
+
+    def smooth_frame(self, frame: int) -> None:
+        """The same of one frame alone."""
+        self._smooth(self.frame_alpha[0, frame])
+
+    def _smooth(self, logits: Tensor) -> None:
+        if self.device.type == "cpu":
+            smoothed = torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape))
+        else:
+            smoothed = smooth_reference(logits, *self.shape)
+        logits.copy_(smoothed)
 
     def look(self, views: Views, images: NDArray[np.uint8], frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""

@@ -130,11 +130,19 @@ class MovingRays:
         stride: of the pixels that there are, as in `trace_views`.
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how many shares a frame has in use, and how much is kept.
+        first: number of the first share of frame 0.
     """
 
     def __init__(
-        self, scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams
+        self,
+        scene: Scene,
+        manifolds: RadialManifolds,
+        stride: int,
+        share: float,
+        params: MovingParams,
+        first: int = 0,
     ) -> None:
+        self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
         self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
@@ -151,7 +159,7 @@ class MovingRays:
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
         """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""
         turn, rest = phase % self._used, phase // self._used
-        number = (frame * self._used + turn) % self.shares
+        number = (self._first + frame * self._used + turn) % self.shares
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)

@@ -105,6 +105,14 @@ def bounding_box(cameras: list[Camera], params: VolumeParams) -> tuple[NDArray[n
     return kept.min(0) - half, kept.max(0) + half
 
 
+def volume_frames(scene: Scene, params: ExplicitParams) -> list[int]:
+    """The frame that a volume is fitted to, and of a head that turns others, spread over the take."""
+    if scene.poses is None:
+        return [scene.num_frames // 2]
+    spread = np.linspace(0, scene.num_frames - 1, params.moving.volume_frames - 1)
+    return list(dict.fromkeys([scene.poses.nearest(), *(round(k) for k in spread)]))
+
+
 class VolumeFit:
     """A fit to the middle frame, level by level; of a head that turns, to the frame nearest its mean pose and some
     others (`train.moving.volume_frames`): in each of them the cameras see it from elsewhere.
@@ -123,8 +131,8 @@ class VolumeFit:
     def __init__(self, scene: Scene, params: ExplicitParams, outer: bool) -> None:
         indices = scene.indices("train")
         self.params, self.outer = params, outer
-        self.frame = scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
-        self.views = posed_photos(scene, indices, self._frames(scene))
+        self.frame = volume_frames(scene, params)[0]
+        self.views = posed_photos(scene, indices, volume_frames(scene, params))
         self.cameras = [view.camera for view in self.views]
         self.lower, self.upper = bounding_box(self.cameras, params.volume)
         self.random = np.random.default_rng(params.seed)
@@ -135,13 +143,6 @@ class VolumeFit:
         self.voxel = self.psnr = 0.0
         self.found = CameraFit.alike(len(indices), params.cameras)
         self.rays: Rays | None = None
-
-    def _frames(self, scene: Scene) -> list[int]:
-        """`frame`, and of a head that turns others, spread over the take."""
-        if scene.poses is None:
-            return [self.frame]
-        spread = np.linspace(0, scene.num_frames - 1, self.params.moving.volume_frames - 1)
-        return list(dict.fromkeys([self.frame, *(round(k) for k in spread)]))
 
     def run(self, number: int, bar: tqdm) -> None:
         """One level; `bar` is advanced by one an iteration.

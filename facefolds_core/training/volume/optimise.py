@@ -29,7 +29,8 @@ class Rays:
 
     Attributes:
         room_origins, room_directions: (R, 3) the same rays in the room's frame: a head may turn in it.
-        plate: (R, 3) what is behind the subject, NaN where it is not known.
+        plate: (R, 3) what is behind the subject, NaN where it is not known. Where a matte says that there is no
+            subject, it is what the ray shows.
         matte: (R,) opacity of the subject, -1 where it is not known.
     """
 
@@ -74,6 +75,9 @@ def rays_of(views: Sequence[PosedPhoto], voxel: float, reduced: float) -> Rays:
 
         colours, plate, matte = small(photo.image), small(photo.plate), small(photo.matte)
         assert colours is not None
+        if matte is not None:
+            plate = np.full_like(colours, np.nan) if plate is None else plate
+            plate = np.where(np.isnan(plate) & (matte == 0), colours, plate)
         parts.append(
             Rays(
                 origins=origins,

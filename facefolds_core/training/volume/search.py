@@ -30,7 +30,9 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     params = in_ball(scene.radius, params)
     plain, notes = VolumeFit(scene, params, outer=False), list[Fact]()
     plain.run(0, bar)
-    if plain.psnr < params.room.needed_below:
+    # With mattes the room is known where the subject is not: an outer zone would take up the subject.
+    cut_out = all(view.photo.matte is not None for view in plain.views)
+    if plain.psnr < params.room.needed_below and not cut_out:
         notes.append(fact("room_fitted", psnr=plain.psnr, under=params.room.needed_below))
         found = _with_room(scene, params, bar, notes)
         depth = thickness(found, params.start.subject_opacity)

@@ -23,6 +23,7 @@ export class Overlays {
       this.find(".spinner").hidden = true;
     });
     player.addEventListener("level", () => this.#pill());
+    player.addEventListener("resized", () => this.#placePoster());
     player.addEventListener("restored", () => this.#hideMessage());
     player.addEventListener("draw", () => this.#count());
   }
@@ -41,7 +42,7 @@ export class Overlays {
     if (!wanted) return;
     if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
     const [decoder, all] = player.level ? [0, 0] : [weight.loaded, weight.total]; // before the first picture it comes too
-    const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.bytes + all));
+    const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.first + all));
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
     this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded + decoder)}`;
@@ -58,10 +59,27 @@ export class Overlays {
     try {
       poster.src = URL.createObjectURL(new Blob([await this.player.files.bytes(entry)]));
       await poster.decode();
-      poster.hidden = this.player.level !== null;
+      this.poster = entry;
+      this.#placePoster();
     } catch {
       poster.hidden = true;
     }
+  }
+
+  /** Where the first picture will show the same; one that would show something else is not shown. */
+  #placePoster() {
+    if (!this.poster || this.player.level) return;
+    const { element, player } = this;
+    const { camera } = this.poster;
+    const { style } = this.find(".poster");
+    const place = camera && player.view.placeOf(camera);
+    const same = camera?.background.every((v, i) => Math.abs(v - element.paint[i]) < 0.01) && element.paint[3] === 1;
+    const plain = Object.keys(element.state).every((key) => key === "frame") && !element.state.frame;
+    this.find(".poster").hidden = Boolean(camera) && !(place && same && plain);
+    if (!place) return;
+    const ratio = player.size[0] / player.canvas.clientWidth;
+    const pixels = [place.left, place.top, place.scale * camera.width, place.scale * camera.height];
+    ["left", "top", "width", "height"].forEach((name, i) => (style[name] = `${pixels[i] / ratio}px`));
   }
 
   #pill() {

@@ -1,9 +1,9 @@
 /**
  * Frames of a video by their numbers, decoded with WebCodecs.
  *
- * The whole file is in memory (a few MB); decoded pictures are not: those of a short window from the wanted frame on are
- * kept, and closed when it moves on. Frame k is the k-th picture, by count. The window wraps round at the end, so that a
- * loop finds its first frame decoded when it gets there.
+ * Coded pictures come from a store, which has the whole file (a few MB) or fetches what is wanted. Of decoded pictures
+ * those of a short window from the wanted frame on are kept, and closed when it moves on. Frame k is the k-th picture, by
+ * count. The window wraps round at the end, so that a loop finds its first frame decoded when it gets there.
  */
 
 const AHEAD = { least: 3, most: 8 };
@@ -12,16 +12,15 @@ const PATIENCE = 60; // ms that a decoder with nothing left to do may keep the w
 export class CodedFrames {
   /**
    * @param {VideoDecoderConfig} config
-   * @param {import("./packets.js").Packet[]} packets
+   * @param {import("./whole.js").WholePackets | import("./segments.js").SegmentPackets} packets
    * @param {(error: Error) => void} onError called once, when the decoder gives up
    */
   constructor(config, packets, onError) {
     this.kind = "WebCodecs";
-    this.frames = packets.length;
+    this.frames = packets.frames;
     this.onError = onError;
     this.config = { ...config, optimizeForLatency: true };
     this.packets = packets;
-    this.place = new Map(packets.map((packet, i) => [packet.frame, i])); // frame -> place in decoding order
     this.decoded = new Map(); // frame -> VideoFrame
     this.inside = new Set(); // frames that the decoder holds
     this.wanted = 0;
@@ -32,6 +31,8 @@ export class CodedFrames {
     this.decoder = new VideoDecoder({ output: (frame) => this.#keep(frame), error: (error) => this.#fail(error) });
     this.decoder.addEventListener("dequeue", () => this.#feed());
     this.decoder.configure(this.config);
+    packets.onPackets = () => this.#feed();
+    packets.onFailure = (error) => this.#fail(error);
   }
 
   /** The decoded frame `k`, or null while it is not there. It stays valid until another one is wanted. */
@@ -42,6 +43,7 @@ export class CodedFrames {
   /** Moves the window: `k` is wanted now, and the frames after it are next. @param {number} stride frames a picture */
   want(k, stride = 1) {
     this.wanted = k;
+    this.packets.want(k);
     this.ahead = Math.max(AHEAD.least, Math.min(AHEAD.most, Math.ceil(1.5 * stride) + 2));
     for (const [frame, picture] of this.decoded) {
       if (this.#inWindow(frame)) continue;
@@ -73,6 +75,7 @@ export class CodedFrames {
 
   close() {
     clearTimeout(this.timer);
+    this.packets.close();
     for (const picture of this.decoded.values()) picture.close();
     this.decoded.clear();
     for (const [, reject] of this.waiting.values()) reject(new DOMException("closed", "AbortError"));
@@ -90,8 +93,10 @@ export class CodedFrames {
     while (this.decoder.decodeQueueSize < 3) {
       const missing = this.#firstMissing();
       if (missing === null) break;
-      const place = this.#nextPlace(this.place.get(missing));
-      const { frame, key, data } = this.packets[place];
+      const place = this.#nextPlace(this.packets.place(missing));
+      const packet = this.packets.at(place);
+      if (!packet) break; // it is being fetched
+      const { frame, key, data } = packet;
       this.decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: frame, data }));
       this.inside.add(frame);
       this.cursor = place;
@@ -109,8 +114,7 @@ export class CodedFrames {
 
   /** The packet to feed on the way to the one at `goal`: the one after the last, or the key frame before `goal`. */
   #nextPlace(goal) {
-    let key = goal;
-    while (key > 0 && !this.packets[key].key) --key;
+    const key = this.packets.key(goal);
     const onTheWay = this.cursor >= key && this.cursor < goal;
     return onTheWay ? this.cursor + 1 : key;
   }

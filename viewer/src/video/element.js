@@ -11,8 +11,11 @@ export class ElementFrames {
   /**
    * @param {HTMLVideoElement} video loaded, muted
    * @param {{frames: number, fps: number}} texture
+   * @param {number} patience ms after which a seek has failed
    */
-  constructor(video, { frames, fps }) {
+  constructor(video, { frames, fps }, patience = STUCK) {
+    this.patience = patience;
+    this.feed = null; // what feeds the element, to be ended with it
     this.kind = "video element";
     this.playsItself = true;
     this.video = video;
@@ -77,7 +80,7 @@ export class ElementFrames {
     if (this.shown === k) return;
     const seeked = new Promise((resolve, reject) => {
       this.video.addEventListener("seeked", resolve, { once: true });
-      setTimeout(() => reject(new Error(`the video does not seek to frame ${k}`)), STUCK);
+      setTimeout(() => reject(new Error(`the video does not seek to frame ${k}`)), this.patience);
     });
     this.shown = -1;
     this.video.currentTime = Math.min((k + 0.5) / this.fps, this.video.duration);
@@ -98,6 +101,7 @@ export class ElementFrames {
 
   close() {
     const { src } = this.video;
+    this.feed?.destroy();
     this.video.removeAttribute("src");
     this.video.load(); // lets go of what it was still reading, before that is revoked
     URL.revokeObjectURL(src);

@@ -1,0 +1,124 @@
+"""The documents as a site (`make docs`): what MkDocs cannot do by itself, as its hooks. mkdocs.yml names this file.
+
+The first page is README.md, with the player in place of its moving picture where `make hero` has made one. Pages that
+lie outside of docs/ join it; links between all of them lead to where they then are. The page of the library is made
+from the names that `facefolds_core` offers and their docstrings.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import facefolds_core
+from facefolds_core.errors import UserError
+
+if TYPE_CHECKING:
+    from mkdocs.config.defaults import MkDocsConfig
+    from mkdocs.structure.files import Files
+    from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).resolve().parents[1]
+HERO = "dist/hero/hero.html"
+MOVED = {
+    "README.md": "index.md",
+    "docs/README.md": "documents.md",
+    "bench/RESULTS.md": "research/results.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+}
+"""File of the checkout -> page of the site; docs/X is X."""
+API = "reference/api.md"
+NOTES = "Research notes"
+"""Their heading in mkdocs.yml."""
+FRAME = '<iframe src="hero.html" title="The embedded actor, in the player" loading="lazy" allow="fullscreen"></iframe>'
+
+
+def place_of(path: str) -> str:
+    """Where a file of the checkout is on the site; other files than documents lie under files/ as they are."""
+    if path in MOVED:
+        return MOVED[path]
+    return path.removeprefix("docs/") if path.startswith("docs/") else f"files/{path}"
+
+
+def relinked(text: str, source: str, root: Path = ROOT) -> tuple[str, set[str]]:
+    """A document for its place on the site, and the files under files/ that it links to.
+
+    Args:
+        source: its path in the checkout.
+
+    Raises:
+        UserError: if a link leads to nothing.
+    """
+    wanted: set[str] = set()
+    here = posixpath.dirname(place_of(source))
+
+    def lead(link: re.Match[str]) -> str:
+        target, _, anchor = link[1].partition("#")
+        if not target or re.match(r"[a-z]+:", target):
+            return link[0]
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
+        if not (root / path).exists():
+            raise UserError("a link that leads to nothing", file=root / source, found=link[1])
+        place = place_of(path)
+        if place.startswith("files/"):
+            wanted.add(path)
+        return f"]({posixpath.relpath(place, here or '.')}{'#' * bool(anchor)}{anchor})"
+
+    parts = re.split(r"(```.*?```)", text, flags=re.DOTALL)
+    changed = [part if part.startswith("```") else re.sub(r"\]\(([^)\s]+)\)", lead, part) for part in parts]
+    return "".join(changed), wanted
+
+
+def first_page(text: str, player: bool) -> str:
+    """README.md with the player in place of its first picture, where there is one."""
+    return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: FRAME, text, count=1, flags=re.MULTILINE) if player else text
+
+
+def api_page() -> str:
+    """Every name of the library, with its signature and docstring."""
+    lines = ["# The library, name by name", "", "From the docstrings; [in words](library.md).", ""]
+    for name, (module, attribute) in sorted(facefolds_core._PLACES.items()):
+        lines += [f"::: {module}.{attribute}", "    options:", f"      heading: {name}", f"      toc_label: {name}", ""]
+    return "\n".join(lines)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Every research note, the newest first, under the heading that mkdocs.yml has for them."""
+    named = sorted((ROOT / "docs" / "research").glob("20*.md"), reverse=True)
+    others = sorted((ROOT / "docs" / "research").glob("[a-z]*.md"))
+    for entry in config.nav or []:
+        if NOTES in entry:
+            entry[NOTES] += [f"research/{path.name}" for path in [*others, *named]]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """The pages from outside of docs/, those with changed links, and the files that they name."""
+    from mkdocs.structure.files import File
+
+    documents = {f"docs/{file.src_uri}" for file in files.documentation_pages()} | set(MOVED)
+    wanted: set[str] = set()
+    player = (ROOT / HERO).exists()
+    for source in sorted(documents):
+        text = (ROOT / source).read_text(encoding="utf-8")
+        text, more = relinked(first_page(text, player) if source == "README.md" else text, source)
+        wanted |= more
+        place = place_of(source)
+        if (old := files.get_file_from_path(source.removeprefix("docs/"))) is not None:
+            files.remove(old)
+        files.append(File.generated(config, place, content=text))
+    files.append(File.generated(config, API, content=api_page()))
+    for path in sorted(wanted):
+        files.append(File.generated(config, place_of(path), abs_src_path=str(ROOT / path)))
+    if player:
+        files.append(File.generated(config, "hero.html", abs_src_path=str(ROOT / HERO)))
+    return files
+
+
+def on_page_context(context: dict[str, Any], page: Page, **_: object) -> dict[str, Any]:
+    """No link "edit this page": the generated ones have no place to be edited at."""
+    page.edit_url = None
+    return context

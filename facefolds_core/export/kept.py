@@ -1,0 +1,95 @@
+"""Frames of an earlier run that are made of the same as now: they are taken over instead of being made again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder, read_json, write_json
+from facefolds_core.frame_store import FrameStore, Image
+
+STORE, INDEX = "textures.arrow", "frames.json"
+
+
+def digest_of(values: Mapping[str, Any]) -> bytes:
+    """Of arrays, texts and numbers by name."""
+    digest = hashlib.blake2b(digest_size=16)
+    for name, value in sorted(values.items()):
+        digest.update(name.encode())
+        if isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype} {value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+        else:
+            digest.update(repr(value).encode())
+    return digest.digest()
+
+
+def digests_of_frames(common: bytes, stores: Sequence[FrameStore], frames: Sequence[int]) -> dict[int, str]:
+    """Frame -> digest of its images in all stores, and of `common`."""
+    found = {frame: hashlib.blake2b(common, digest_size=16) for frame in frames}
+    for store in stores:
+        for index, frame in sorted(store, key=lambda key: (key[1], key[0])):
+            found[frame].update(np.ascontiguousarray(store.image(index, frame)).data)
+    return {frame: digest.hexdigest() for frame, digest in found.items()}
+
+
+class KeptFrames:
+    """A layered frame store of an earlier run, and of what each of its frames was made.
+
+    Args:
+        folder: where they are kept; None keeps nothing.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self._known: dict[str, int] = {}
+        self._store: FrameStore | None = None
+        if folder is not None and (folder / INDEX).exists():
+            with suppress(UserError, ValueError, TypeError, AttributeError):  # what is damaged is made again
+                known = read_json(folder / INDEX)
+                self._store = FrameStore(folder / STORE)
+                self._known = {str(digest): int(frame) for digest, frame in known.items()}
+
+    def rows(
+        self, digests: Mapping[int, str], layers: int, make: Callable[[int], Image], done: Callable[[], object]
+    ) -> Iterator[tuple[int, int, Image]]:
+        """All images, frame by frame.
+
+        Args:
+            digests: of the frames, in their order.
+            layers: N.
+            make: makes a frame's images (N, S, S, 4).
+            done: called after each frame.
+        """
+        for frame, digest in digests.items():
+            known = self._known.get(digest)
+            images = None if known is None else self._images(known, layers)
+            for layer, image in enumerate(make(frame) if images is None else images):
+                yield layer, frame, image
+            done()
+
+    def _images(self, frame: int, layers: int) -> list[Image] | None:
+        assert self._store is not None
+        try:
+            return [self._store.image(layer, frame) for layer in range(layers)]
+        except UserError:
+            return None
+
+    def keep(self, store: Path, digests: Mapping[int, str]) -> None:
+        """Keep what was made now instead; the file is linked where that is possible."""
+        if self.folder is None:
+            return
+        self._store = None
+        with atomic_folder(self.folder) as temporary:
+            try:
+                os.link(store, temporary / STORE)
+            except OSError:
+                shutil.copyfile(store, temporary / STORE)
+            write_json(temporary / INDEX, {digest: frame for frame, digest in digests.items()})

@@ -1,0 +1,69 @@
+"""Levels of a long take: the full one's meshes and layout, pictures of fewer pixels.
+
+A player changes between them at a segment's border and keeps all else; a connection's worth of them is all that DASH
+and HLS know. The layout's cells are multiples of what the coarsest needs, so that each is the full one's, scaled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from facefolds_core.asset.manifest import Level
+from facefolds_core.asset.writer import FULL, LevelContent
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.packaging.coding import coded_level
+from facefolds_core.packaging.levels import Resampled, level_params
+from facefolds_core.packaging.views import ViewMeter
+from facefolds_core.params import CompressParams, LevelParams, StreamParams
+
+COARSEST = 8
+"""Times fewer texels a side than the full level's."""
+
+
+def is_streamed(params: StreamParams, frames: int, fps: float) -> bool:
+    """Whether a sequence is long enough to be a stream."""
+    return fps > 0 and frames > 1 and frames / fps > params.beyond
+
+
+def stream_unit(levels: Sequence[LevelParams], resolution: int) -> int:
+    """The largest factor by which a level of a stream is smaller than the full one."""
+    return max((_factor(level, resolution) for level in levels), default=1)
+
+
+def _factor(level: LevelParams, resolution: int) -> int:
+    """The power of two that comes to the level's texture resolution, or next above it."""
+    factor = 1
+    while 2 * factor <= COARSEST and level.texture_resolution * 2 * factor <= resolution:
+        if resolution % (2 * factor):
+            break
+        factor *= 2
+    return factor
+
+
+def write_rungs(
+    folder: Path, full: LevelContent, params: CompressParams, meter: ViewMeter | None, cameras: Sequence[Camera]
+) -> list[Level]:
+    """Write the levels of a stream, coarsest first, the full one last; their key frames are `segment_seconds` apart."""
+    interval = max(1, round(params.stream.segment_seconds * full.rate))
+    params = params.model_copy(update={"video": params.video.model_copy(update={"keyframe_interval": interval})})
+    finest = coded_level(folder, FULL, full, params, meter, cameras)
+    resolution = full.textures.image(full.layers[0].source, 0).shape[0]
+    levels = []
+    for level in params.levels:
+        content = _smaller(full, _factor(level, resolution), resolution)
+        levels.append(coded_level(folder, level.name, content, level_params(params, level), meter, cameras, finest))
+    together = [*levels, finest]
+    return [level.model_copy(update={"switchable": FULL}) for level in together] if levels else together
+
+
+def _smaller(full: LevelContent, factor: int, resolution: int) -> LevelContent:
+    """The same layers in pictures with a `factor`-th of the pixels a side."""
+    textures = full.textures if factor == 1 else Resampled(full.textures, resolution // factor)
+    layers = []
+    for layer in full.layers:
+        x, y, width, height = layer.crop
+        crop = x // factor, y // factor, width // factor, height // factor
+        layers.append(replace(layer, crop=crop))
+    return replace(full, layers=layers, textures=textures, unit=full.unit // factor, placed=full.layout.scaled(factor))

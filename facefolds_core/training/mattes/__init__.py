@@ -1,0 +1,1 @@
+"""Where the subject is in each picture: mattes from whatever there is."""

@@ -1,0 +1,1 @@
+"""Takes of any length: a base from key frames, and each frame fitted alone against it."""

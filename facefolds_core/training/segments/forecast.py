@@ -1,0 +1,87 @@
+"""What a training will take, before it begins: how, how long, how much memory and disk; what cannot be is refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import psutil
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.state import model_bytes
+from facefolds_core.training.patience import check_space
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Attributes:
+    key_frames: of the base; None if the take is trained at once.
+    memory, disk: bytes.
+    seconds: on the cores that there are.
+    """
+
+    key_frames: int | None
+    memory: int
+    disk: int
+    seconds: float
+
+    def __str__(self) -> str:
+        """In words, for the terminal."""
+        how = "at once" if self.key_frames is None else f"in segments over {self.key_frames} key frames"
+        minutes = self.seconds / 60
+        time = f"{minutes:.0f} minutes" if minutes >= 2 else f"{self.seconds:.0f} s"
+        return f"{how}: about {time}, {self.memory / 1e9:.1f} GB of memory, {self.disk / 1e9:.2f} GB on the disk"
+
+
+def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> Forecast:
+    """Of a scene's training.
+
+    Args:
+        left: frames that are still to be fitted to a base that is there; None where there is none.
+    """
+    segments = params.segments
+    texels = round(segments.texels_per_pixel * scene.width * scene.height)
+    most = int(segments.memory_megabytes * 1e6 / (segments.texel_bytes * texels))
+    frames = scene.num_frames
+    at_once = frames <= min(segments.joint_frames, most) and left is None
+    keys = frames if at_once else min(max(1, most), frames, len(segments.named) or segments.key_frames)
+    trained = keys if left is None else 1
+    rays = len(scene.indices("train")) * scene.width * scene.height
+    memory = round(trained * texels * segments.texel_bytes + rays * _ray_bytes(params) + segments.floor_megabytes * 1e6)
+    steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
+    if not at_once:
+        steps += segments.steps * (frames if left is None else left)
+    seconds = steps * texels * params.textures.rays_per_texel * segments.ray_nanoseconds * 1e-9
+    seconds *= params.layers / 12 / numba.get_num_threads()
+    base = model_bytes((1, texels), params.layers, keys)
+    disk = base if at_once else base + 2 * texels * frames * (3 + params.layers)
+    return Forecast(None if at_once else keys, memory, disk, seconds)
+
+
+def _ray_bytes(params: ExplicitParams) -> int:
+    """A ray that may meet the subject: codes, camera, pixel, direction; background, and the pictures of a frame."""
+    return 4 * params.layers + 20 + 12 + 6
+
+
+def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) -> None:
+    """Refuse what cannot be.
+
+    Args:
+        place: where the model is to be written; None leaves the disk out.
+
+    Raises:
+        UserError: if memory or disk would not do.
+    """
+    total = psutil.virtual_memory().total
+    if found.memory > params.segments.free_share * total:
+        raise UserError(
+            "this training does not fit into the memory of this machine",
+            expected=f"{found.memory / 1e9:.1f} GB for it",
+            found=f"{total / 1e9:.1f} GB, of which train.segments.free_share may be used",
+            remedy="lower train.segments.memory_megabytes (fewer key frames) or normalize.long_side (smaller pictures)",
+        )
+    if place is not None:
+        check_space(place, found.disk)

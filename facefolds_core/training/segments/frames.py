@@ -1,0 +1,125 @@
+"""One frame of a take, fitted alone against the base: what all frames share stays as it is.
+
+A frame's result depends on the base and on the frame alone: not on its neighbours, on the segment that it is in, or on
+who fits it. So there are no seams between segments.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from facefolds_core.captures.part import part_of
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.views import Images, MovingRays, Rays, StillRays, trace_views
+from facefolds_core.training.segments.base import Base
+
+
+@dataclass(frozen=True)
+class FittedFrame:
+    """Attributes:
+    colour, alpha: [H, W, 3] and [H, W, N] float16.
+    psnr: of the rays of the last steps, dB.
+    rays: shaded in all steps.
+    """
+
+    colour: Tensor
+    alpha: Tensor
+    psnr: float
+    rays: int
+
+
+class FrameFitter:
+    """Fits frames, one at a time: memory of one frame.
+
+    Args:
+        scene: with the cameras that the base was made with.
+        base: see there.
+        params: of the training.
+        device: of the textures.
+    """
+
+    def __init__(self, scene: Scene, base: Base, params: ExplicitParams, device: torch.device) -> None:
+        self.scene, self.base = scene, base
+        still = params.background.model_copy(update={"rate": 0.0})
+        self.params = params.model_copy(update={"background": still})
+        self.images = Images(scene, base.surroundings.gains)
+        h, w = base.spec.texels
+        background = torch.from_numpy(base.surroundings.background)
+        shape = (base.spec.num_layers, 1)
+        self.state = TextureState((h, w), *shape, torch.zeros(2, 2, 4), background, self.params, device)
+        with torch.no_grad():
+            self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
+            self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
+        self.still = None if scene.poses is not None else StillRays(trace_views(scene, base.manifolds, 1))
+
+    def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> FittedFrame:
+        """Args:
+        frame: of the scene.
+        shares: of the key frames that it starts from.
+        seed: of the draw of rays; of this frame, so that it is the same in every take.
+
+        Raises:
+            UserError: if it diverges.
+        """
+        state, params = self.state, self.params
+        self._start(shares)
+        random = np.random.default_rng(list(seed))
+        views = self._rays(frame, random)
+        texels = state.shape[0] * state.shape[1]
+        parts = max(1, int(views.count / (params.textures.rays_per_texel * texels)))
+        losses, steps = params.losses, params.segments.steps
+        weights = LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, params.textures.min_alpha)
+        phases: list[int] = []
+        rays, errors, images = 0, [], self.images.frame(frame)
+        for i in range(steps):
+            phases = phases or random.permutation(parts).tolist()
+            seen, which = views.part(0, phases.pop(), parts)
+            errors.append(state.step(seen, which, images, 0, weights, self._rates(i / steps)))
+            if i % params.textures.smooth_every == 0:
+                state.smooth_frame(0)
+            rays += len(which)
+        if not np.isfinite(errors).all():
+            raise _diverged(self.scene, frame)
+        psnr = -10 * float(np.log10(max(float(np.mean(errors[-parts:])), 1e-12)))
+        h, w = state.shape
+        colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
+        return FittedFrame(colour.half().cpu(), alpha.half().cpu(), psnr, rays)
+
+    def _start(self, shares: NDArray[np.float64]) -> None:
+        colour, alpha = self.base.mixed(shares)
+        state = self.state
+        state.frame_colour.zero_()
+        state.frame_alpha.zero_()
+        state.frame_colour[0, 0].copy_(colour.view(-1, 3))
+        state.frame_alpha[0, 0].copy_(alpha.view(len(state.frame_alpha[0, 0]), -1))
+        state.steps[:] = 0
+
+    def _rays(self, frame: int, random: np.random.Generator) -> Rays:
+        if self.still is not None:
+            return self.still
+        h, w = self.state.shape
+        share = self.params.textures.rays_per_texel * h * w
+        alone = part_of(self.scene, [frame])
+        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, int(random.integers(1 << 30)))
+
+    def _rates(self, progress: float) -> NDArray[np.float32]:
+        to = self.params.textures
+        rate = self.base.surroundings.rate * self.params.segments.rate * (1 - (1 - to.final_rate) * progress)
+        return np.array([0, 0, 0, rate * to.frame_rate, rate * to.frame_rate * to.alpha_rate], np.float32)
+
+
+def _diverged(scene: Scene, frame: int) -> UserError:
+    return UserError(
+        "training diverged",
+        place=f"frame {scene.frame_ids[frame]}",
+        expected="a finite error",
+        remedy="lower train.segments.rate; if that does not help, look at the frame's pictures",
+    )

@@ -1,0 +1,107 @@
+"""Which frames of a take are its key frames, and which of them each frame is like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.params import SegmentParams
+from facefolds_core.progress import progress
+
+Float = NDArray[np.float32]
+
+
+def likenesses(scene: Scene, params: SegmentParams) -> list[Float]:
+    """By what frames are told apart, each (K, D): small grey pictures of a few training cameras and, where the scene
+    has them, the tracked meshes in the head's own frame."""
+    train = scene.indices("train")
+    cameras = sorted({train[round(i)] for i in np.linspace(0, len(train) - 1, min(params.cameras, len(train)))})
+    rows = min(params.thumbnail, scene.height)
+    size = (max(1, round(scene.width * rows / scene.height)), rows)
+    store = scene.open_frames()
+    found = np.empty((scene.num_frames, len(cameras), size[1], size[0]), np.float32)
+    for k in progress(range(scene.num_frames), desc="likeness", unit="frame"):
+        for position, camera in enumerate(cameras):
+            small = cv2.resize(store.image(camera, k), size, interpolation=cv2.INTER_AREA)
+            found[k, position] = small.mean(-1)
+    surface = scene.load_surface()
+    meshes = []
+    if surface is not None:
+        step = -(-surface[0].shape[1] // params.vertices)
+        meshes = [np.ascontiguousarray(surface[0][:, ::step]).reshape(len(found), -1)]
+    return [found.reshape(len(found), -1), *meshes]
+
+
+def comparable(parts: Sequence[Float], frames: Sequence[int] | None = None) -> Float:
+    """(K, D) a row a frame: each part less its mean over `frames` (all, by default), its mean square there being 1."""
+    scaled = []
+    for part in parts:
+        among = part if frames is None else part[list(frames)]
+        mean = among.mean(0, dtype=np.float64).astype(np.float32)
+        spread = np.float32(np.sqrt(np.square(among - mean, dtype=np.float64).sum(1).mean()))
+        scaled.append((part - mean) / (spread if spread > 0 else np.float32(1)))
+    return np.asarray(np.concatenate(scaled, 1), np.float32)
+
+
+def _squares(rows: Float, to: Float) -> NDArray[np.float64]:
+    """(K,) squared distances of rows (K, D) to a row (D,); not by a matrix product, whose bits depend on threads."""
+    return np.asarray(np.square(rows - to).sum(1, dtype=np.float64))
+
+
+def farthest_first(rows: Float, count: int) -> list[int]:
+    """Numbers of `count` frames in their order: the one nearest the mean, then always the farthest from all chosen."""
+    chosen = [int(_squares(rows, np.zeros_like(rows[0])).argmin())]
+    distance = _squares(rows, rows[chosen[0]])
+    while len(chosen) < min(count, len(rows)):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, _squares(rows, rows[chosen[-1]]))
+    return sorted(set(chosen))
+
+
+def named_frames(scene: Scene, names: Sequence[str]) -> list[int]:
+    """Numbers of the frames of these names, in their order in the take.
+
+    Raises:
+        UserError: if one is not there.
+    """
+    missing = [name for name in names if name not in scene.frame_ids]
+    if missing:
+        raise UserError(
+            "a key frame that the take does not have",
+            file=scene.folder / "scene.json",
+            place="train.segments.named",
+            expected=f"names of frames, {scene.frame_ids[0]} to {scene.frame_ids[-1]}",
+            found=", ".join(missing[:5]),
+            remedy="leave it out, or give the key a range of frames that holds it",
+        )
+    return sorted({scene.frame_ids.index(name) for name in names})
+
+
+def _apart(keys: Float) -> float:
+    """Mean distance of a key frame from the one most like it; 0 of a single one."""
+    if len(keys) < 2:
+        return 0.0
+    return float(np.mean([np.sqrt(np.partition(_squares(keys, key), 1)[1]) for key in keys]))
+
+
+def mixture(row: Float, keys: Float, params: SegmentParams) -> NDArray[np.float64]:
+    """(n,) shares of key frames (n, D) that make up a frame (D,), their sum 1; 0 but for the `neighbours` nearest.
+
+    ((d_far - d_i) / (d_far d_i))^2 with d_far the distance of the next one (modified Shepard weights; Franke and
+    Nielson 1980): they change without a leap when another key frame becomes one of the nearest.
+    Distances are those of places beside the key frames, so that these, too, are made of their neighbours.
+    """
+    distance = np.sqrt(_squares(keys, row) + (params.blend * _apart(keys)) ** 2)
+    if distance.min() == 0:
+        shares = (distance == 0).astype(np.float64)
+        return np.asarray(shares / shares.sum())
+    beyond = np.sort(distance)[min(params.neighbours, len(distance) - 1)] if len(distance) > 1 else 2 * distance[0]
+    shares = np.square(np.maximum(beyond - distance, 0) / (beyond * distance))
+    if shares.sum() == 0:  # all equally far
+        shares = np.ones(len(distance))
+    return np.asarray(shares / shares.sum())

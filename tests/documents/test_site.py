@@ -1,0 +1,56 @@
+"""The site of the documents: links of moved pages, the player on the first page, the library's page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import facefolds_core
+from bench.site import FRAME, api_page, first_page, relinked
+from facefolds_core.errors import UserError
+
+
+@pytest.mark.parametrize(
+    ("source", "link", "moved"),
+    [
+        ("README.md", "docs/guide/viewer.md", "guide/viewer.md"),
+        ("README.md", "docs/README.md", "documents.md"),
+        ("docs/guide/actor.md", "../reference/params.md#capture", "../reference/params.md#capture"),
+        ("docs/guide/actor.md", "../../bench/RESULTS.md#x", "../research/results.md#x"),
+        ("bench/RESULTS.md", "../README.md#results", "../index.md#results"),
+        ("docs/research/README.md", "../README.md", "../documents.md"),
+        ("docs/guide/actor.md", "#frames-and-units", "#frames-and-units"),
+        ("README.md", "https://example.org/a.md", "https://example.org/a.md"),
+    ],
+)
+def test_links_lead_to_where_a_page_moved(source: str, link: str, moved: str, project_root: Path) -> None:
+    assert relinked(f"[x]({link})", source, project_root) == (f"[x]({moved})", set())
+
+
+def test_other_files_go_along(project_root: Path) -> None:
+    text, wanted = relinked("[keys](params.yaml)", "README.md", project_root)
+    assert (text, wanted) == ("[keys](files/params.yaml)", {"params.yaml"})
+
+
+def test_code_is_left_alone(project_root: Path) -> None:
+    code = "```md\n[x](nowhere.md)\n```"
+    assert relinked(code, "README.md", project_root)[0] == code
+
+
+def test_a_link_to_nothing_is_refused(project_root: Path) -> None:
+    with pytest.raises(UserError, match="leads to nothing"):
+        relinked("[x](gone.md)", "README.md", project_root)
+
+
+def test_the_player_takes_the_place_of_the_readmes_picture(project_root: Path) -> None:
+    text = (project_root / "README.md").read_text(encoding="utf-8")
+    shown = first_page(text, player=True)
+    assert FRAME in shown and "face.webp" not in shown
+    assert len(shown.splitlines()) == len(text.splitlines())
+    assert first_page(text, player=False) == text
+
+
+def test_the_librarys_page_has_every_name() -> None:
+    page = api_page()
+    assert all(f"heading: {name}\n" in page for name in facefolds_core.__all__ if not name.startswith("__"))

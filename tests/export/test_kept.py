@@ -1,0 +1,76 @@
+"""Frames of an earlier run are taken over where they would be the same, and only there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facefolds_core.export.kept import INDEX, STORE, KeptFrames, digest_of, digests_of_frames
+from facefolds_core.frame_store import FrameStore, Image, write_frames
+
+LAYERS, FRAMES = 2, 3
+
+
+def image(layer: int, frame: int) -> Image:
+    return np.random.default_rng(10 * layer + frame).integers(0, 256, (8, 8, 4), dtype=np.uint8)
+
+
+def source(path: Path, changed: int | None = None) -> FrameStore:
+    """Images of two layers and three frames; those of one frame others."""
+    rows = [(n, k, image(n, k + 7 * (k == changed))) for n in range(LAYERS) for k in range(FRAMES)]
+    write_frames(path, (8, 8, 4), rows, packed=True)
+    return FrameStore(path)
+
+
+def run(folder: Path, store: FrameStore, common: bytes = b"same") -> tuple[list[int], list[Image]]:
+    """The frames that are made, and all images; a made frame is the source's, inverted."""
+    kept, made = KeptFrames(folder / "kept"), list[int]()
+
+    def make(frame: int) -> Image:
+        made.append(frame)
+        return 255 - np.stack([store.image(n, frame) for n in range(LAYERS)])
+
+    digests = digests_of_frames(common, [store], range(FRAMES))
+    write_frames(folder / "out.arrow", (8, 8, 4), kept.rows(digests, LAYERS, make, lambda: None), packed=True)
+    kept.keep(folder / "out.arrow", digests)
+    out = FrameStore(folder / "out.arrow")
+    return made, [out.image(n, k) for k in range(FRAMES) for n in range(LAYERS)]
+
+
+def test_what_is_the_same_is_taken_over(tmp_path: Path) -> None:
+    first = run(tmp_path, source(tmp_path / "a.arrow"))
+    second = run(tmp_path, source(tmp_path / "b.arrow"))
+    assert (first[0], second[0]) == ([0, 1, 2], [])
+    assert np.array_equal(first[1], second[1])
+
+
+def test_a_changed_frame_alone_is_made_anew(tmp_path: Path) -> None:
+    run(tmp_path, source(tmp_path / "a.arrow"))
+    made, images = run(tmp_path, source(tmp_path / "b.arrow", changed=1))
+    assert made == [1]
+    assert np.array_equal(images[2], 255 - image(0, 8))
+
+
+def test_with_other_input_all_are_made_anew(tmp_path: Path) -> None:
+    run(tmp_path, source(tmp_path / "a.arrow"))
+    assert run(tmp_path, source(tmp_path / "b.arrow"), common=b"other")[0] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("name", [STORE, INDEX])
+def test_what_is_damaged_is_made_anew(name: str, tmp_path: Path) -> None:
+    first = run(tmp_path, source(tmp_path / "a.arrow"))
+    path = tmp_path / "kept" / name
+    content = path.read_bytes()
+    path.unlink()  # it is a link
+    path.write_bytes(content[: len(content) // 2])
+    made, images = run(tmp_path, source(tmp_path / "b.arrow"))
+    assert made == [0, 1, 2]
+    assert np.array_equal(images, first[1])
+
+
+@pytest.mark.parametrize("value", [np.array([1.5, 2.0]), np.array([[1.5], [2.5]]), "text", (1, 2)])
+def test_a_digest_tells_values_apart(value: object) -> None:
+    assert digest_of({"a": value}) == digest_of({"a": value})
+    assert digest_of({"a": value}) != digest_of({"a": np.array([1.5, 2.5])})

@@ -1,0 +1,202 @@
+"""Takes that are too long to be trained at once: a base, and each frame alone against it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json
+from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.track import Track
+from facefolds_core.model import load_model
+from facefolds_core.model.segmented import SegmentedTextures
+from facefolds_core.params import ExplicitParams, train_params
+from facefolds_core.training.segments.frames import FrameFitter
+from facefolds_core.training.segments.loop import train_take
+from tests.scenes import make_scene
+
+pytestmark = pytest.mark.slow
+
+FRAMES = 5
+
+
+def params(**segments: object) -> ExplicitParams:
+    given = {
+        "preset": "fast",
+        "device": "cpu",
+        "layers": 3,
+        "iterations": 30,
+        "volume": {"levels": [{"resolution": 16, "iterations": 20}]},
+        "geometry": {"rounds": [1.0], "round_iterations": 10},
+        "reflection": {"enabled": False},
+        "textures": {"steps_per_frame": 4},
+        "segments": {"joint_frames": 0, "key_frames": 2, "frames": 2, "steps": 3, **segments},
+    }
+    found = train_params(given)
+    assert isinstance(found, ExplicitParams)
+    return found
+
+
+def train(scene: Scene, folder: Path, **segments: object) -> Path:
+    train_take(scene, params(**segments), folder / "model", folder / "checkpoints", folder / "log")
+    return folder / "model"
+
+
+def same(one: Path, other: Path) -> bool:
+    """Whether two models' frames are equal bit for bit."""
+    textures = [load_model(folder).textures for folder in (one, other)]
+    pairs = [zip(*(t.frame(k) for t in textures), strict=True) for k in range(FRAMES)]  # type: ignore[operator]
+    return all(torch.equal(a, b) for pair in pairs for a, b in pair)
+
+
+@contextmanager
+def counted(most: int = 1000) -> Iterator[list[int]]:
+    """The frames that are fitted meanwhile; a kill before number `most`."""
+    fitted: list[int] = []
+    fit: Callable[..., object] = FrameFitter.fit
+
+    def counting(self: FrameFitter, frame: int, *rest: object) -> object:
+        if len(fitted) == most:
+            raise KeyboardInterrupt
+        fitted.append(frame)
+        return fit(self, frame, *rest)
+
+    with patch.object(FrameFitter, "fit", counting):
+        yield fitted
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
+    folder = tmp_path_factory.mktemp("segments")
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    train(scene, folder)
+    return scene, folder
+
+
+@pytest.fixture
+def again(trained: tuple[Scene, Path], tmp_path: Path) -> tuple[Scene, Path]:
+    """The same take with what a finished training leaves, in a folder of its own."""
+    shutil.copytree(trained[1], tmp_path / "take")
+    return read_scene(tmp_path / "take" / "scene"), tmp_path / "take"
+
+
+def error_of(scene: Scene, model: Path, frame: int, shown: int) -> float:
+    """Mean squared difference of a held-out picture from what the model shows of frame `shown`."""
+    index = scene.indices("holdout")[0]
+    rays = [np.ascontiguousarray(a.reshape(-1, 3)) for a in scene.cameras[index].rays()]
+    origins, directions = (torch.from_numpy(a).float() for a in rays)
+    rgb = load_model(model).render(origins, directions, float(shown), False).rgb.numpy()
+    return float(np.square(rgb - scene.open_frames().image(index, frame).reshape(-1, 3) / 255).mean())
+
+
+def test_each_frame_is_shown_best_by_its_own_textures(trained: tuple[Scene, Path]) -> None:
+    scene, folder = trained
+    for k in (0, 2, 4):
+        assert error_of(scene, folder / "model", k, k) < error_of(scene, folder / "model", k, (k + 2) % FRAMES)
+
+
+def test_the_model_holds_base_and_segments(trained: tuple[Scene, Path]) -> None:
+    folder = trained[1] / "model"
+    assert sorted(p.name for p in (folder / "segments").iterdir()) == [f"{i:05d}.safetensors" for i in range(3)]
+    textures = load_model(folder).textures
+    assert isinstance(textures, SegmentedTextures) and textures.lengths == (2, 2, 1)
+    assert textures.frame_colour.numel() == 0
+
+
+def test_between_frames_it_is_linear_across_segments(trained: tuple[Scene, Path]) -> None:
+    textures = load_model(trained[1] / "model").textures
+    assert isinstance(textures, SegmentedTextures)
+    uv, directions = torch.zeros(2, 2), torch.tensor([[-1.0, 0, 0]] * 2)
+    both = textures.shade(uv, torch.zeros(2, dtype=torch.long), torch.tensor([1.5, 4.0]), directions)
+    alone = [textures.shade(uv[:1], torch.zeros(1, dtype=torch.long), torch.tensor([t]), None) for t in (1.5, 4.0)]
+    torch.testing.assert_close(both.rgb, torch.cat([one.rgb for one in alone]))
+
+
+def test_a_killed_training_loses_the_segment_in_progress_only(again: tuple[Scene, Path]) -> None:
+    scene, folder = again
+    for path in (folder / "checkpoints" / "take").glob("segment-*"):
+        path.unlink()
+    with counted(most=3) as before, pytest.raises(KeyboardInterrupt):
+        train(scene, folder)
+    with counted() as after:
+        train(scene, folder)
+    assert (before, after) == ([0, 1, 2], [2, 3, 4])
+
+
+def test_what_was_taken_up_is_what_is_made_in_one_go(trained: tuple[Scene, Path], again: tuple[Scene, Path]) -> None:
+    scene, folder = again
+    shutil.rmtree(folder / "checkpoints")
+    train(scene, folder)
+    assert same(folder / "model", trained[1] / "model")
+
+
+def test_frames_do_not_depend_on_their_segments(trained: tuple[Scene, Path], again: tuple[Scene, Path]) -> None:
+    scene, folder = again
+    with counted() as fitted:
+        train(scene, folder, frames=3)
+    assert fitted == []  # dealt anew, trained no more
+    for path in (folder / "checkpoints" / "take").glob("segment-*"):
+        path.unlink()
+    with counted() as fitted:
+        train(scene, folder, frames=5)
+    assert fitted == [0, 1, 2, 3, 4]
+    assert same(folder / "model", trained[1] / "model")
+
+
+def test_a_changed_frame_trains_itself_alone(again: tuple[Scene, Path]) -> None:
+    scene, folder = again
+    keys = load_keys(folder)
+    changed = next(k for k in range(FRAMES) if k not in keys)
+    store = FrameStore(scene.folder / "frames.arrow")
+
+    def brighter(camera: int, k: int) -> NDArray[np.uint8]:
+        image = store.image(camera, k).copy()
+        return image + np.uint8(1) * (image < 255) if k == changed else image
+
+    rows = [(camera, k, brighter(camera, k)) for camera, k in store]
+    write_frames(scene.folder / "frames.arrow", (store.height, store.width, 3), rows)
+    with counted() as fitted:
+        train(scene, folder, named=[scene.frame_ids[k] for k in keys])
+    assert fitted == [changed]
+
+
+def load_keys(folder: Path) -> list[int]:
+    """Key frames of a trained model; frames of these scenes are named by their numbers."""
+    return [int(name) for name in read_json(folder / "model" / "fit.json")["key_frames"]]
+
+
+@pytest.mark.parametrize("keep", [0, 100, -8])
+def test_a_damaged_segment_is_named(keep: int, again: tuple[Scene, Path]) -> None:
+    path = again[1] / "model" / "segments" / "00001.safetensors"
+    content = path.read_bytes()
+    path.unlink()  # it is a link
+    path.write_bytes(content[:keep])
+    with pytest.raises(UserError, match=r"00001\.safetensors"):
+        load_model(again[1] / "model")
+
+
+def test_an_unknown_key_frame_is_refused(again: tuple[Scene, Path]) -> None:
+    with pytest.raises(UserError, match="key frame"):
+        train(again[0], again[1], named=["000001", "elsewhere"])
+
+
+def test_a_head_that_turns_is_fitted_frame_by_frame_too(tmp_path: Path) -> None:
+    """Its rays meet other texels in each frame. It is the sphere itself, said to have shifted by next to nothing."""
+    scene = make_scene(tmp_path / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    shifts = np.outer(np.linspace(-1e-4, 1e-4, FRAMES), [0, 1, 0])
+    scene = replace(scene, poses=Track.of([np.eye(3)] * FRAMES, shifts))
+    with counted() as fitted:
+        model = train(scene, tmp_path)
+    assert fitted == list(range(FRAMES))
+    assert error_of(scene, model, 0, 0) < error_of(scene, model, 0, 2)

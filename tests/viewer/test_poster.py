@@ -1,0 +1,85 @@
+"""The poster and the first picture: the same face at the same place, in front of the same colour."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset.manifest_file import parse_manifest
+from facefolds_core.packaging.poster import BACKGROUND, FIELD_OF_VIEW, FILLED, write_poster
+from tests.assets import make_asset
+from tests.pictures import psnr
+from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.fixtures import add_reflection, change_manifest, file_entry
+
+BARE = """const root = e.shadowRoot;
+for (const name of ['.spinner', 'header', '.bar', '.toast']) root.querySelector(name).style.visibility = 'hidden';
+root.querySelector('.poster').style.transition = 'none';"""
+AGREE = 42.0
+"""dB. Seen: 47.7 and more: the poster is scaled, and a JPEG."""
+
+
+@pytest.fixture(scope="module")
+def asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("poster") / "asset"
+    make_asset(folder, layers=3, frames=2, resolution=96)
+    add_reflection(folder)
+    camera = write_poster(folder / "poster.jpg", parse_manifest(folder / "manifest.json"), 640, 92)
+    poster = file_entry(folder / "poster.jpg") | {"width": camera.width, "height": camera.height}
+    poster |= {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "background": list(BACKGROUND)}
+    change_manifest(folder, lambda value: value.update(poster=poster))
+    return folder
+
+
+def seen(player: Player) -> NDArray[np.float64]:
+    player.run(BARE)
+    data = player.page.screenshot(animations="disabled")
+    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")) / 255
+
+
+def waiting(new_player: NewPlayer, asset: Path, view: str, **options: object) -> tuple[Player, list]:
+    """A player whose video is held back."""
+    player, held = new_player({"asset": asset}, **options), []
+    player.page.route("**/*.mp4", lambda route: held.append(route))
+    player.open("asset", view, wait=False)
+    while not held:
+        player.page.wait_for_timeout(20)
+    return player, held
+
+
+@pytest.mark.parametrize("size", [(900, 600), (390, 844), (360, 240)])
+def test_the_first_picture_is_the_poster(new_player: NewPlayer, asset: Path, size: tuple[int, int]) -> None:
+    viewport = {"width": size[0], "height": size[1]}
+    player, held = waiting(new_player, asset, "frame=0", viewport=viewport)
+    player.page.locator(".poster").wait_for()
+    before = seen(player)
+    assert player.run("return e.ready") is False
+    held[0].continue_()
+    player.wait("e.ready")
+    after = seen(player)
+    assert np.ptp(before, axis=(0, 1)).max() > 0.3  # there is something to be seen
+    assert psnr(before, after) >= AGREE
+
+
+@pytest.mark.parametrize("view", ["view=30,0,1.2,0,0,0", "background=ffffff", "mode=alpha", "hidden=1"])
+def test_a_poster_that_shows_something_else_is_not_shown(new_player: NewPlayer, asset: Path, view: str) -> None:
+    player, held = waiting(new_player, asset, view)
+    player.page.wait_for_timeout(300)
+    assert not player.page.locator(".poster").is_visible()
+    held[0].continue_()
+    player.wait("e.ready")
+
+
+def test_both_know_of_the_same_camera_and_colour(project_root: Path) -> None:
+    source = project_root / "viewer" / "src"
+    view = (source / "view.js").read_text()
+    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", view)[1]) == FIELD_OF_VIEW  # type: ignore[index]
+    assert float(re.search(r"FILLED = ([\d.]+)", view)[1]) == FILLED  # type: ignore[index]
+    colour = re.search(r'BACKGROUND = "#(\w{6})"', (source / "element.js").read_text())
+    assert colour is not None and tuple(round(255 * value) for value in BACKGROUND) == tuple(bytes.fromhex(colour[1]))

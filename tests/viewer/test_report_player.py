@@ -1,0 +1,45 @@
+"""The face in the report: the player within the page, from the disk, without a network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from facefolds_core.asset import read_asset
+from facefolds_core.reporting import face
+from facefolds_core.reporting.build import make_report
+from tests.reporting.tiny import make_subject
+from tests.viewer.conftest import PATIENCE
+
+
+def test_the_face_plays_in_the_report(browser: Browser, player_folder: Path, tmp_path: Path) -> None:
+    report = make_report(make_subject(tmp_path / "somebody"), player=player_folder)
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    said: list[str] = []
+    fetched: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: fetched.append(request.url))
+    page.goto(report.as_uri())
+    inner = page.frame_locator("iframe").locator("facefolds-player")
+    inner.wait_for()
+    frame = page.frames[1]
+    playing = "() => { const e = document.querySelector('facefolds-player'); return e.ready && e.playing; }"
+    frame.wait_for_function(playing, timeout=PATIENCE)
+    fold = [page.locator(part).bounding_box() for part in ("iframe", ".worst img >> nth=0")]
+    assert all(box is not None and box["y"] + box["height"] <= 900 for box in fold)  # both at the first glance
+    assert said == []
+    assert {url for url in fetched if not url.startswith(("data:", "blob:"))} == {report.as_uri()}
+    page.close()
+
+
+def test_a_level_that_the_page_has_no_room_for_is_left_out(
+    player_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asset = read_asset(make_subject(tmp_path / "somebody").asset)
+    shown = face.face(asset, player_folder)
+    assert shown is not None and shown["level"] == "full"
+    monkeypatch.setattr(face, "MOST_FACE_BYTES", 100)
+    assert face.face(asset, player_folder) is None

@@ -1,0 +1,86 @@
+"""What eyes need: contrast of all words, layers in sight when they are pulled apart, progress that counts all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.viewer.conftest import NewPlayer, Player
+
+CONTRAST = """
+const numbers = (colour) => {
+  const [r, g, b, a = 1] = colour.match(/[\\d.]+/g).map(Number);
+  return [r, g, b, a];
+};
+const over = ([r, g, b, a], behind) => [r, g, b].map((v, i) => a * v + (1 - a) * behind[i]);
+const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))
+  .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+const ground = (node) => {
+  const chain = [];
+  for (let at = node; at instanceof Element; at = at.parentElement) chain.unshift(at);
+  return chain.reduce((rgb, at) => over(numbers(getComputedStyle(at).backgroundColor), rgb), v);
+};
+const found = [];
+for (const node of e.shadowRoot.querySelectorAll('.bar *, .panel *, dialog *, .message *')) {
+  const words = [...node.childNodes].filter((n) => n.nodeType === 3).map((n) => n.data.trim()).join(' ').trim();
+  if (!words || !node.checkVisibility() || node.disabled) continue;
+  const [text, behind] = [over(numbers(getComputedStyle(node).color), ground(node)), ground(node)].map(light);
+  const ratio = (Math.max(text, behind) + 0.05) / (Math.min(text, behind) + 0.05);
+  found.push([words.slice(0, 30), ratio]);
+}
+return found;
+"""
+
+
+@pytest.fixture
+def player(new_player: NewPlayer, rich: Path) -> Player:
+    player = new_player({"asset": rich}, viewport={"width": 900, "height": 700})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    return player
+
+
+@pytest.mark.parametrize("behind", [(0, 0, 0), (255, 255, 255)], ids=["dark picture", "white picture"])
+def test_all_words_have_the_contrast_that_wcag_asks_for(player: Player, behind: tuple[int, int, int]) -> None:
+    """4.5 to 1, whatever the picture behind half-transparent panels is."""
+    player.button("Settings")
+    player.page.get_by_text("Keys").click()
+    found: list[tuple[str, float]] = player.run(CONTRAST, list(behind))  # type: ignore[assignment]
+    assert len(found) > 30
+    assert [(words, round(ratio, 1)) for words, ratio in found if ratio < 4.5] == []
+
+
+def test_layers_that_are_pulled_apart_are_seen_from_aside_and_all_in_sight(player: Player) -> None:
+    player.button("Settings")
+    player.page.get_by_label("Pull apart").fill("1")
+    player.wait("Math.abs(e.player.view.get().azimuth - 55) < 0.1")
+    player.page.wait_for_timeout(500)
+    corners = """const { view, renderer, size } = e.player; const { low, high } = renderer.bounds();
+        const { projection: p, view: m } = view.matrices(...size, renderer.bounds());
+        const times = (a, x) => [0, 1, 2, 3].map((i) => x.reduce((sum, v, k) => sum + a[4 * k + i] * v, 0));
+        return [0, 1, 2, 3, 4, 5, 6, 7].map((k) => {
+          const at = [0, 1, 2].map((i) => (k >> i & 1 ? high[i] : low[i]));
+          const clip = times(p, times(m, [...at, 1]));
+          return [clip[0] / clip[3], clip[1] / clip[3]]; });"""
+    found: list[tuple[float, float]] = player.run(corners)  # type: ignore[assignment]
+    assert max(abs(value) for corner in found for value in corner) < 1
+    assert max(abs(x) for x, _ in found) > 0.4  # and they fill what there is
+    player.page.get_by_label("Pull apart").fill("0")
+    player.wait("Math.abs(e.player.view.get().azimuth) < 0.1")
+
+
+def test_the_progress_counts_the_decoder(new_player: NewPlayer, rich: Path) -> None:
+    """A decoder that is still under way is part of what is loaded."""
+    player = new_player({"asset": rich})
+    held: list = []
+    player.page.route("**/*.wasm", lambda route: held.append(route))
+    player.open("asset", wait=False)
+    bar = player.page.get_by_role("progressbar")
+    bar.wait_for()
+    player.page.wait_for_timeout(1000)  # all else is there
+    shown = int(bar.get_attribute("aria-valuenow") or 0)
+    assert 0 < shown < 90
+    for route in held:
+        route.continue_()
+    player.wait("e.ready")
