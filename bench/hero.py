@@ -86,6 +86,7 @@ def release(folders: SubjectFolders, out: Path) -> list[Path]:
         UserError: if there is no player, or the asset is not sound.
     """
     asset = read_asset(folders.asset)
+    out.mkdir(parents=True, exist_ok=True)
     page, packed = out / "hero.html", out / "hero.zip"
     write_single_page(page, folders.asset, asset.manifest, asset.full.entry, find_player())
     with atomic_folder(out / "asset") as temporary:

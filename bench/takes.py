@@ -38,7 +38,7 @@ WATCH = 0.02
 """Seconds between two looks at a stage's memory."""
 
 PARAMS: dict[str, Any] = {
-    "capture": {"cameras": 8, "frames": CYCLE, "height": 64, "width": 48},
+    "capture": {"cameras": 6, "frames": CYCLE, "height": 64, "width": 48},
     "normalize": {},
     "train": {"preset": "fast", "segments": {"key_frames": 16}},
     "sample": {"resolution": 128},
@@ -128,7 +128,7 @@ def lengthen(capture: Path, frames: int) -> None:
 def measure(folder: Path, frames: int) -> dict[str, Watched]:
     """All stages of a take, by their names."""
     project = Project(folder / f"frames{frames}", "take")
-    subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}
+    subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 6}}
     project.write({"subjects": {"take": subject}, **PARAMS})
     watched(project, "configure")
     found = {}

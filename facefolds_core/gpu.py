@@ -30,6 +30,8 @@ THREADS = 128
 
 Array = NDArray[Any]
 
+_most = [0]
+
 
 class Entry:
     """A function that runs on a GPU, compiled when it is first asked for.
@@ -68,24 +70,35 @@ def available() -> bool:
 
 def name() -> str:
     """Of the GPU."""
+    if config.ENABLE_CUDASIM:
+        return "simulated GPU"
     found = cuda.get_current_device().name
     return found.decode() if isinstance(found, bytes) else str(found)
 
 
-def used_bytes() -> int:
-    """Of the GPU's memory, by whatever uses it now."""
-    free, total = cuda.current_context().get_memory_info()
-    return int(total - free)
+def most_bytes() -> int:
+    """Of the GPU's memory in use, by whatever used it, when it was asked for here; 0 in the simulator."""
+    return _most[0]
+
+
+def _measure() -> None:
+    if not config.ENABLE_CUDASIM:
+        free, total = cuda.current_context().get_memory_info()
+        _most[0] = max(_most[0], int(total - free))
 
 
 def to_gpu(array: Array) -> Any:
     """A copy on the GPU."""
-    return cuda.to_device(np.ascontiguousarray(array))
+    copy = cuda.to_device(np.ascontiguousarray(array))
+    _measure()
+    return copy
 
 
 def empty(shape: int | tuple[int, ...], dtype: Any = np.float32) -> Any:
     """An array on the GPU, not written yet."""
-    return cuda.device_array(shape, dtype)
+    array = cuda.device_array(shape, dtype)
+    _measure()
+    return array
 
 
 def zeros(shape: int | tuple[int, ...], dtype: Any = np.float32) -> Any:

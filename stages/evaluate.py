@@ -10,7 +10,7 @@ from facefolds_core.config import read_stage, read_subject, read_train
 from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
-from facefolds_core.model.device import pick_device
+from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.params import CaptureParams, CompressParams, EvaluateParams
 from facefolds_core.paths import SubjectFolders
@@ -45,7 +45,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
 
 def evaluate_subject(folders: SubjectFolders) -> str:
     params = read_stage(EvaluateParams, folders.config)
-    device = pick_device(read_train(folders.config).device)
+    device = device_of(read_train(folders.config))
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     cost = read_cost(folders, asset.manifest)
     perceptual, model = find_perceptual(device), load_model(folders.model, device)

@@ -8,7 +8,7 @@ from facefolds_core.export.steps import check_frames, sample_model
 from facefolds_core.export.stores import write_grids
 from facefolds_core.files import atomic_folder
 from facefolds_core.model import load_model
-from facefolds_core.model.device import pick_device
+from facefolds_core.model.device import device_of
 from facefolds_core.params import SampleParams
 from facefolds_core.paths import SubjectFolders
 from stages.common import run_stage
@@ -16,7 +16,7 @@ from stages.common import run_stage
 
 def sample(folders: SubjectFolders) -> str:
     params = read_stage(SampleParams, folders.config)
-    model = load_model(folders.model, pick_device(read_train(folders.config).device))
+    model = load_model(folders.model, device_of(read_train(folders.config)))
     scene = read_scene(folders.scene)
     check_frames(model, scene, folders.model)
     with atomic_folder(folders.samples) as temporary:

@@ -28,6 +28,7 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
+from facefolds_core.spill import by_rows
 
 Negatives = list[Negative]
 
@@ -110,9 +111,11 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     )
     vertices, there = None, None
     if capture.tracking is not None:
-        there = similarity.apply(capture.tracking.world_vertices()[frames])
-        vertices = in_head(there, motion.track).astype(np.float32)
-    check_sight(cameras, scene.frame_ids, None if there is None else there.astype(np.float32), capture.root)
+        world, track = capture.tracking.world_vertices(frames), motion.track
+        normalised = by_rows(len(world), lambda rows: similarity.apply(world[rows]))
+        vertices = by_rows(len(world), lambda rows: in_head(normalised[rows], track, rows.start), np.float32)
+        there = by_rows(len(world), lambda rows: normalised[rows], np.float32)
+    check_sight(cameras, scene.frame_ids, there, capture.root)
     given = None if subject.mattes is None else Path(subject.mattes)
     return Plan(capture, scene, tuple(rows), vertices, sound, given)
 

@@ -17,6 +17,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import FrameRange, Subject
+from facefolds_core.spill import by_rows
 
 Array = NDArray[np.float64]
 
@@ -57,10 +58,17 @@ class Tracking:
     vertices: Array
     faces: NDArray[np.int32] | None
 
-    def world_vertices(self) -> Array:
-        """(K, V, 3) in the capture's world."""
-        moved = np.einsum("kij,kvj->kvi", self.poses[:, :, :3], self.vertices)
-        return np.asarray(moved + self.poses[:, None, :, 3])
+    def world_vertices(self, frames: Sequence[int] | None = None) -> Array:
+        """(K, V, 3) in the capture's world, of all frames or some."""
+        chosen = np.arange(len(self.poses)) if frames is None else np.asarray(frames, int)
+
+        def moved(rows: slice) -> Array:
+            poses = self.poses[chosen[rows]]
+            return np.asarray(
+                np.einsum("kij,kvj->kvi", poses[:, :, :3], self.vertices[chosen[rows]]) + poses[:, None, :, 3]
+            )
+
+        return by_rows(len(chosen), moved)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track, rigid_motion
 from facefolds_core.params import NormalizeParams
+from facefolds_core.spill import by_rows
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,8 @@ def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity,
             )
         return HeadMotion(None, ())
     rotations, translations, source = _poses(tracking, frames)
-    vertices = similarity.apply(tracking.world_vertices()[list(frames)])
+    world = tracking.world_vertices(frames)
+    vertices = by_rows(len(world), lambda rows: similarity.apply(world[rows]))
     moves = zip(rotations, translations, strict=True)
     poses = [similarity.after(Similarity(1.0, R, t)).after(similarity.inverse()) for R, t in moves]
     track = own_track(poses, _middles(vertices))
@@ -66,11 +68,11 @@ def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity,
     return HeadMotion(None, ())
 
 
-def in_head(vertices: Array, track: Track | None) -> Array:
-    """Vertices (K, V, 3) of the world in the head's own frame."""
+def in_head(vertices: Array, track: Track | None, first: int = 0) -> Array:
+    """Vertices (K, V, 3) of the world in frames `first` on, in the head's own frame."""
     if track is None:
         return vertices
-    return np.stack([track.at(k).inverse().apply(points) for k, points in enumerate(vertices)])
+    return np.stack([track.at(k).inverse().apply(points) for k, points in enumerate(vertices, first)])
 
 
 def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str]:
@@ -81,7 +83,7 @@ def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str
     poses = tracking.poses[list(frames)]
     if np.abs(poses - poses[0]).max() > 1e-9 * max(1.0, float(np.abs(poses).max())):
         return poses[:, :, :3], poses[:, :, 3], "the capture's poses"
-    vertices = tracking.world_vertices()[list(frames)]
+    vertices = tracking.world_vertices(frames)
     shape, motions = vertices[0], []
     for _ in range(3):
         motions = [rigid_motion(shape, points) for points in vertices]

@@ -17,6 +17,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.reading import check_folder, is_there, read_bytes, read_text
+from facefolds_core.spill import spilled
 
 Array = NDArray[np.float64]
 _REMEDY = "copy the file again from the dataset, or choose other frames for this subject in params.yaml"
@@ -182,8 +183,8 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
     else:
         points, faces = read_obj(topology)
         count = len(points)
-    vertices, poses = [], []
-    for name in tracked:
+    vertices, poses = np.empty((0, 0, 3)), []
+    for position, name in enumerate(tracked):
         binary, text, transform = meshes(name)
         points = read_bin(binary, count) if is_there(binary) else read_obj(text)[0]
         file = binary if is_there(binary) else text
@@ -195,6 +196,8 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
                 "a damaged tracked mesh", file=file, expected=f"{count} finite vertices", found=found, remedy=_REMEDY
             )
         check_extent(points, file)
-        vertices.append(points)
+        if position == 0:
+            vertices = spilled((len(tracked), count, 3))
+        vertices[position] = points
         poses.append(read_pose(transform))
-    return Tracking(np.array(poses), np.array(vertices), faces), tracked, left_out
+    return Tracking(np.array(poses), vertices, faces), tracked, left_out

@@ -19,6 +19,7 @@ COMMANDS = {
     "view": "Play an asset in a browser.",
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
+    "vectors": "Tiny assets and the pictures that a player must show; compares a player's.",
     "export": "Write an asset as another program can read it.",
     "export-html": "One HTML file that plays an asset by itself.",
     "export-godot": "The same as `export godot`.",
@@ -37,6 +38,7 @@ COMMANDS = {
 
 EXTRAS = {
     "submission": "train",
+    "vectors": "train",
     "scores": "train",
     "report": "report",
     "mattes": "train",

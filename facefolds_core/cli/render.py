@@ -19,6 +19,7 @@ from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import rgb_to_yuv420
 from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
+from facefolds_core.cli.cameras import enlarged, named_camera
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file
 from facefolds_core.params import VideoCodec
@@ -141,6 +142,10 @@ def command(
     samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
     reflection: Annotated[bool, typer.Option(help="With the reflection, where the asset has one.")] = True,
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(help="`poster`, a camera of the capture by its name, or FILE.json with K, w2c, width, height."),
+    ] = None,
 ) -> None:
     """Render an asset with OpenGL, without a screen: a PNG still, or an MP4 film in which the sequence plays."""
     with report_user_errors("render"):
@@ -156,20 +161,30 @@ def command(
         if out.suffix.lower() != SUFFIXES[kind]:
             remedy = f"name a file that ends in {SUFFIXES[kind]}, or choose another --kind"
             raise UserError(f"the wrong kind of file for {kind.value}", file=out, remedy=remedy)
-        shown = pick_level(read_asset(asset), level)
+        read = read_asset(asset)
+        shown = pick_level(read, level)
         if not 0 <= frame < shown.num_frames:
             expected = f"0 to {shown.num_frames - 1}"
             raise UserError(
                 "no such frame", place="--frame", expected=expected, found=frame, remedy="choose one of these"
             )
+        given = None if camera is None else named_camera(read, camera)
+        if given is not None:
+            width, height = given.width, given.height
+            if kind is not Kind.STILL:
+                raise UserError("a film of one camera", place="--camera", remedy="leave out --kind, or --camera")
         start = Eye(azimuth, elevation, distance)
         with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
 
             def picture(eye: Eye, index: int) -> NDArray[np.uint8]:
-                camera = camera_of(eye, samples * width, samples * height, field_of_view)
-                return shrink(renderer.render(camera, index % shown.num_frames, colour)[0], samples)
+                seen = camera_of(eye, samples * width, samples * height, field_of_view)
+                return shrink(renderer.render(seen, index % shown.num_frames, colour)[0], samples)
 
-            if kind is Kind.STILL:
+            if given is not None:
+                with atomic_file(out) as temporary:
+                    still = shrink(renderer.render(enlarged(given, samples), frame, colour)[0], samples)
+                    Image.fromarray(still).save(temporary)
+            elif kind is Kind.STILL:
                 with atomic_file(out) as temporary:
                     Image.fromarray(picture(start, frame)).save(temporary)
             else:

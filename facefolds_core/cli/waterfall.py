@@ -14,7 +14,7 @@ from facefolds_core.config import read_train
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
-from facefolds_core.model.device import pick_device
+from facefolds_core.model.device import device_of
 from facefolds_core.packaging.views import spread
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.waterfall import waterfall
@@ -31,7 +31,7 @@ def command(
     with report_user_errors("waterfall"):
         for folders in map(SubjectFolders, subjects or evaluated_subjects(data)):
             scene = read_scene(folders.scene)
-            model = load_model(folders.model, pick_device(read_train(folders.config).device))
+            model = load_model(folders.model, device_of(read_train(folders.config)))
             steps = waterfall(scene, model, folders, spread(scene.num_frames, frames))
             with atomic_folder(folders.waterfall.parent) as temporary:
                 write_json(

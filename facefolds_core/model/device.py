@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 
 from facefolds_core.errors import UserError
+from facefolds_core.params import ExplicitParams, MlpParams
 
 
 def pick_device(name: str) -> torch.device:
@@ -24,3 +25,12 @@ def pick_device(name: str) -> torch.device:
     if name == "auto":
         name = "cuda" if torch.cuda.is_available() else "cpu"
     return torch.device(name)
+
+
+def device_of(train: ExplicitParams | MlpParams) -> torch.device:
+    """That a trained model is looked at on: the one that it was trained on, if torch can use it.
+
+    Raises:
+        UserError: as `pick_device`; not for `fast`, which needs no torch for CUDA to train on a GPU.
+    """
+    return pick_device("auto" if train.model == "explicit" and train.device == "cuda" else train.device)

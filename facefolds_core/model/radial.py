@@ -76,11 +76,15 @@ class RadialManifolds(nn.Module):
         """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
         return self.tracer()(offsets, directions)
 
-    def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
+    def tracer(self, gpu: bool = False) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """`compiled_distances` with the surfaces as they are now, prepared for many calls; on a GPU if asked for."""
         rho = self.radii().detach().cpu().numpy()
         window = np.array(self.window)
         top = ceiling(rho, window)
+        if gpu:
+            from facefolds_core.model.radial_gpu import Tracer
+
+            return Tracer(rho, window, top, self.radius, STEP)
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)

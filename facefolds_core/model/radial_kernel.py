@@ -1,4 +1,6 @@
-"""First crossings of rays with radius maps, compiled for CPUs. Reference: `radial.reference_crossings` (torch)."""
+"""First crossings of rays with radius maps, compiled for CPUs; GPUs: `radial_gpu.py`.
+
+Reference: `radial.reference_crossings` (torch)."""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.hit_codes import SCALE
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.jit import compiled, inlined, kernel
 
 Array = NDArray[Any]
 
@@ -90,102 +92,115 @@ def crossing_distances(
     far above all layers. A crossing lies between neighbouring samples inside the window at which |x - c| - rho changes
     sign; it is refined by regula falsi.
     """
-    count, layers = offsets.shape[0], rho.shape[2]
-    rows, columns = rho.shape[0], rho.shape[1]
+    result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
+    for ray in prange(offsets.shape[0]):
+        one, other = np.empty(rho.shape[2], np.float64), np.empty(rho.shape[2], np.float64)
+        cross(ray, offsets, directions, rho, window, ceiling, bound, step, result, one, other)
+    return result
+
+
+@compiled
+def cross(
+    ray: Any,
+    offsets: Any,
+    directions: Any,
+    rho: Any,
+    window: Any,
+    ceiling: Any,
+    bound: Any,
+    step: Any,
+    result: Any,
+    previous: Any,
+    current: Any,
+) -> None:
+    """`crossing_distances` of one ray, into result, which is 0. Scratch: two arrays (N,) float64."""
+    rows, columns, layers = rho.shape
     cells = ceiling.shape[0]
-    result = np.zeros((count, layers), np.float32)
-    for ray in prange(count):
-        ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
-        dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
-        along = ox * dx + oy * dy + oz * dz
-        disc = along * along - (ox * ox + oy * oy + oz * oz - bound * bound)
-        if disc <= 0.0:
-            continue
-        half = math.sqrt(disc)
-        near, far = max(-along - half, 0.0), -along + half
-        if dx > 0.0:
-            near = max(near, -ox / dx)
-        elif dx < 0.0:
-            far = min(far, -ox / dx)
-        if far <= near:
-            continue
-        previous = np.empty(layers, np.float64)
-        current = np.empty(layers, np.float64)
-        found = 0
-        last = -1.0  # distance of the last sample inside the window; < 0: none
-        state = 0  # of that sample: 1 above all layers, 2 below all, 3 among them
-        row_before = 0.0
-        column_before = 0.0
-        s = near
-        while True:
-            x, y, z = ox + s * dx, oy + s * dy, oz + s * dz
-            r = math.sqrt(x * x + y * y + z * z)
-            u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
-            v = _TO_UV * math.atan2(y, x)
-            ci = min(max(int((1.0 - u) * 0.5 * cells), 0), cells - 1)
-            cj = min(max(int((v + 1.0) * 0.5 * cells), 0), cells - 1)
-            if r - SKIP > ceiling[ci, cj]:
-                last = -1.0
-                if s >= far:
-                    break
-                s = min(s + SKIP, far)
-                continue
-            row = (window[1] - u) / (window[1] - window[0]) * (rows - 1)
-            column = (v - window[2]) / (window[3] - window[2]) * (columns - 1)
-            if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
-                last = -1.0
-            else:
-                i = min(int(row), rows - 2)
-                j = min(int(column), columns - 2)
-                a, b = row - i, column - j
-                w00, w01, w10, w11 = (1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b
-                for n in range(layers):
-                    current[n] = r - (
-                        w00 * rho[i, j, n]
-                        + w01 * rho[i, j + 1, n]
-                        + w10 * rho[i + 1, j, n]
-                        + w11 * rho[i + 1, j + 1, n]
-                    )
-                now = 1 if current[0] >= 0.0 else (2 if current[layers - 1] < 0.0 else 3)
-                if last >= 0.0 and (now != state or now == 3):
-                    # Grid position along the bracket: a parabola through its ends and its middle.
-                    t = 0.5 * (last + s)
-                    mx, my, mz = ox + t * dx, oy + t * dy, oz + t * dz
-                    mr = math.sqrt(mx * mx + my * my + mz * mz)
-                    mid_row, mid_column = _grid_position(mx, my, mz, mr, window, rows, columns)
-                    bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
-                    bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
-                    for n in range(layers):
-                        if result[ray, n] == 0.0 and (previous[n] >= 0.0) != (current[n] >= 0.0):
-                            fa, fb, ga, gb = 0.0, 1.0, previous[n], current[n]
-                            f = 0.0
-                            for _ in range(8):
-                                f = fa + (fb - fa) * (ga / (ga - gb))
-                                d = last + f * (s - last)
-                                x, y, z = ox + d * dx, oy + d * dy, oz + d * dz
-                                at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
-                                at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
-                                gm = math.sqrt(x * x + y * y + z * z) - _look_up(rho, at_row, at_column, n)
-                                if abs(gm) < 1e-6:
-                                    break
-                                if (gm >= 0.0) == (ga >= 0.0):
-                                    fa, ga = f, gm
-                                    gb *= 0.5  # Illinois: the stale end counts half
-                                else:
-                                    fb, gb = f, gm
-                                    ga *= 0.5
-                            result[ray, n] = last + f * (s - last)
-                            found += 1
-                    if found == layers:
-                        break
-                state = now
-                last = s
-                row_before, column_before = row, column
-                previous, current = current, previous
+    ox, oy, oz = offsets[ray, 0], offsets[ray, 1], offsets[ray, 2]
+    dx, dy, dz = directions[ray, 0], directions[ray, 1], directions[ray, 2]
+    along = ox * dx + oy * dy + oz * dz
+    disc = along * along - (ox * ox + oy * oy + oz * oz - bound * bound)
+    if disc <= 0.0:
+        return
+    half = math.sqrt(disc)
+    near, far = max(-along - half, 0.0), -along + half
+    if dx > 0.0:
+        near = max(near, -ox / dx)
+    elif dx < 0.0:
+        far = min(far, -ox / dx)
+    if far <= near:
+        return
+    found = 0
+    last = -1.0  # distance of the last sample inside the window; < 0: none
+    state = 0  # of that sample: 1 above all layers, 2 below all, 3 among them
+    row_before = 0.0
+    column_before = 0.0
+    s = near
+    while True:
+        x, y, z = ox + s * dx, oy + s * dy, oz + s * dz
+        r = math.sqrt(x * x + y * y + z * z)
+        u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
+        v = _TO_UV * math.atan2(y, x)
+        ci = min(max(int((1.0 - u) * 0.5 * cells), 0), cells - 1)
+        cj = min(max(int((v + 1.0) * 0.5 * cells), 0), cells - 1)
+        if r - SKIP > ceiling[ci, cj]:
+            last = -1.0
             if s >= far:
                 break
-            s = min(s + step, far)
-    return result
+            s = min(s + SKIP, far)
+            continue
+        row = (window[1] - u) / (window[1] - window[0]) * (rows - 1)
+        column = (v - window[2]) / (window[3] - window[2]) * (columns - 1)
+        if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
+            last = -1.0
+        else:
+            i = min(int(row), rows - 2)
+            j = min(int(column), columns - 2)
+            a, b = row - i, column - j
+            w00, w01, w10, w11 = (1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b
+            for n in range(layers):
+                current[n] = r - (
+                    w00 * rho[i, j, n] + w01 * rho[i, j + 1, n] + w10 * rho[i + 1, j, n] + w11 * rho[i + 1, j + 1, n]
+                )
+            now = 1 if current[0] >= 0.0 else (2 if current[layers - 1] < 0.0 else 3)
+            if last >= 0.0 and (now != state or now == 3):
+                # Grid position along the bracket: a parabola through its ends and its middle.
+                t = 0.5 * (last + s)
+                mx, my, mz = ox + t * dx, oy + t * dy, oz + t * dz
+                mr = math.sqrt(mx * mx + my * my + mz * mz)
+                mid_row, mid_column = _grid_position(mx, my, mz, mr, window, rows, columns)
+                bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
+                bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
+                for n in range(layers):
+                    if result[ray, n] == 0.0 and (previous[n] >= 0.0) != (current[n] >= 0.0):
+                        fa, fb, ga, gb = 0.0, 1.0, previous[n], current[n]
+                        f = 0.0
+                        for _ in range(8):
+                            f = fa + (fb - fa) * (ga / (ga - gb))
+                            d = last + f * (s - last)
+                            x, y, z = ox + d * dx, oy + d * dy, oz + d * dz
+                            at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
+                            at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
+                            gm = math.sqrt(x * x + y * y + z * z) - _look_up(rho, at_row, at_column, n)
+                            if abs(gm) < 1e-6:
+                                break
+                            if (gm >= 0.0) == (ga >= 0.0):
+                                fa, ga = f, gm
+                                gb *= 0.5  # Illinois: the stale end counts half
+                            else:
+                                fb, gb = f, gm
+                                ga *= 0.5
+                        result[ray, n] = last + f * (s - last)
+                        found += 1
+                if found == layers:
+                    break
+            state = now
+            last = s
+            row_before, column_before = row, column
+            previous, current = current, previous
+        if s >= far:
+            break
+        s = min(s + step, far)
 
 
 @kernel(parallel=True)
@@ -198,15 +213,21 @@ def texture_positions(
     """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
     for ray in prange(distance.shape[0]):
-        for n in range(distance.shape[1]):
-            d = distance[ray, n]
-            if d == 0.0:
-                continue
-            x = offsets[ray, 0] + d * directions[ray, 0]
-            y = offsets[ray, 1] + d * directions[ray, 1]
-            z = offsets[ray, 2] + d * directions[ray, 2]
-            r = math.sqrt(x * x + y * y + z * z)
-            row, column = _grid_position(x, y, z, r, window, 2, 2)
-            codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
-            codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))
+        encode(ray, offsets, directions, distance, window, codes)
     return codes
+
+
+@compiled
+def encode(ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, codes: Any) -> None:
+    """`texture_positions` of one ray, into codes, which are 0."""
+    for n in range(distance.shape[1]):
+        d = distance[ray, n]
+        if d == 0.0:
+            continue
+        x = offsets[ray, 0] + d * directions[ray, 0]
+        y = offsets[ray, 1] + d * directions[ray, 1]
+        z = offsets[ray, 2] + d * directions[ray, 2]
+        r = math.sqrt(x * x + y * y + z * z)
+        row, column = _grid_position(x, y, z, r, window, 2, 2)
+        codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
+        codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))

@@ -43,7 +43,8 @@ def coarse_content(
     Args:
         windows, meshes: of all layers of the export; the meshes as coarse as the level asks for.
     """
-    size = min(level.texture_resolution, full.textures.image(0, 0).shape[0])
+    # Never as fine as the full one's, whose picture would be as large.
+    size = min(level.texture_resolution, 3 * full.textures.image(0, 0).shape[0] // 4)
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
     return LevelContent(layers, textures, full.frames, full.fps)

@@ -174,6 +174,14 @@ class DivergenceParams(Section):
     """The learning rate is divided by this before a level is begun again: four attempts span a factor of 27."""
 
 
+class GpuParams(Section):
+    """With `device: cuda`."""
+
+    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 4096
+    """Of the GPU's memory, for the pictures and the crossings of frames; what does not fit is sent again when its turn
+    comes."""
+
+
 class ExplicitParams(Section):
     """Model `explicit`: nested radius maps with texel grids. Its defaults are the preset `fast`."""
 
@@ -184,7 +192,10 @@ class ExplicitParams(Section):
     """Follows from the preset."""
 
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """"auto" takes CUDA where there is one."""
+    """"cuda" needs the extra `cuda` and an NVIDIA GPU; "auto" is "cpu": no GPU has been measured yet."""
+
+    gpu: GpuParams = GpuParams()
+    """What a GPU needs beside."""
 
     seed: Seed = 0
     """Of the draws of rays and frames."""

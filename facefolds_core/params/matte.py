@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Natural, Section, Share
+from facefolds_core.params.base import Count, Length, Natural, Section, Share, Weight
 
 
 class CutOutParams(Section):
@@ -39,6 +39,13 @@ class VoteParams(Section):
 
     min_views: Count = 3
     """Voxels that fewer pictures see are nobody's."""
+
+    body_depth: Weight = 0.1
+    """Optical depth of a voxel of the starting volume from which on it belongs to the subject's body,"""
+
+    near: Length = 0.04
+    """and only what lies within this of the body can be the subject's, units: in the shadow that the head throws for
+    all others, one picture's bookshelf would be undisputed."""
 
     grow: Natural = 4
     """A cut-out may reach this far beyond the silhouette of what the pictures agree on, pixels: hair."""

@@ -220,7 +220,8 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
                 "height": view.truth.shape[0],
                 "width": view.truth.shape[1],
                 "truth": pictures.photo(view.truth),
-                "asset": pictures.photo(shown),
+                "asset": pictures.photo(shown) if worst else "",  # as it is, at the head of the page
+                "scored": pictures.photo(pictures.as_scored(view)),
                 # Over the plate nothing is left out: what stands beside the subject is an error, too.
                 "error": pictures.error_map(shown, view.truth, view.mask if view.over is None else None),
                 "part": "of the subject alone" if view.over is None and view.mask is not None else "of the whole frame",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.record import View
 from facefolds_core.scoring.sheets import ERROR_COLOURS, MAX_ERROR
 
 PHOTO_QUALITY = 88
@@ -64,3 +65,12 @@ def _encode(image: Image.Image, kind: str, **options: int | bool) -> str:
     buffer = io.BytesIO()
     image.save(buffer, kind, **options)
     return f"data:image/{kind};base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def as_scored(view: View) -> Array:
+    """(H, W, 3) the asset to be held against the photo: over the clean plate, else within the mask and the photo around
+    it, so that what differs is what was scored."""
+    if view.over is not None or view.mask is None:
+        return view.asset if view.over is None else view.over
+    inside = view.mask[..., None]
+    return np.asarray(inside * view.asset + (1 - inside) * view.truth)

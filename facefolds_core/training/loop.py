@@ -31,7 +31,7 @@ from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.losses import Losses, batch_losses
 from facefolds_core.training.patience import patiently
 from facefolds_core.training.rays import RaySampler
-from facefolds_core.training.report import TrainingReport, make_report
+from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.start import Start, find_start, fit_outline
 from facefolds_core.training.trained import Trained
 
@@ -237,7 +237,9 @@ def _fit(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> tuple
     psnr = _finish(run, params, log)
     state = run.state
     rays = state.iteration * params.rays
-    report = make_report(state.seconds, state.iteration, run.sampler.device, params.preset, rays, psnr)
+    device = run.sampler.device
+    memory = peak_memory(device)
+    report = make_report(state.seconds, state.iteration, device_name(device), memory, params.preset, rays, psnr)
     return run, Trained(state.model, run.spec, report)
 
 

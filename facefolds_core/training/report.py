@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 import torch
 
-from facefolds_core.model.device import pick_device as pick_device
-
 IMPORTED = time.process_time()
 """Processor time of this process until here."""
 
@@ -52,16 +50,16 @@ def peak_memory(device: torch.device) -> int:
 
 
 def make_report(
-    seconds: float, iterations: int, device: torch.device, preset: str, rays: int, psnr: float
+    seconds: float, iterations: int, device: str, memory: int, preset: str, rays: int, psnr: float
 ) -> TrainingReport:
-    """Args: `rays`: shaded in all iterations together; the others as in `TrainingReport`."""
+    """Args: `rays`: shaded in all iterations together; `memory`: at most, bytes; the others as in `TrainingReport`."""
     return TrainingReport(
         seconds=round(seconds, 1),
         processor_seconds=round(time.process_time() - IMPORTED, 2),
         iterations=iterations,
-        device=device_name(device),
+        device=device,
         preset=preset,
         rays_per_second=round(rays / max(seconds, 1e-9), 1),
-        peak_memory_bytes=peak_memory(device),
+        peak_memory_bytes=memory,
         final_psnr=round(psnr, 3),
     )

@@ -17,6 +17,7 @@ SHADERS = PACKAGE / "Runtime" / "Resources" / "Facefolds"
 def missing(*programs: str) -> str | None:
     """What is not installed, in words; None if all is there."""
     packages = {"mcs": "mono-mcs", "mono": "mono-runtime", "glslangValidator": "glslang-tools"}
+    packages["spirv-cross"] = "spirv-cross"
     lacking = [packages[name] for name in programs if shutil.which(name) is None]
     return f"no {', '.join(lacking)}: apt-get install {' '.join(lacking)}" if lacking else None
 
@@ -37,8 +38,8 @@ def core() -> list[Path]:
     return sorted((PACKAGE / "Runtime" / "Core").glob("*.cs"))
 
 
-def shader_complaints(shader: Path, place: Path, defines: Sequence[str]) -> list[str]:
-    """Of a compiler of HLSL, by stage; empty where there are none."""
+def spirv(shader: Path, place: Path, defines: Sequence[str]) -> list[str]:
+    """Compiles to `vert.spv` and `frag.spv`; complaints of a compiler of HLSL, by stage, empty where there are none."""
     code = re.search(r"HLSLPROGRAM(.*?)ENDHLSL", shader.read_text(), re.S)
     assert code is not None
     entries = dict(re.findall(r"#pragma (vertex|fragment) (\w+)", code[1]))
@@ -48,7 +49,7 @@ def shader_complaints(shader: Path, place: Path, defines: Sequence[str]) -> list
     for kind, stage in (("vertex", "vert"), ("fragment", "frag")):
         words = ["-D", "-V", "-S", stage, "-e", entries[kind], "--auto-map-bindings", "--auto-map-locations"]
         flags = [f"-I{SHADERS}", f"-I{STUBS}", *(f"-D{name}" for name in defines)]
-        done = run("glslangValidator", *words, *flags, "-o", place / "shader.spv", source)
+        done = run("glslangValidator", *words, *flags, "-o", place / f"{stage}.spv", source)
         if done.returncode:
             complaints.append(done.stdout + done.stderr)
     return complaints

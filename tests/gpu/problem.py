@@ -40,8 +40,12 @@ class Problem:
 
 
 def copied(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(copied(one) for one in value)
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
 def there(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(there(one) for one in value)
     return to_gpu(value) if isinstance(value, np.ndarray) else value

@@ -117,6 +117,16 @@ def smoothed() -> Problem:
     return Problem(kernels_gpu.smooth, TEXELS, arguments, {"out": 1e-6}, on_cpu, {"LAYERS": LAYERS})
 
 
+def assigned() -> Problem:
+    values = np.random.default_rng(4).normal(size=(TEXELS, LAYERS)).astype(np.float32)
+
+    def on_cpu(given: dict[str, Any]) -> None:
+        given["out"][:] = given["values"]
+
+    arguments = {"values": values, "out": np.zeros_like(values)}
+    return Problem(kernels_gpu.assign, TEXELS, arguments, {"out": 0}, on_cpu)
+
+
 PROBLEMS = {
     "shading in the rounds": lambda: shading(False, False),
     "shading of textures": lambda: shading(True, False),
@@ -125,4 +135,5 @@ PROBLEMS = {
     "activation": activation,
     "adam of textures": adam,
     "smoothing": smoothed,
+    "assignment": assigned,
 }

@@ -107,3 +107,13 @@ def test_training_cameras_vote_about_all_pictures(tmp_path: Path) -> None:
         found = find_mattes(scene, volume, pictures, PARAMS, bar)
     assert [(one.camera, one.frame) for one in found] == pictures
     assert any(one.believed and one.matte.any() and not one.matte.all() for one in found)
+
+
+def test_what_stands_in_the_heads_shadow_is_no_subject() -> None:
+    """Behind the head one picture's bookshelf is undisputed: the others see the head there."""
+    ball, cameras = _ball(0.15), _cameras()
+    pictures = [(opacity_in(ball, camera) > 0.5).astype(np.uint8) for camera in cameras]
+    pictures[0][:, :12] = 1
+    mended, agreement = outvoted(agreed(ball, cameras, pictures, VoteParams()), cameras, pictures, VoteParams())
+    assert not mended[0][:, :6].any()
+    assert agreement.argmin() == 0

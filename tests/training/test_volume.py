@@ -201,3 +201,12 @@ def test_a_tracked_mesh_of_another_size_is_found_out(scale: float, wrong: bool) 
     share = share_off(_ball(0.3), centre, vertices, ball.faces, PARAMS.mesh, START)
     assert (share > PARAMS.mesh.max_share_off) == wrong
     assert share > 0.95 or share < 0.05
+
+
+def test_the_bounds_compiled_into_the_kernel_are_below_what_a_picture_shows() -> None:
+    """Half a code of 255 is seen by nobody: bounds that change less are guards of arithmetic, no parameters."""
+    half = 0.5 / 255
+    assert half > kernel.OPAQUE  # what lies behind so little light adds at most as much
+    voxel = math.log1p(math.exp(kernel.LIMIT)), math.log1p(math.exp(-kernel.LIMIT))
+    assert math.exp(-voxel[0]) < half  # a voxel at the upper bound is opaque, across its side
+    assert 1 - math.exp(-voxel[1]) < kernel.CLEAR < half  # one at the lower bound is left out

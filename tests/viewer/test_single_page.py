@@ -14,6 +14,7 @@ from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.cli import app
 from facefolds_core.errors import UserError
 from tests.pictures import GREY, expected_pictures, five_cameras, psnr
+from tests.streamed import streamed_asset
 from tests.viewer.conftest import Player, fresh_context
 
 
@@ -47,3 +48,19 @@ def test_a_player_that_was_built_before(rich: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="older"):
         write_single_page(tmp_path / "face.html", rich, asset.manifest, asset.manifest.full, tmp_path)
     assert not (tmp_path / "face.html").exists()
+
+
+def test_a_long_take_in_one_file(
+    browser: Browser, player_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("facefolds_core.cli.export_html.find_player", lambda: player_folder)
+    streamed_asset(tmp_path / "asset", {"stream": {"segment_seconds": 0.2}}, 14, sound=True)
+    out = tmp_path / "face.html"
+    done = CliRunner().invoke(app, ["export-html", str(tmp_path / "asset"), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    with fresh_context(browser) as context:
+        player = Player(context.new_page(), out.as_uri())
+        player.page.goto(f"{out.as_uri()}#frame=0")
+        player.wait("e.ready")
+        assert player.run("return [await e.seek(13), e.frame, e.statistics.decoder]") == [True, 13, "WebCodecs"]
+        assert player.said == []

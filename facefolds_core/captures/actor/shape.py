@@ -32,7 +32,7 @@ _LID_RADIUS = 15.0
 _EYE_HALFWIDTH = 14.8
 MOUTH_Y = -67.0
 MOUTH_HALFWIDTH = 25.0
-_JAW_DROP = 21.0
+_JAW_DROP = 16.0
 BALL_X, BALL_Y, BALL_Z = 22.0, -62.0, 168.0
 """Centre of the ball before the mouth, some 70 mm in front of the lips."""
 

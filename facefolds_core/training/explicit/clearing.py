@@ -25,7 +25,7 @@ def clear_texels(state: TextureState, rays: Rays, passes: int, params: ExplicitP
     state.hide(hidden)
     apart, count = specks(_opacity(state), params.pruning)
     if count:
-        splinters = torch.from_numpy(apart.reshape(-1, 1)).to(state.device)
+        splinters = torch.from_numpy(apart.reshape(-1, 1))
         state.hide(splinters.expand_as(hidden))
         hidden |= splinters
         found.append(fact("specks_cleared", count=count, share=params.pruning.speck_share))
@@ -36,7 +36,7 @@ def clear_texels(state: TextureState, rays: Rays, passes: int, params: ExplicitP
 def _opacity(state: TextureState) -> NDArray[np.float32]:
     """(H, W) of all layers together, the most over all frames."""
     clear = [(1 - state.activated(k)[..., 3]).prod(1) for k in range(len(state.steps))]
-    opacity: NDArray[np.float32] = 1 - torch.stack(clear).amin(0).view(*state.shape).cpu().numpy()
+    opacity: NDArray[np.float32] = 1 - torch.stack(clear).amin(0).view(*state.shape).numpy()
     return opacity
 
 

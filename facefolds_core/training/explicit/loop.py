@@ -25,6 +25,7 @@ from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
+from facefolds_core.training.device import Device, choose
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice, choose_cameras
 from facefolds_core.training.explicit.clearing import clear_texels
@@ -32,12 +33,12 @@ from facefolds_core.training.explicit.fit import Fit, fit_scene, least_middle, r
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import Epochs, Level, plan
-from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes
+from facefolds_core.training.explicit.state import LossWeights, TextureState, model_bytes, state_type
 from facefolds_core.training.explicit.views import Images, Rays, check_images, rays_of
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import check_space, patiently
-from facefolds_core.training.report import TrainingReport, make_report, pick_device
+from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.trained import Trained
 from facefolds_core.training.volume.fit import Volume, iterations
 from facefolds_core.training.volume.search import find_subject
@@ -86,7 +87,7 @@ def fit_with_surroundings(
 ) -> tuple[Trained, Surroundings]:
     """`fit_explicit`, and what else was found out."""
     check_images(scene)
-    device = pick_device(params.device)
+    device = choose(params.device)
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
@@ -110,7 +111,13 @@ def fit_with_surroundings(
         patiently(live.make_summary)
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
-        time.perf_counter() - began, trainer.iteration, device, params.preset, trainer.rays, trainer.psnr
+        time.perf_counter() - began,
+        trainer.iteration,
+        device.name,
+        device.peak_memory(),
+        params.preset,
+        trainer.rays,
+        trainer.psnr,
     )
     draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
     assert trainer.state is not None
@@ -120,9 +127,7 @@ def fit_with_surroundings(
 
 
 class _Trainer:
-    def __init__(
-        self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: torch.device
-    ) -> None:
+    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: Device) -> None:
         self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
         self.scene = cameras.scene
         self.images = Images(self.scene, cameras.gains)
@@ -183,14 +188,14 @@ class _Trainer:
         if new_rays:
             finest = level.texels if level.stride > 1 else self.fit.texels
             share = self.params.textures.rays_per_texel * finest[0] * finest[1]
-            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving)
+            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
             self.stride = level.stride
         assert self.views is not None
         if self.state is None:
             background = first_background(self.scene, self.images, self.volume, self.params.background)
             start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
             shape = (self.params.layers, self.scene.num_frames)
-            self.state = TextureState(level.texels, *shape, start, background, self.params, self.device)
+            self.state = state_type(self.device.gpu)(level.texels, *shape, start, background, self.params)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:
@@ -204,7 +209,7 @@ class _Trainer:
         h, w = self.state.shape
         alpha = torch.stack([self.state.activated(k)[..., 3].clone() for k in range(self.scene.num_frames)]).mean(0)
         seen = self.state.layers[2, ..., 3] > 0
-        alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2).cpu()
+        alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
         nodes = torch.nn.functional.interpolate(
             alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
         )
@@ -235,7 +240,7 @@ class _Trainer:
             error = self.state.step(
                 views,
                 rays,
-                self.images.frame(frame),
+                self.images,
                 frame,
                 weights,
                 rates,

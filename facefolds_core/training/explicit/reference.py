@@ -1,4 +1,4 @@
-"""The same as the compiled kernels, in plain torch: what they are tested against, and what runs on other devices."""
+"""The same as the compiled kernels, in plain torch: what they are tested against."""
 
 from __future__ import annotations
 

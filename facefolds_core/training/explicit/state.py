@@ -1,4 +1,6 @@
-"""Texture grids while they are trained: values and Adam's moments, on a CPU (compiled) or any device (torch)."""
+"""Texture grids while they are trained: values and Adam's moments. Steps are compiled for CPUs.
+
+On a GPU: `state_gpu.py`."""
 
 from __future__ import annotations
 
@@ -11,10 +13,10 @@ from torch import Tensor
 
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import corrections, decays
-from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
+from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.reflection_kernel import look
-from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
-from facefolds_core.training.explicit.views import Rays, Views
+from facefolds_core.training.explicit.smoothing import smooth
+from facefolds_core.training.explicit.views import Pictures, Rays, Views
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
@@ -62,18 +64,17 @@ class TextureState:
         start: Tensor,
         background: Tensor,
         params: ExplicitParams,
-        device: torch.device,
     ) -> None:
         m = shape[0] * shape[1]
-        self.device, self.params = device, params
+        self.params = params
         self.shape = shape
-        self.colour = torch.zeros(3, m, 3, device=device)
-        self.layers = torch.zeros(3, m, layers, 4, device=device)
-        self.frame_colour = torch.zeros(3, frames, m, 3, device=device)
-        self.frame_alpha = torch.zeros(3, frames, m, layers, device=device)
-        self.start = start.to(device)
+        self.colour = torch.zeros(3, m, 3)
+        self.layers = torch.zeros(3, m, layers, 4)
+        self.frame_colour = torch.zeros(3, frames, m, 3)
+        self.frame_alpha = torch.zeros(3, frames, m, layers)
+        self.start = start
         self.colour[0] = self._start()[:, :3]
-        self.background = background.to(device)
+        self.background = background
         self.shine = np.zeros((0, 3), np.float32)
         self.reset_alpha()
         self._allocate()
@@ -81,9 +82,8 @@ class TextureState:
     def _allocate(self) -> None:
         m, n = self.layers.shape[1:3]
         self.steps = np.zeros(self.frame_colour.shape[1], np.int64)
-        if self.device.type == "cpu":
-            self.texture = torch.empty(m, n, 4)
-            self.gradient = torch.zeros(n, m, 4)
+        self.texture = torch.empty(m, n, 4)
+        self.gradient = torch.zeros(n, m, 4)
 
     def reset_alpha(self) -> None:
         """Back to the initial opacity; colours stay. For layers that have moved."""
@@ -91,7 +91,7 @@ class TextureState:
         self.layers[1:, ..., :3] = 0
         n = self.layers.shape[2]
         weight = self._start()[:, 3:].clamp(self.params.start.min_opacity, self.params.start.max_opacity) / n
-        alpha = weight / (1 - weight * torch.arange(n, device=self.device))
+        alpha = weight / (1 - weight * torch.arange(n))
         self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
 
@@ -120,108 +120,72 @@ class TextureState:
     def activated(self, frame: int) -> Tensor:
         """[M, N, 4] of one frame."""
         parts = (self.colour[0], self.layers[0], self.frame_colour[0, frame], self.frame_alpha[0, frame])
-        if self.device.type != "cpu":
-            return reference.activate(*parts)
-        a, b, c, d = (p.numpy() for p in parts)
-        adam_kernel.activate(a, b, c, d, self.texture.numpy())
+        adam_kernel.activate(*(part.numpy() for part in parts), self.texture.numpy())
         return self.texture
 
     def step(
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: NDArray[np.uint8],
+        images: Pictures,
         frame: int,
         weights: LossWeights,
         rates: NDArray[np.float32],
     ) -> float:
         """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
-        background_rate, keep = self.params.background.rate, self.params.textures.frame_decay
-        texture = self.activated(frame)
-        self.steps[frame] += 1
-        total, own = int(self.steps.sum()), int(self.steps[frame])
-        betas = self.params.textures.betas
-        correct = np.array([*corrections(betas, total), *corrections(betas, own)], np.float32)
-        if self.device.type == "cpu":
-            (h, w), n = self.shape, texture.shape[1]
-            squares = shading_kernel.shade(
-                views.codes,
-                views.camera,
-                views.pixel,
-                rays,
-                images,
-                self.background.numpy(),
-                texture.numpy().reshape(h, w, n, 4),
-                self.shine,
-                self.gradient.numpy().reshape(n, h, w, 4),
-                weights.opacity,
-                weights.binarisation,
-                background_rate,
-                weights.min_alpha,
-                self.params.textures.min_light,
-            )
-            adam_kernel.adam_step(
-                self.colour.numpy(),
-                self.layers.numpy(),
-                self.frame_colour[:, frame].numpy(),
-                self.frame_alpha[:, frame].numpy(),
-                texture.numpy(),
-                self.gradient.numpy(),
-                rates,
-                np.float32(keep),
-                correct,
-                decays(betas),
-            )
-        else:
-            squares = self._reference_step(views, rays, images, frame, texture, weights, rates, correct)
-        return float(squares) / (3 * len(rays))
+        correct = self._count_step(frame)
+        squares = self._step(views, rays, images, frame, weights, rates, correct)
+        return squares / (3 * len(rays))
 
-    def _reference_step(
+    def _count_step(self, frame: int) -> NDArray[np.float32]:
+        """(4,) bias corrections, see `adam_kernel.adam_step`, of one step more on a frame."""
+        self.steps[frame] += 1
+        betas = self.params.textures.betas
+        static, own = corrections(betas, int(self.steps.sum())), corrections(betas, int(self.steps[frame]))
+        return np.array([*static, *own], np.float32)
+
+    def _step(
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: NDArray[np.uint8],
+        images: Pictures,
         frame: int,
-        texture: Tensor,
         weights: LossWeights,
         rates: NDArray[np.float32],
         correct: NDArray[np.float32],
     ) -> float:
-        """`step` in plain torch."""
-        camera, pixel = views.camera[rays], views.pixel[rays]
-        codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
-        target = torch.from_numpy(images[camera, pixel]).to(self.device).float() / 255
-        at = (
-            torch.from_numpy(camera.astype(np.int64)).to(self.device),
-            torch.from_numpy(pixel.astype(np.int64)).to(self.device),
-        )
-        n = texture.shape[1]
-        gradient, moved, squares = reference.shade(
-            codes,
-            target,
-            self.background[at],
-            texture.view(*self.shape, n, 4),
-            torch.from_numpy(self.shine[rays]).to(self.device) if len(self.shine) else None,
+        """Returns the sum of |C - I|^2."""
+        texture = self.activated(frame)
+        (h, w), n = self.shape, texture.shape[1]
+        squares: float = shading_kernel.shade(
+            views.codes,
+            views.camera,
+            views.pixel,
+            rays,
+            images.frame(frame),
+            self.background.numpy(),
+            texture.numpy().reshape(h, w, n, 4),
+            self.shine,
+            self.gradient.numpy().reshape(n, h, w, 4),
             weights.opacity,
             weights.binarisation,
             self.params.background.rate,
             weights.min_alpha,
             self.params.textures.min_light,
         )
-        self.background[at] = moved
-        reference.adam_step(
-            self.colour,
-            self.layers,
-            self.frame_colour[:, frame],
-            self.frame_alpha[:, frame],
-            texture,
-            gradient.view(-1, n, 4),
-            torch.from_numpy(rates).to(self.device),
-            self.params.textures.frame_decay,
-            torch.from_numpy(correct).to(self.device),
-            self.params.textures.betas,
+        adam_kernel.adam_step(
+            self.colour.numpy(),
+            self.layers.numpy(),
+            self.frame_colour[:, frame].numpy(),
+            self.frame_alpha[:, frame].numpy(),
+            texture.numpy(),
+            self.gradient.numpy(),
+            rates,
+            np.float32(self.params.textures.frame_decay),
+            correct,
+            decays(self.params.textures.betas),
         )
-        return float(squares)
+        return squares
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""
@@ -233,17 +197,13 @@ class TextureState:
         self._smooth(self.frame_alpha[0, frame])
 
     def _smooth(self, logits: Tensor) -> None:
-        if self.device.type == "cpu":
-            smoothed = torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape))
-        else:
-            smoothed = smooth_reference(logits, *self.shape)
-        logits.copy_(smoothed)
+        logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
 
     def look(self, views: Views, images: NDArray[np.uint8], frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
         (h, w), n = self.shape, self.layers.shape[2]
-        texture = self.activated(frame).cpu().numpy().reshape(h, w, n, 4)
-        background, least = self.background.cpu().numpy(), self.params.textures.min_light
+        texture = self.activated(frame).numpy().reshape(h, w, n, 4)
+        background, least = self.background.numpy(), self.params.textures.min_light
         look(views.codes, views.camera, views.pixel, images, background, texture, seen, least)
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
@@ -254,12 +214,8 @@ class TextureState:
         for i in range(max(passes, frames)):
             views, rays = source.part(i % frames, i % passes, passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
-            if self.device.type == "cpu":
-                shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), least)
-            else:
-                codes = torch.from_numpy(views.codes[rays].astype(np.int32)).to(self.device)
-                torch.maximum(peak, reference.contributions(codes, texture, least).cpu(), out=peak)
-        return peak.view(n, -1).T.contiguous().to(self.device)
+            shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), least)
+        return peak.view(n, -1).T.contiguous()
 
     def hide(self, unseen: Tensor) -> None:
         """Make texels [M, N] bool transparent."""
@@ -277,8 +233,7 @@ class TextureState:
         for tensor in (self.colour, self.layers, self.frame_colour, self.frame_alpha):
             tensor[1:].zero_()
         self.steps[:] = 0
-        if self.device.type == "cpu":
-            self.gradient.zero_()
+        self.gradient.zero_()
 
     def forget_moments(self) -> None:
         """Give their memory back, two thirds of the grids'; no `step` can follow."""
@@ -287,6 +242,15 @@ class TextureState:
 
     def _values(self) -> list[Tensor]:
         return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0], self.background]
+
+
+def state_type(gpu: bool) -> type[TextureState]:
+    """The class whose steps run there."""
+    if not gpu:
+        return TextureState
+    from facefolds_core.training.explicit.state_gpu import GpuTextureState
+
+    return GpuTextureState
 
 
 def _with_moments(values: Tensor) -> Tensor:

@@ -36,7 +36,7 @@ class Views:
     directions: NDArray[np.float32]
 
 
-def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
+def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
     """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers.
 
     Raises:
@@ -44,14 +44,14 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     """
     codes, cameras, pixels, along = [], [], [], []
     centre = manifolds.centre.cpu().numpy().astype(np.float64)
-    window = np.array(manifolds.window)
+    window, trace = np.array(manifolds.window), manifolds.tracer(gpu)
     for position, index in enumerate(scene.indices("train")):
         origins, directions = scene.cameras[index].rays()
         first = position * 7 % stride
         chosen = np.arange(first, scene.height * scene.width, stride)
         offsets = np.ascontiguousarray(origins.reshape(-1, 3)[chosen] - centre)
         directions = np.ascontiguousarray(directions.reshape(-1, 3)[chosen])
-        distance = manifolds.compiled_distances(offsets, directions)
+        distance = trace(offsets, directions)
         hit = np.flatnonzero((distance > 0).any(1))
         codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
         cameras.append(np.full(len(hit), position, np.int32))
@@ -131,6 +131,7 @@ class MovingRays:
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how many shares a frame has in use, and how much is kept.
         first: number of the first share of frame 0.
+        gpu: whether they are traced on a GPU.
     """
 
     def __init__(
@@ -141,11 +142,12 @@ class MovingRays:
         share: float,
         params: MovingParams,
         first: int = 0,
+        gpu: bool = False,
     ) -> None:
         self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
-        self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, params.sample_frames)})
@@ -191,15 +193,35 @@ class MovingRays:
         return origins - self._centre, directions
 
 
-def rays_of(scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams) -> Rays:
-    """The rays of a scene's training cameras; for `share` see `MovingRays`.
+def rays_of(
+    scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams, gpu: bool = False
+) -> Rays:
+    """The rays of a scene's training cameras, traced on a GPU if asked for; for `share` see `MovingRays`.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
     if scene.poses is None:
-        return StillRays(trace_views(scene, manifolds, stride))
-    return MovingRays(scene, manifolds, stride, share, params)
+        return StillRays(trace_views(scene, manifolds, stride, gpu))
+    return MovingRays(scene, manifolds, stride, share, params, gpu=gpu)
+
+
+class Pictures(Protocol):
+    """Of the training cameras, by frame."""
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """(C, H W, 3)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The pictures of one frame, whichever is asked for."""
+
+    images: NDArray[np.uint8]
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        return self.images
 
 
 class Images:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VoteParams
@@ -22,7 +23,7 @@ def agreed(volume: Volume, cameras: Sequence[Camera], cut_outs: Sequence[Image],
     """The visual hull that enough pictures agree on, as a volume that is solid there and empty elsewhere.
 
     Args:
-        volume: whose grid it has, twice as coarse.
+        volume: whose grid it has, twice as coarse, and near whose body the hull stays.
         cameras: of the cut-outs' sizes.
         cut_outs: (H, W) 1 where the subject is.
     """
@@ -37,8 +38,10 @@ def agreed(volume: Volume, cameras: Sequence[Camera], cut_outs: Sequence[Image],
         seen += there
         inside[there] += picture[y[there], x[there]]
     kept = (seen >= params.min_views) & (inside >= params.share * seen)
+    body = np.logaddexp(0, volume.grid[..., 0]) > params.body_depth
+    near = ndimage.distance_transform_edt(~body, sampling=volume.voxel) <= params.near
     grid = np.zeros_like(volume.grid)
-    grid[..., 0] = np.where(kept.reshape(grid.shape[:3]), kernel.LIMIT, -kernel.LIMIT)
+    grid[..., 0] = np.where(kept.reshape(near.shape) & near, kernel.LIMIT, -kernel.LIMIT)
     return replace(volume, grid=grid)
 
 

@@ -17,8 +17,9 @@ from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.state import LossWeights, TextureState
-from facefolds_core.training.explicit.views import Images, MovingRays, Rays, StillRays, trace_views
+from facefolds_core.training.device import Device
+from facefolds_core.training.explicit.state import LossWeights, state_type
+from facefolds_core.training.explicit.views import Images, MovingRays, Rays, Shown, StillRays, trace_views
 from facefolds_core.training.segments.base import Base
 
 
@@ -46,19 +47,19 @@ class FrameFitter:
         device: of the textures.
     """
 
-    def __init__(self, scene: Scene, base: Base, params: ExplicitParams, device: torch.device) -> None:
-        self.scene, self.base = scene, base
+    def __init__(self, scene: Scene, base: Base, params: ExplicitParams, device: Device) -> None:
+        self.scene, self.base, self.gpu = scene, base, device.gpu
         still = params.background.model_copy(update={"rate": 0.0})
         self.params = params.model_copy(update={"background": still})
         self.images = Images(scene, base.surroundings.gains)
         h, w = base.spec.texels
         background = torch.from_numpy(base.surroundings.background)
         shape = (base.spec.num_layers, 1)
-        self.state = TextureState((h, w), *shape, torch.zeros(2, 2, 4), background, self.params, device)
+        self.state = state_type(self.gpu)((h, w), *shape, torch.zeros(2, 2, 4), background, self.params)
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
-        self.still = None if scene.poses is not None else StillRays(trace_views(scene, base.manifolds, 1))
+        self.still = None if scene.poses is not None else StillRays(trace_views(scene, base.manifolds, 1, self.gpu))
 
     def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> FittedFrame:
         """Args:
@@ -78,7 +79,7 @@ class FrameFitter:
         losses, steps = params.losses, params.segments.steps
         weights = LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, params.textures.min_alpha)
         phases: list[int] = []
-        rays, errors, images = 0, [], self.images.frame(frame)
+        rays, errors, images = 0, [], Shown(self.images.frame(frame))
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
@@ -91,7 +92,7 @@ class FrameFitter:
         psnr = -10 * float(np.log10(max(float(np.mean(errors[-parts:])), 1e-12)))
         h, w = state.shape
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
-        return FittedFrame(colour.half().cpu(), alpha.half().cpu(), psnr, rays)
+        return FittedFrame(colour.half(), alpha.half(), psnr, rays)
 
     def _start(self, shares: NDArray[np.float64]) -> None:
         colour, alpha = self.base.mixed(shares)
@@ -108,7 +109,8 @@ class FrameFitter:
         h, w = self.state.shape
         share = self.params.textures.rays_per_texel * h * w
         alone = part_of(self.scene, [frame])
-        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, int(random.integers(1 << 30)))
+        first = int(random.integers(1 << 30))
+        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first, self.gpu)
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         to = self.params.textures

@@ -24,11 +24,12 @@ from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
+from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
-from facefolds_core.training.report import TrainingReport, make_report, pick_device
+from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.segments.base import (
     Base,
     digest_of_fitting,
@@ -80,7 +81,7 @@ class _Take:
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
-        self.device = pick_device(params.device)
+        self.device = choose(params.device)
         self.began = time.perf_counter()
         training = digest_of_training(params)
         frames = progress(range(scene.num_frames), desc="fingerprints", unit="frame")
@@ -160,7 +161,13 @@ class _Take:
         textures.colour, textures.layers = shared.colour, shared.layers
         textures.attach(paths, _REMEDY)
         report = make_report(
-            time.perf_counter() - self.began, self.steps, self.device, self.params.preset, self.rays, psnr
+            time.perf_counter() - self.began,
+            self.steps,
+            self.device.name,
+            self.device.peak_memory(),
+            self.params.preset,
+            self.rays,
+            psnr,
         )
         before = read_json(base.folder / "training.json", _REMEDY)
         report = replace(report, iterations=report.iterations + int(before["iterations"]))

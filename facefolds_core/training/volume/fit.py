@@ -16,11 +16,12 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, VolumeParams
+from facefolds_core.training.device import choose
 from facefolds_core.training.photos import posed_photos
-from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume import kernel, look_kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.optimise import Rays, clear, rays_of, train
-from facefolds_core.training.volume.room import Room
+from facefolds_core.training.volume.room import Room, room_type
 
 Array = NDArray[np.float32]
 
@@ -61,7 +62,7 @@ class Volume:
 
     def render(self, origins: Array, directions: Array) -> tuple[Array, Array, Array]:
         """Rays (R, 3) -> rgb over black (R, 3), alpha (R,), distance at which T falls to 1/2 or 0 (R,)."""
-        rgb, alpha, depth = kernel.render(
+        rgb, alpha, depth = look_kernel.render(
             np.ascontiguousarray(origins, np.float32),
             np.ascontiguousarray(directions, np.float32),
             self.grid,
@@ -138,7 +139,10 @@ class VolumeFit:
         self.random = np.random.default_rng(params.seed)
         self.mean = np.mean([view.photo.image.mean((0, 1)) for view in self.views], 0) / 255
         farthest = max(float(np.linalg.norm(c.centre)) for c in self.cameras)
-        self.room = Room(self.mean.astype(np.float32), farthest, params.volume.reach, params.room, params.environment)
+        self.gpu = choose(params.device).gpu
+        self.room = room_type(self.gpu)(
+            self.mean.astype(np.float32), farthest, params.volume.reach, params.room, params.environment
+        )
         self.grid: Array | None = None
         self.voxel = self.psnr = 0.0
         self.found = CameraFit.alike(len(indices), params.cameras)
@@ -164,8 +168,10 @@ class VolumeFit:
         last = number == len(wanted.levels) - 1
         if self.outer:
             self.room.refine(level.room)
-        self.psnr = train(grid, share, self.lower, finer, rays, self.room, level, last, wanted, self.random, bar)
-        rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, self.lower, finer, wanted.step * finer)
+        self.psnr = train(
+            grid, share, self.lower, finer, rays, self.room, level, last, wanted, self.random, bar, self.gpu
+        )
+        rgb, alpha, _ = look_kernel.render(rays.origins, rays.directions, grid, self.lower, finer, wanted.step * finer)
         self.found = self.found.refined(rgb, alpha, rays.colours, rays.camera)
         self.grid, self.voxel, self.rays = grid, finer, rays
 
@@ -181,7 +187,7 @@ class VolumeFit:
         clear(self.grid, self.lower, self.voxel, self.rays, self.room, self.params.volume)
         rays = self.rays
         step = self.params.volume.step * self.voxel
-        _, alpha, _ = kernel.render(rays.origins, rays.directions, self.grid, self.lower, self.voxel, step)
+        _, alpha, _ = look_kernel.render(rays.origins, rays.directions, self.grid, self.lower, self.voxel, step)
         self.room.forget_unseen(rays.room_origins, rays.room_directions, 1 - alpha)
         return self.volume()
 

@@ -15,10 +15,11 @@ from tqdm import tqdm
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VolumeLevel, VolumeParams
-from facefolds_core.training.adam import corrections, decays
+from facefolds_core.training.adam import corrections
 from facefolds_core.training.photos import PosedPhoto
-from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume import kernel, look_kernel
 from facefolds_core.training.volume.room import Room
+from facefolds_core.training.volume.steps import shade, steps_type
 
 Array = NDArray[np.float32]
 
@@ -98,59 +99,6 @@ def _rays(camera: Camera, pixels: NDArray[np.float64]) -> tuple[Array, Array]:
     return np.broadcast_to(origins, directions.shape).astype(np.float32), directions.astype(np.float32)
 
 
-def _occupied(density: Array, empty_depth: float) -> NDArray[np.bool_]:
-    """Blocks that hold, or touch, a voxel that is not empty."""
-    block = kernel.BLOCK
-    blocks = tuple(n // block + 1 for n in density.shape)
-    padded = np.full([block * n for n in blocks], -kernel.LIMIT, np.float32)
-    padded[tuple(slice(n) for n in density.shape)] = ndimage.maximum_filter(density, 3)
-    split = padded.reshape(blocks[0], block, blocks[1], block, blocks[2], block)
-    occupied: NDArray[np.bool_] = split.max((1, 3, 5)) > math.log(math.expm1(empty_depth))
-    return occupied
-
-
-def _shade(
-    grid: Array,
-    occupied: NDArray[np.bool_],
-    lower: NDArray[np.float64],
-    voxel: float,
-    rays: Rays,
-    jitter: Array,
-    background: Array,
-    gradient: Array,
-    touched: NDArray[np.bool_],
-    step: float,
-    opacity_weight: float,
-    binarisation_weight: float,
-    matte_weight: float,
-) -> tuple[float, Array, Array]:
-    """`kernel.shade` with steps of so many voxels: sum of |C - I|^2, residuals (R, 3), transmittance (R,)."""
-    residual, transmittance = np.empty_like(rays.colours), np.empty(len(rays.colours), np.float32)
-    samples = int(math.sqrt(3) * max(grid.shape) / step) + 2
-    squares: float = kernel.shade(
-        rays.origins,
-        rays.directions,
-        jitter,
-        rays.colours,
-        background,
-        rays.matte,
-        grid,
-        occupied,
-        lower,
-        voxel,
-        step * voxel,
-        samples,
-        gradient,
-        touched,
-        residual,
-        transmittance,
-        opacity_weight,
-        binarisation_weight,
-        matte_weight,
-    )
-    return squares, residual, transmittance
-
-
 def clear(
     grid: Array,
     lower: NDArray[np.float64],
@@ -163,7 +111,7 @@ def clear(
     they see in the volume is from the room behind it. What no ray reaches stays."""
     gradient, touched = kernel.empty_gradient(grid.shape)
     background, _ = rays.over(room.look_up(rays.room_origins, rays.room_directions))
-    rgb, alpha, _ = kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
+    rgb, alpha, _ = look_kernel.render(rays.origins, rays.directions, grid, lower, voxel, params.step * voxel)
     contrast = rgb / np.maximum(alpha, 0.1)[:, None] - background
     # The kernel splats its residuals C - I: with this target they are (squared contrast, 1, 0).
     wanted = np.zeros_like(rgb)
@@ -172,7 +120,7 @@ def clear(
     occupied = np.ones(tuple(n // kernel.BLOCK + 1 for n in grid.shape[:3]), bool)
     half = np.full(len(rgb), 0.5, np.float32)
     seen = replace(rays, colours=target)
-    _shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, params.step, 0.0, 0.0, 0.0)
+    shade(grid, occupied, lower, voxel, seen, half, background, gradient, touched, params.step, 0.0, 0.0, 0.0)
     total = gradient.sum(0)
     weight = ndimage.gaussian_filter(total[..., 2], 1.0)
     evidence = ndimage.gaussian_filter(total[..., 1], 1.0) / np.maximum(weight, 1e-12)
@@ -191,47 +139,33 @@ def train(
     params: VolumeParams,
     random: np.random.Generator,
     bar: tqdm,
+    gpu: bool = False,
 ) -> float:
     """Adam on `values`, in place; returns PSNR on the rays of the last iterations."""
-    grid = np.stack([values, np.zeros_like(values), np.zeros_like(values)])
-    gradient, touched = kernel.empty_gradient(values.shape)
-    count, decay = min(params.rays, len(rays.origins)), decays(params.betas)
+    steps = steps_type(gpu)(values, share, lower, voxel, params)
+    count = min(params.rays, len(rays.origins))
     recent = math.nan
     for i in range(level.iterations):
         if i % 25 == 0:
-            occupied = _occupied(grid[0, ..., 0], params.empty_depth)
+            steps.occupy()
         chosen = np.sort(random.choice(len(rays.origins), count, replace=False))
         part = rays.choose(chosen)
         jitter = random.random(count, np.float32)
         behind = room.look(part.room_origins, part.room_directions, jitter)
         background, unknown = part.over(behind.colours)
-        squares, residual, transmittance = _shade(
-            grid[0],
-            occupied,
-            lower,
-            voxel,
-            part,
-            jitter,
-            background,
-            gradient,
-            touched,
-            params.step,
-            params.opacity_weight,
-            params.binarisation_weight,
-            params.matte_weight,
-        )
+        squares, residual, transmittance = steps.shade(part, jitter, background)
         if not math.isfinite(squares):
             raise UserError("the fit of the starting volume diverged", remedy="check the capture's calibration")
         scale = 1 - (1 - params.final_rate) * i / level.iterations if last else 1.0
         bias = corrections(params.betas, i + 1)
         rates = scale * params.learning_rate, scale * params.colour_learning_rate
         room.step(behind, (transmittance * unknown)[:, None] * residual, scale, *rates)
-        kernel.adam_step(grid, gradient, touched, share, *rates, *bias, decay, params.smoothness_weight)
+        steps.move(*rates, *bias)
         error = squares / (3 * count)
         recent = error if i == 0 else 0.9 * recent + 0.1 * error
         bar.update()
         bar.set_postfix(volume=f"{max(values.shape)}^3", psnr=f"{_psnr(recent):.2f}", refresh=False)
-    values[:] = grid[0]
+    values[:] = steps.values()
     return _psnr(recent)
 
 

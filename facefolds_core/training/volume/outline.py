@@ -14,7 +14,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv, uv_to_directions
 from facefolds_core.params import StartParams
-from facefolds_core.training.volume import kernel
+from facefolds_core.training.volume import look_kernel
 from facefolds_core.training.volume.fit import Volume
 
 Array = NDArray[np.float64]
@@ -49,11 +49,11 @@ def profile(volume: Volume, centre: Array, directions: Array, least: float) -> P
     corners = volume.lower + volume.voxel * ends * size
     farthest = float(np.linalg.norm(corners - centre, axis=1).max())
     flat = np.ascontiguousarray(directions.reshape(-1, 3))
-    opacity, rgb, radii = kernel.profile(
+    opacity, rgb, radii = look_kernel.profile(
         volume.grid, volume.lower, volume.voxel, centre, flat, farthest, 0.5 * volume.voxel, np.array([0.5, 0.1, 0.9])
     )
     radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
-    rgb /= np.maximum(opacity, kernel.CLEAR)[:, None]
+    rgb /= np.maximum(opacity, look_kernel.CLEAR)[:, None]
     shape = directions.shape[:-1]
     middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
     return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from facefolds_core.model.compositing import compositing_weights, transmittances
-from facefolds_core.training.volume.kernel import CLEAR, OPAQUE
+from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE
 
 
 def sample(grid: Tensor, points: Tensor, lower: Tensor, voxel: float) -> Tensor:

@@ -92,9 +92,7 @@ class Room:
         far, taps, weights = self.environment.look_up(origins, directions)
         if not self.outer:
             return Looked(origins, directions, jitter, far, np.ones(len(far), np.float32), far, taps, weights)
-        rgb, through = room_kernel.look(
-            origins, directions, jitter, self.grid[0], self.radius, self.step_length, self.params.farthest
-        )
+        rgb, through = self._see(origins, directions, jitter)
         colours = (rgb + through[:, None] * far).astype(np.float32)
         return Looked(origins, directions, jitter, colours, through, far.astype(np.float32), taps, weights)
 
@@ -111,9 +109,7 @@ class Room:
             return
         self._splat(seen, slope)
         self._steps += 1
-        rates = rate, colour_rate, *corrections(self.params.betas, self._steps), decays(self.params.betas)
-        weight = self.params.smoothness_weight
-        kernel.adam_step(self.grid, self._gradient, self._touched, self._share, *rates, weight)
+        self._move((rate, colour_rate, *corrections(self.params.betas, self._steps)))
 
     def forget_unseen(self, origins: Array, directions: Array, through: Array) -> None:
         """Give voxels that no rays (R, 3) have reached, with transmittances (R,), the colours of their neighbours."""
@@ -121,8 +117,7 @@ class Room:
             return
         seen = self.look(origins, directions, np.full(len(origins), 0.5, np.float32))
         self._splat(seen, np.repeat(through[:, None], 3, 1))
-        weight = self._gradient[..., 1].sum(0)
-        self._gradient[:], self._touched[:] = 0, False
+        weight = self._take_splatted()[..., 1]
         colours = self.grid[0, ..., 1:]
         guess = np.broadcast_to(np.average(colours.reshape(-1, 3), 0, weight.ravel() + 1e-9), colours.shape)
         for blur in (16.0, 8.0, 4.0, 2.0):
@@ -131,6 +126,23 @@ class Room:
             guess = (mean + 0.01 * guess) / (mass + 0.01)
         trust = weight[..., None] / (weight[..., None] + self.params.seen_rays)
         self.grid[0, ..., 1:] = trust * colours + (1 - trust) * guess
+
+    def _see(self, origins: Array, directions: Array, jitter: Array) -> tuple[Array, Array]:
+        """Colours (R, 3) of the outer zone over black, and transmittances (R,)."""
+        lengths = self.radius, self.step_length, self.params.farthest
+        rgb, through = room_kernel.look(origins, directions, jitter, self.grid[0], *lengths)
+        return rgb, through
+
+    def _move(self, rates: tuple[float, ...]) -> None:
+        """Adam's step; rates: of density and colour, and both corrections."""
+        decay, smoothness = decays(self.params.betas), self.params.smoothness_weight
+        kernel.adam_step(self.grid, self._gradient, self._touched, self._share, *rates, decay, smoothness)
+
+    def _take_splatted(self) -> Array:
+        """The gradient (M, M, M, 4) that was added up, which is 0 afterwards."""
+        total: Array = self._gradient.sum(0)
+        self._gradient[:], self._touched[:] = 0, False
+        return total
 
     def _splat(self, seen: Looked, slope: Array) -> None:
         """Add the gradient of sum slope . colour."""
@@ -149,3 +161,12 @@ class Room:
             self._gradient,
             self._touched,
         )
+
+
+def room_type(gpu: bool) -> type[Room]:
+    """The class whose outer zone is looked at there."""
+    if not gpu:
+        return Room
+    from facefolds_core.training.volume.steps_gpu import GpuRoom
+
+    return GpuRoom

@@ -4,17 +4,19 @@ A point y, in radii of the ball, lies in the grid at y for |y| < 1 and at (2 - 1
 voxels grow with distance, and infinity is a sphere of radius 2. Steps along a ray have one length in the contracted
 space. Only what lies behind a ray's point nearest to the ball's centre is looked at: cameras see the subject freely.
 
-Compiled for CPUs. Reference: `room_reference.py`."""
+Compiled for CPUs; GPUs: `kernels_gpu.py`. Reference: `room_reference.py`."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import prange
 
-from facefolds_core.jit import inlined, kernel
-from facefolds_core.training.volume.kernel import CLEAR, OPAQUE, _sample, _softplus
+from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.training.volume.kernel import put
+from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE, sample, softplus
 
 
 @inlined
@@ -53,22 +55,41 @@ def look(origins, directions, jitter, grid, radius, step, farthest):  # type: ig
     through = np.ones(count, np.float32)
     voxel = 4.0 / (grid.shape[0] - 1)
     for r in prange(count):
-        o, d = origins[r], directions[r]
         value, at = np.empty(4, np.float32), np.empty(3)
-        t = np.float32(1.0)
-        s = _start(o, d, radius)
-        stride, n = _stride(o, d, s, radius, step)
-        while n < farthest and t >= OPAQUE:
-            _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
-            _sample(grid, at[0], at[1], at[2], value)
-            a = np.float32(1 - math.exp(-_softplus(value[0]) * step / voxel))
-            for q in range(3):
-                rgb[r, q] += t * a * value[q + 1]
-            t *= 1 - a
-            s += stride
-            stride, n = _stride(o, d, s, radius, step)
-        through[r] = t
+        look_ray(r, origins, directions, jitter, grid, (radius, step, voxel, farthest), rgb, through, value, at)
     return rgb, through
+
+
+@compiled
+def look_ray(
+    r: Any,
+    origins: Any,
+    directions: Any,
+    jitter: Any,
+    grid: Any,
+    lengths: Any,
+    rgb: Any,
+    through: Any,
+    value: Any,
+    at: Any,
+) -> None:
+    """`look` of ray r into rgb, which is 0, and through. lengths: radius, step, side of a voxel, `farthest`. Scratch:
+    value (4,), at (3,) float64."""
+    radius, step, voxel, farthest = lengths
+    o, d = origins[r], directions[r]
+    t = np.float32(1.0)
+    s = _start(o, d, radius)
+    stride, n = _stride(o, d, s, radius, step)
+    while n < farthest and t >= OPAQUE:
+        _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
+        sample(grid, at[0], at[1], at[2], value)
+        a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
+        for q in range(3):
+            rgb[r, q] += t * a * value[q + 1]
+        t *= 1 - a
+        s += stride
+        stride, n = _stride(o, d, s, radius, step)
+    through[r] = t
 
 
 @kernel(parallel=True)
@@ -89,50 +110,60 @@ def splat(  # type: ignore[no-untyped-def]
     """Gradient of sum slope . colour. A sample has alpha = 1 - exp(-softplus(raw) step / voxel)."""
     count, parts = origins.shape[0], gradient.shape[0]
     voxel = 4.0 / (grid.shape[0] - 1)
-    density = step / voxel
     for part in prange(parts):
-        own = gradient[part]
         corner = np.empty((samples, 3), np.int32)
         fraction = np.empty((samples, 3), np.float32)
-        kept = np.empty((samples, 6), np.float32)  # colour, alpha, its slope in raw density, transmittance before
+        kept = np.empty((samples, 6), np.float32)
         value, behind, at = np.empty(4, np.float32), np.empty(3, np.float32), np.empty(3)
         for r in range(count * part // parts, count * (part + 1) // parts):
-            o, d = origins[r], directions[r]
-            t = np.float32(1.0)
-            m = 0
-            s = _start(o, d, radius)
-            stride, n = _stride(o, d, s, radius, step)
-            while n < farthest and m < samples and t >= OPAQUE:
-                _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
-                s += stride
-                stride, n = _stride(o, d, s, radius, step)
-                i, j, k, fx, fy, fz = _sample(grid, at[0], at[1], at[2], value)
-                rest = math.exp(-_softplus(value[0]) * density)
-                a = np.float32(1 - rest)
-                if a < CLEAR:
-                    continue
-                corner[m, 0], corner[m, 1], corner[m, 2] = i, j, k
-                fraction[m, 0], fraction[m, 1], fraction[m, 2] = fx, fy, fz
-                kept[m, 0], kept[m, 1], kept[m, 2] = value[1], value[2], value[3]
-                kept[m, 3], kept[m, 4], kept[m, 5] = a, rest * density / (1 + math.exp(-value[0])), t
-                t *= 1 - a
-                m += 1
-            for q in range(3):
-                behind[q] = beyond[r, q]
-            for p in range(m - 1, -1, -1):
-                a, light = kept[p, 3], kept[p, 5]
-                pull = np.float32(0.0)
-                for q in range(3):
-                    pull += slope[r, q] * (kept[p, q] - behind[q])
-                    behind[q] = a * kept[p, q] + (1 - a) * behind[q]
-                g = light * pull * kept[p, 4]
-                i, j, k = corner[p, 0], corner[p, 1], corner[p, 2]
-                fx, fy, fz = fraction[p, 0], fraction[p, 1], fraction[p, 2]
-                for tap in range(4):
-                    touched[part, i + (tap >> 1), j + (tap & 1)] = True
-                for tap in range(8):
-                    di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
-                    w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
-                    own[i + di, j + dj, k + dk, 0] += w * g
-                    for q in range(3):
-                        own[i + di, j + dj, k + dk, q + 1] += w * light * a * slope[r, q]
+            splat_ray(
+                r,
+                (origins, directions, jitter, beyond, slope),
+                grid,
+                (radius, step, voxel, farthest),
+                gradient[part],
+                touched[part],
+                (corner, fraction, kept),
+                (value, behind, at),
+            )
+
+
+@compiled
+def splat_ray(r: Any, rays: Any, grid: Any, lengths: Any, gradient: Any, touched: Any, samples: Any, own: Any) -> None:
+    """`splat` of ray r into the gradient (M, M, M, 4) and touched (M, M) of its part. rays are arguments of `splat`,
+    lengths as of `look_ray`. Scratch: samples, arrays (S, 3) int32, (S, 3) and (S, 6): colour, alpha, its slope in raw
+    density, transmittance before; own, arrays (4,), (3,), and (3,) float64."""
+    origins, directions, jitter, beyond, slope = rays
+    radius, step, voxel, farthest = lengths
+    (corner, fraction, kept), (value, behind, at) = samples, own
+    density = step / voxel
+    o, d = origins[r], directions[r]
+    t = np.float32(1.0)
+    m = 0
+    s = _start(o, d, radius)
+    stride, n = _stride(o, d, s, radius, step)
+    while n < farthest and m < corner.shape[0] and t >= OPAQUE:
+        _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
+        s += stride
+        stride, n = _stride(o, d, s, radius, step)
+        i, j, k, fx, fy, fz = sample(grid, at[0], at[1], at[2], value)
+        rest = math.exp(-softplus(value[0]) * density)
+        a = np.float32(1 - rest)
+        if a < CLEAR:
+            continue
+        corner[m, 0], corner[m, 1], corner[m, 2] = i, j, k
+        fraction[m, 0], fraction[m, 1], fraction[m, 2] = fx, fy, fz
+        kept[m, 0], kept[m, 1], kept[m, 2] = value[1], value[2], value[3]
+        kept[m, 3], kept[m, 4], kept[m, 5] = a, rest * density / (1 + math.exp(-value[0])), t
+        t *= 1 - a
+        m += 1
+    for q in range(3):
+        behind[q] = beyond[r, q]
+    for p in range(m - 1, -1, -1):
+        a, light = kept[p, 3], kept[p, 5]
+        pull = np.float32(0.0)
+        for q in range(3):
+            pull += slope[r, q] * (kept[p, q] - behind[q])
+            behind[q] = a * kept[p, q] + (1 - a) * behind[q]
+        place = (corner[p, 0], corner[p, 1], corner[p, 2], fraction[p, 0], fraction[p, 1], fraction[p, 2])
+        put(place, light * pull * kept[p, 4], light, a, slope[r], gradient, touched)

@@ -51,6 +51,7 @@ namespace UnityEngine
         public static Vector3 operator -(Vector3 a, Vector3 b) { return a; }
         public static Vector3 operator *(float a, Vector3 b) { return b; }
     }
+    public struct Pose { } // Unity has one, too
     public struct Vector4 { public Vector4(float x, float y, float z, float w) { } }
     public struct Quaternion
     {

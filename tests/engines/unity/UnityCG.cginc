@@ -1,4 +1,4 @@
-// What the package's shaders use of Unity's own includes, for a compiler of HLSL elsewhere. Values mean nothing.
+// What the package's shaders use of Unity's own includes, for a compiler of HLSL elsewhere.
 #define UNITY_VERTEX_INPUT_INSTANCE_ID
 #define UNITY_VERTEX_OUTPUT_STEREO
 #define UNITY_SETUP_INSTANCE_ID(v)
@@ -18,7 +18,6 @@ float4 UnityObjectToClipPos(float3 pos)
 float LinearToGammaSpaceExact(float value) { return pow(value, 0.45); }
 float GammaToLinearSpaceExact(float value) { return pow(value, 2.2); }
 // DirectX 9's way to name a texture and its sampler in one, which Unity's compiler still takes.
-struct sampler2D_f { Texture2D t; SamplerState s; };
-#define sampler2D static const int
-float4 tex2D_stub(float2 at) { return float4(at, at); }
-#define tex2D(image, at) tex2D_stub(at)
+SamplerState linear_clamp;
+#define sampler2D Texture2D
+#define tex2D(image, at) image.Sample(linear_clamp, at)

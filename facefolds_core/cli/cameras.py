@@ -1,0 +1,80 @@
+"""The camera that `facefolds render --camera` names: of the asset, of the capture beside it, or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.asset.reader import Asset
+from facefolds_core.errors import UserError
+from facefolds_core.files import read_json
+from facefolds_core.geometry.cameras import Camera
+
+POSTER = "poster"
+MOST_LISTED = 20
+
+
+def named_camera(asset: Asset, name: str) -> Camera:
+    """The camera of that name, in the world of the asset.
+
+    Raises:
+        UserError: if there is none, listing those that there are; or if the file holds none.
+    """
+    if name.endswith(".json"):
+        return _from_file(Path(name))
+    known = []
+    for camera in _cameras(asset):
+        if camera.name == name:
+            return camera
+        known.append(camera.name)
+    names = list(dict.fromkeys(known))
+    expected = ", ".join(names[:MOST_LISTED]) + (
+        f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    )
+    raise UserError(
+        "no such camera",
+        place="--camera",
+        expected=expected or "FILE.json: this asset names no camera, and there is no scene beside it",
+        found=name,
+        remedy="choose one of these, or give a JSON file with K, w2c, width and height",
+    )
+
+
+def _cameras(asset: Asset) -> Iterator[Camera]:
+    """Of the poster, of the photos, and of the scene that the asset was made of, where that lies beside it."""
+    poster = asset.manifest.poster
+    if poster is not None and poster.K is not None and poster.w2c is not None:
+        yield Camera(POSTER, np.array(poster.K), np.array(poster.w2c), poster.width, poster.height)
+    for photo in asset.manifest.photos:
+        yield Camera(photo.camera, np.array(photo.K), np.array(photo.w2c), photo.width, photo.height)
+    scene = asset.folder.resolve().parent / "scene"
+    if (scene / "scene.json").is_file():
+        from facefolds_core.captures.scene import read_scene  # playing an asset needs nothing of what makes one
+
+        yield from read_scene(scene).cameras
+
+
+def _from_file(path: Path) -> Camera:
+    remedy = "give one as views.json of `facefolds vectors` has them: K by rows, w2c = (R | t) by rows, width, height"
+    value = read_json(path, remedy=remedy)
+    try:
+        K, w2c = np.array(value["K"], float), np.array(value["w2c"], float)
+        width, height = int(value["width"]), int(value["height"])
+        rotation = w2c[:, :3]
+        sound = K.shape == (3, 3) and w2c.shape == (3, 4) and np.isfinite(K).all() and np.isfinite(w2c).all()
+        sound = sound and min(width, height) >= 16 and max(width, height) <= 16_384 and K[0, 0] > 0 and K[1, 1] > 0
+        sound = sound and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2 and np.linalg.det(rotation) > 0
+    except (KeyError, TypeError, ValueError, IndexError):
+        sound = False
+    if not sound:
+        raise UserError("no camera in the file", file=path, expected="K, w2c, width and height", remedy=remedy)
+    return Camera(path.stem, K, w2c, width, height)
+
+
+def enlarged(camera: Camera, factor: int) -> Camera:
+    """The same view in `factor` times as many pixels a side."""
+    K = np.diag([factor, factor, 1.0]) @ camera.K
+    return replace(camera, K=K, width=factor * camera.width, height=factor * camera.height)

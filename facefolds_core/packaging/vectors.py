@@ -1,0 +1,217 @@
+"""Conformance vectors: tiny assets, cameras and the pictures that a player must show; and how near somebody's come.
+
+Made, not kept: the same on every machine, but for what float32 rounds. They have what players get wrong: sheets that
+fold before the eye (only the nearest crossing counts), half-transparent layers, texels unlike their neighbours,
+rectangles anywhere in the picture, two levels, a head that moves, a frame rate that is no whole number, and the same
+take once more as a stream in segments.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from facefolds_core.asset.cropping import crop_layers
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
+from facefolds_core.asset.reader import Asset, read_asset
+from facefolds_core.asset.streams import make_streams
+from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
+from facefolds_core.geometry.track import Track
+from facefolds_core.packaging.levels import Resampled
+from facefolds_core.packaging.rungs import write_rungs
+from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
+from facefolds_core.pictures import open_picture
+from facefolds_core.rendering.reference import render_asset
+
+ASSETS = ("short", "stream")
+VIEWS, REFERENCE = "views.json", "reference"
+CENTRE = (-0.25, 0.0, 0.0)
+WINDOW: Window = (-0.5, 0.5, -0.45, 0.45)
+LAYERS, FRAMES, TEXELS, SIDE = 3, 6, 64, 128
+RATE = 30000 / 1001
+BACKGROUND = (64 / 255, 128 / 255, 192 / 255)
+
+
+class Waves:
+    """Textures of the vectors: (TEXELS, TEXELS, 4), waves that move, with single texels that stand out."""
+
+    def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
+        s, t = np.meshgrid(*[(np.arange(TEXELS) + 0.5) / TEXELS] * 2)
+        phase = 0.7 * frame + 1.3 * layer
+        red = 0.55 + 0.35 * np.sin(11 * s + 5 * t + phase)
+        green = 0.5 + 0.3 * np.sin(9 * t - 2 * phase)
+        blue = 0.45 + 0.3 * np.cos(10 * (s - t) + phase)
+        alpha = np.clip(1.5 - 3.1 * np.hypot(s - 0.5, t - 0.5), 0, 1) * (0.9, 0.5, 1.0)[layer]
+        rgba = np.stack([red, green, blue, alpha], -1)
+        rgba[8::16, 8::16, :3] = 1 - rgba[8::16, 8::16, :3]
+        return np.asarray(np.rint(255 * np.clip(rgba, 0, 1)), np.uint8)
+
+
+def sheet(layer: int, side: int) -> TexturedMesh:
+    """A cap with a nose and a brow: seen from the side, rays cross it up to three times."""
+    s, t = np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side))
+    st = np.stack([s, t], -1).reshape(-1, 2)
+    u, v = st_to_uv(st, WINDOW).T
+    bump = 0.13 * np.exp(-((u + 0.05) ** 2 + v**2) / 0.008) + 0.06 * np.exp(-((u - 0.2) ** 2) / 0.004)
+    points = np.array(CENTRE) + (0.36 - 0.03 * layer + bump)[:, None] * uv_to_directions(st_to_uv(st, WINDOW))
+    index = np.arange(side * side).reshape(side, side)
+    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
+    return TexturedMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+
+
+def source() -> AssetSource:
+    """The head nods and turns a little."""
+    angles = np.radians(6) * np.sin(np.arange(FRAMES))
+    turns = [[[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]] for a in angles]
+    track = Track.of(turns, np.stack([0.01 * np.arange(FRAMES), np.zeros(FRAMES), -0.02 * np.sin(angles)], -1))
+    return AssetSource("vectors", RATE, Similarity.identity(), CENTRE, track)
+
+
+def cameras() -> list[Camera]:
+    """From before, from the sides, from above and near, and one whose pixels are not square and whose centre is off."""
+    found = []
+    for name, azimuth, elevation, distance in (
+        ("front", 0, 0, 1.2),
+        ("left", 60, 5, 1.1),
+        ("right", -75, -10, 1.1),
+        ("above", 15, 45, 1.0),
+        ("near", -20, 0, 0.5),
+        ("odd", 30, 15, 1.3),
+    ):
+        a, e = np.radians([azimuth, elevation])
+        outward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        right = np.cross(-outward, [0, 0, 1])
+        right /= np.linalg.norm(right)
+        R = np.stack([right, np.cross(-outward, right), -outward])
+        w2c = np.concatenate([R, -R @ (distance * outward)[:, None]], 1)
+        f = 1.3 * SIDE
+        K = np.array([[f, 0, SIDE / 2], [0, f, SIDE / 2], [0, 0, 1.0]])
+        if name == "odd":
+            K[0, 0], K[0, 2], K[1, 2] = 1.2 * f, 0.4 * SIDE, 0.55 * SIDE
+        found.append(Camera(name, K, w2c, SIDE, SIDE))
+    return found
+
+
+def write_vectors(folder: Path) -> int:
+    """Write the assets, `views.json` and the pictures of `reference/`, whole or not at all; returns their number."""
+    if folder.exists() and any(folder.iterdir()) and not (folder / VIEWS).is_file():
+        raise UserError("the folder is not empty, and holds no vectors", file=folder, remedy="name another folder")
+    with atomic_folder(folder) as out:
+        _write_short(out / "short")
+        _write_stream(out / "stream")
+        (out / REFERENCE).mkdir()
+        views = [
+            view
+            for name in ASSETS
+            for level in read_asset(out / name).levels
+            for view in _views(name, level.entry.name)
+        ]
+        for view in views:
+            Image.fromarray(_picture(read_asset(out / view["asset"]), view)).save(out / REFERENCE / view["file"])
+        write_json(out / VIEWS, {"background": "#4080c0", "views": views})
+    return len(views)
+
+
+def _content() -> LevelContent:
+    textures = Waves()
+    meshes = [sheet(layer, 24) for layer in range(LAYERS)]
+    layers = crop_layers(meshes, [WINDOW] * LAYERS, textures, FRAMES, 2)
+    return LevelContent(layers, textures, FRAMES, RATE, 2)
+
+
+def _params() -> CompressParams:
+    level = LevelParams(name="small", mesh_resolution=12, texture_resolution=TEXELS // 2, crf=16)
+    return CompressParams(
+        mesh=MeshCodec(quantization_bits=14, texture_coordinate_bits=12, compression_level=7),
+        video=VideoCodec(crf=10, keyframe_interval=4),
+        levels=(level,),
+        stream=StreamParams(beyond=0, segment_seconds=3 / RATE),
+    )
+
+
+def _write_short(folder: Path) -> None:
+    folder.mkdir()
+    full, params = _content(), _params()
+    textures = Resampled(full.textures, TEXELS // 2)
+    layers = crop_layers([sheet(layer, 12) for layer in range(2)], [WINDOW] * 2, textures, FRAMES)
+    small = LevelContent(layers, textures, FRAMES, RATE)
+    levels = [write_level(folder, "small", small, params), write_level(folder, FULL, full, params)]
+    write_manifest(manifest_of(source(), levels, folder), folder / MANIFEST_NAME)
+
+
+def _write_stream(folder: Path) -> None:
+    folder.mkdir()
+    levels, _, stream = make_streams(folder, write_rungs(folder, _content(), _params(), None, []), None)
+    manifest = manifest_of(source(), levels, folder)
+    write_manifest(manifest.model_copy(update={"stream": stream}), folder / MANIFEST_NAME)
+
+
+def _views(asset: str, level: str) -> Iterator[dict[str, Any]]:
+    """Of `short` all cameras in the first frame and some in others, of `stream` a few: what differs is in its files."""
+    for index, camera in enumerate(cameras()):
+        if (asset, level) != ("short", FULL) and camera.name not in ("left", "odd"):
+            continue
+        for frame in (0,) if index % 2 else (0, 2, FRAMES - 1):
+            pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": camera.width, "height": camera.height}
+            file = f"{asset}_{level}_{camera.name}_{frame}.png"
+            yield {"file": file, "asset": asset, "level": level, "frame": frame, "camera": camera.name, **pose}
+
+
+def _picture(asset: Asset, view: dict[str, Any]) -> NDArray[np.uint8]:
+    level = next(level for level in asset.levels if level.entry.name == view["level"])
+    camera = Camera(view["camera"], np.array(view["K"]), np.array(view["w2c"]), view["width"], view["height"])
+    rgb, _ = render_asset(level, camera, view["frame"], BACKGROUND)
+    return np.asarray(np.rint(255 * np.clip(rgb, 0, 1)), np.uint8)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How near a picture comes to the reference.
+
+    Attributes:
+        file: its name.
+        psnr: dB; None where there is no such picture, or it is of another size.
+    """
+
+    file: str
+    psnr: float | None
+
+
+def compare(folder: Path, pictures: Path) -> list[Agreement]:
+    """Somebody's pictures, named as in `views.json`, against those of the vectors in `folder`.
+
+    Raises:
+        UserError: if there are no vectors in the folder.
+    """
+    try:
+        views = json.loads((folder / VIEWS).read_text())["views"]
+    except (OSError, ValueError, KeyError):
+        remedy = "make them: `facefolds vectors FOLDER`"
+        raise UserError("no conformance vectors", file=folder / VIEWS, remedy=remedy) from None
+    return [
+        Agreement(view["file"], _psnr(folder / REFERENCE / view["file"], pictures / view["file"])) for view in views
+    ]
+
+
+def _psnr(reference: Path, found: Path) -> float | None:
+    if not found.is_file():
+        return None
+    pair = [np.asarray(open_picture(path).convert("RGB"), float) for path in (reference, found)]
+    if pair[0].shape != pair[1].shape:
+        return None
+    error = float(((pair[0] - pair[1]) ** 2).mean())
+    return 99.0 if error == 0 else min(99.0, 10 * float(np.log10(255**2 / error)))

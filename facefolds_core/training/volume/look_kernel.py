@@ -1,0 +1,140 @@
+"""Looking at a grid of density and colour: rays through it, and outlines from a centre. Compiled for CPUs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from facefolds_core.jit import compiled, inlined, kernel
+
+CLEAR, OPAQUE = 1e-4, 1e-3
+"""Samples with less alpha are left out, and so is what lies behind less transmittance."""
+
+
+@inlined
+def softplus(x):  # type: ignore[no-untyped-def]
+    return x if x > 15.0 else math.log1p(math.exp(x))
+
+
+@inlined
+def span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
+    """Distances at which a ray enters and leaves the box of voxel centres; empty if the second is smaller."""
+    near, far = 0.0, 1e30
+    for a in range(3):
+        slope = d[a] if abs(d[a]) > 1e-9 else 1e-9
+        t0 = (lower[a] - o[a]) / slope
+        t1 = (lower[a] + voxel * (grid.shape[a] - 1) - o[a]) / slope
+        near = max(near, min(t0, t1))
+        far = min(far, max(t0, t1))
+    return near, far
+
+
+@inlined
+def sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Trilinear values at voxel coordinates (x, y, z) into out[0:4]; returns the lower corner and the fractions."""
+    i = min(max(int(x), 0), grid.shape[0] - 2)
+    j = min(max(int(y), 0), grid.shape[1] - 2)
+    k = min(max(int(z), 0), grid.shape[2] - 2)
+    fx = np.float32(min(max(x - i, 0.0), 1.0))
+    fy = np.float32(min(max(y - j, 0.0), 1.0))
+    fz = np.float32(min(max(z - k, 0.0), 1.0))
+    for q in range(4):
+        out[q] = 0
+    for t in range(8):
+        di, dj, dk = t >> 2, (t >> 1) & 1, t & 1
+        w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
+        for q in range(4):
+            out[q] += w * grid[i + di, j + dj, k + dk, q]
+    return i, j, k, fx, fy, fz
+
+
+@kernel(parallel=True)
+def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
+    """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance where half of the light is left (R,) or 0."""
+    count = origins.shape[0]
+    rgb = np.zeros((count, 3), np.float32)
+    alpha = np.zeros(count, np.float32)
+    depth = np.zeros(count, np.float32)
+    for r in prange(count):
+        value = np.empty(4, np.float32)
+        render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth, value)
+    return rgb, alpha, depth
+
+
+@compiled
+def render_ray(
+    r: Any,
+    origins: Any,
+    directions: Any,
+    grid: Any,
+    lower: Any,
+    voxel: Any,
+    step: Any,
+    rgb: Any,
+    alpha: Any,
+    depth: Any,
+    value: Any,
+) -> None:
+    """`render` of ray r into rgb, alpha and depth, which are 0. Scratch: value (4,)."""
+    o, d = origins[r], directions[r]
+    near, far = span(o, d, lower, voxel, grid)
+    t = np.float32(1.0)
+    s = near + 0.5 * step
+    while s < far and t >= OPAQUE:
+        x = (o[0] + s * d[0] - lower[0]) / voxel
+        y = (o[1] + s * d[1] - lower[1]) / voxel
+        z = (o[2] + s * d[2] - lower[2]) / voxel
+        sample(grid, x, y, z, value)
+        a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
+        for q in range(3):
+            rgb[r, q] += t * a * value[q + 1]
+        t *= 1 - a
+        if depth[r] == 0 and t < 0.5:
+            depth[r] = s
+        s += step
+    alpha[r] = 1 - t
+
+
+@kernel(parallel=True)
+def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
+    """Along each direction (R, 3), from `farthest` in to `centre`.
+
+    Returns opacity (R,), colour over black (R, 3), and the radii (R, S) at which the given shares of the opacity are
+    reached, linear between samples; 0 where all is clear.
+    """
+    count = directions.shape[0]
+    samples = int(farthest / step)
+    opacity = np.zeros(count, np.float32)
+    rgb = np.zeros((count, 3), np.float32)
+    radius = np.zeros((count, shares.shape[0]), np.float32)
+    for r in prange(count):
+        reached = np.zeros(samples + 1, np.float32)
+        value = np.empty(4, np.float32)
+        t = np.float32(1.0)
+        for n in range(samples):
+            s = farthest - (n + 0.5) * step
+            x = (centre[0] + s * directions[r, 0] - lower[0]) / voxel
+            y = (centre[1] + s * directions[r, 1] - lower[1]) / voxel
+            z = (centre[2] + s * directions[r, 2] - lower[2]) / voxel
+            inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
+            if inside and t >= OPAQUE:
+                sample(grid, x, y, z, value)
+                a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
+                for q in range(3):
+                    rgb[r, q] += t * a * value[q + 1]
+                t *= 1 - a
+            reached[n + 1] = 1 - t
+        opacity[r] = 1 - t
+        if opacity[r] < CLEAR:
+            continue
+        for k in range(shares.shape[0]):
+            wanted = shares[k] * opacity[r]
+            n = 1
+            while n < samples and reached[n] < wanted:
+                n += 1
+            f = (wanted - reached[n - 1]) / max(reached[n] - reached[n - 1], np.float32(1e-9))
+            radius[r, k] = farthest - (n - 1 + min(max(f, 0.0), 1.0)) * step
+    return opacity, rgb, radius

@@ -1,0 +1,46 @@
+"""The hero: its parameters, its project, and what is packed."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from bench import hero
+from facefolds_core.asset import read_asset
+from facefolds_core.files import write_json
+from facefolds_core.params import CaptureParams
+from facefolds_core.params_file import load_params
+from facefolds_core.paths import SubjectFolders
+from tests.assets import make_asset
+
+
+def test_the_whole_take_is_25_frames_a_second() -> None:
+    capture = CaptureParams.model_validate(hero.hero_params({})["subjects"]["hero"]["capture"])
+    assert (capture.frames, capture.seconds, capture.frame_rate) == (100, 4.0, 25.0)
+    assert (capture.width, capture.height) == (500, 768)
+
+
+def test_a_project_of_its_own_that_keeps_what_it_made(tmp_path: Path) -> None:
+    for frames in (100, 12):
+        hero.write_project(tmp_path, hero.hero_params({"frames": frames}))
+        (tmp_path / "data").mkdir(exist_ok=True)
+    params = load_params(tmp_path / "params.yaml")
+    assert list(params.subjects) == ["hero"]
+    assert (tmp_path / "facefolds_core" / "params").is_dir() and (tmp_path / "data").is_dir()
+
+
+def test_what_is_packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = SubjectFolders(tmp_path / "hero")
+    make_asset(folders.asset)
+    write_json(folders.metrics, {"headline": "psnr_subject", "asset": {"psnr_subject": 26.5}})
+    monkeypatch.setattr(hero, "find_player", lambda: tmp_path)
+    monkeypatch.setattr(hero, "write_single_page", lambda out, *_: out.write_text("<html>"))
+    page, packed = hero.release(folders, tmp_path / "out")
+    with zipfile.ZipFile(packed) as zipped:
+        zipped.extractall(tmp_path / "there")
+        assert "26.50 dB of the subject" in zipped.read("README.txt").decode()
+    assert read_asset(tmp_path / "there" / "asset").num_frames == read_asset(folders.asset).num_frames
+    assert (tmp_path / "there" / "hero.html").read_text() == page.read_text()
+    assert {"LICENSE", "metrics.json"} <= {path.name for path in (tmp_path / "there").iterdir()}

@@ -1,0 +1,59 @@
+"""The web player and the OpenGL renderer against the conformance vectors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from facefolds_core.cli import app
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.packaging.vectors import compare, write_vectors
+from tests.viewer.conftest import NewPlayer
+
+
+@pytest.fixture(scope="module")
+def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "vectors"
+    write_vectors(folder)
+    return folder
+
+
+def views(vectors: Path, asset: str) -> list[dict[str, Any]]:
+    found = json.loads((vectors / "views.json").read_text())["views"]
+    return [view for view in found if view["asset"] == asset]
+
+
+@pytest.mark.parametrize("asset", ["short", "stream"])
+def test_the_web_player_shows_what_it_must(new_player: NewPlayer, vectors: Path, tmp_path: Path, asset: str) -> None:
+    player = new_player({"asset": vectors / asset})
+    player.open("asset")
+    player.wait("e.level === 'full'")
+    player.run("e.background = '#4080c0'")
+    for view in views(vectors, asset):
+        player.run("e.level = v", view["level"])
+        player.wait(f"e.level === '{view['level']}'")
+        assert player.run("return await e.seek(v)", view["frame"])
+        size = view["width"], view["height"]
+        camera = Camera(view["camera"], np.array(view["K"]), np.array(view["w2c"]), *size)
+        shown = np.rint(255 * player.capture(camera)[..., :3]).astype(np.uint8)
+        Image.fromarray(shown).save(tmp_path / view["file"])
+    found = [one for one in compare(vectors, tmp_path) if one.file.startswith(asset)]
+    assert min(one.psnr or 0 for one in found) > 40, found
+
+
+def test_facefolds_render_shows_what_it_must(vectors: Path, tmp_path: Path) -> None:
+    for view in (view for asset in ("short", "stream") for view in views(vectors, asset)[::3]):
+        camera = tmp_path / "camera.json"
+        camera.write_text(json.dumps(view))
+        options = ["--camera", str(camera), "--level", view["level"], "--frame", str(view["frame"]), "--samples", "1"]
+        out = ["--background", "#4080c0", "--out", str(tmp_path / view["file"])]
+        done = CliRunner().invoke(app, ["render", str(vectors / view["asset"]), *options, *out])
+        assert done.exit_code == 0, done.output
+    found = [one for one in compare(vectors, tmp_path) if one.psnr is not None]
+    assert len(found) >= 6 and min(one.psnr or 0 for one in found) > 40, found
