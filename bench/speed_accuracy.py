@@ -18,9 +18,9 @@ from bench import charts
 from bench.results import Clock, Conditions, Measurement, Scores, Store, commit_name, machine_name, mean, now
 from bench.run import Project, own_params, score_model, training_of
 from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_train
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json
-from facefolds_core.model.device import pick_device
+from facefolds_core.model.device import device_of, pick_device
 from facefolds_core.packaging.views import spread
 from facefolds_core.scoring.panels import METRICS
 from facefolds_core.scoring.perceptual import find_perceptual
@@ -44,7 +44,7 @@ def score(project: Project, frames: int) -> Scores:
     """
     scene = read_scene(project.folders.scene)
     times = {k: float(k) for k in spread(scene.num_frames, frames)}
-    device = pick_device(read_json(project.folders.config / "train.json")["device"])
+    device = device_of(read_train(project.folders.config))
     found = [v for _, _, v in score_model(project.folders.model, scene, times, find_perceptual(device), device)]
     if not found:
         raise UserError("no held-out camera: there is nothing to score on", file=scene.folder / "scene.json")

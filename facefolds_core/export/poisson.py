@@ -21,9 +21,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.sampling import row_strides
 from facefolds_core.export.stores import Grids
 from facefolds_core.geometry.meshes import Surface
+from facefolds_core.geometry.sphere_uv import row_strides
 from facefolds_core.params import ReconstructParams
 from facefolds_core.progress import progress as progress_bar
 

@@ -18,7 +18,7 @@ from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.frame_store import write_frames
-from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_st
+from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
 
 DIRECTIONS_AT_ONCE = 16384
@@ -120,12 +120,6 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], centre: 
     usable = valid[..., None] & (length > 1e-3 * scale) & (scale > 0)
     normal = np.where(usable, normal / np.where(usable, length, 1), outward)
     return np.where((normal * outward).sum(-1, keepdims=True) < 0, -normal, normal)
-
-
-def row_strides(resolution: int, window: Window) -> NDArray[np.intp]:
-    """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation)."""
-    u = texel_uv(resolution, resolution, window)[:, 0, 0]
-    return np.maximum(np.rint(1 / np.maximum(np.cos(u * np.pi / 2), 1e-9)), 1).clip(max=resolution).astype(np.intp)
 
 
 def texture_rows(

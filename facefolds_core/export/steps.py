@@ -1,7 +1,7 @@
 """The steps of the export as functions of what they need: the stages call them on files, `pipeline` in a row.
 
 Textures are many and large: they go to and come from frame stores in a folder that the caller gives. Everything else
-is passed in memory.
+is passed in memory. Only sampling needs torch, which takes a second to import.
 """
 
 from __future__ import annotations
@@ -24,10 +24,8 @@ from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.kept import KeptFrames, digest_of, digests_of_frames
 from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
 from facefolds_core.export.protocol import LayeredModel
-from facefolds_core.export.sampling import sample_grids, write_textures
 from facefolds_core.export.sheets import Gridded, grid_sheets
 from facefolds_core.export.stores import Grids, Sheets
-from facefolds_core.export.window import visible_window
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
@@ -61,6 +59,9 @@ def sample_model(model: LayeredModel, cameras: Sequence[Camera], params: SampleP
     Args:
         cameras: for training: they decide what the window must hold.
     """
+    from facefolds_core.export.sampling import sample_grids, write_textures
+    from facefolds_core.export.window import visible_window
+
     window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else FULL_WINDOW
     grids = sample_grids(model, params.resolution, window)
     opacity = write_textures(folder / TEXTURES, model, grids)

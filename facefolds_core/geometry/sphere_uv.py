@@ -19,6 +19,7 @@ import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 Window = tuple[float, float, float, float]
 FULL_WINDOW: Window = (-1.0, 1.0, -1.0, 1.0)
@@ -77,3 +78,9 @@ def texel_uv(height: int, width: int, window: Window = FULL_WINDOW) -> np.ndarra
     """(height, width, 2) float64: (u, v) at the texel centres of an image over `window`."""
     s, t = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     return np.asarray(st_to_uv(np.stack([s, t], -1), window))
+
+
+def row_strides(resolution: int, window: Window) -> NDArray[np.intp]:
+    """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation)."""
+    u = texel_uv(resolution, resolution, window)[:, 0, 0]
+    return np.maximum(np.rint(1 / np.maximum(np.cos(u * np.pi / 2), 1e-9)), 1).clip(max=resolution).astype(np.intp)

@@ -67,6 +67,15 @@ def test_help_lists_every_command_and_imports_none(project_root: Path) -> None:
     assert done.stdout.rstrip().endswith("[]")
 
 
+@pytest.mark.parametrize("stage", ["configure", "reconstruct", "decimate", "texture", "bake", "compress"])
+def test_stages_that_ask_no_model_do_without_torch(stage: str, project_root: Path) -> None:
+    """It takes a second to import, in each stage of each subject."""
+    code = f"import sys, stages.{stage}; print('torch' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": str(project_root)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout == "False\n", done.stderr
+
+
 def test_a_command_without_its_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "jinja2", None)
     for module in [

@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.sampling import grid_normals, row_strides, sample_grids, texture_rows, write_textures
+from facefolds_core.export.sampling import grid_normals, sample_grids, texture_rows, write_textures
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, texel_uv
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, row_strides, texel_uv
 from tests.ellipsoids import Ellipsoids
 
 SPHERES = ((0.35, 0.35, 0.35), (0.30, 0.30, 0.30))

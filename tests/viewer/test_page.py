@@ -41,6 +41,21 @@ def test_a_poster_and_progress_are_shown_before_the_first_picture(new_player: Ne
     assert not player.page.get_by_role("progressbar").is_visible()
 
 
+def test_progress_is_shown_before_the_script_is_there(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich})
+    held: list = []
+    player.page.route("**/page.js", lambda route: held.append(route))
+    player.page.goto(f"{player.address}?src=asset/", wait_until="commit")
+    code = "getComputedStyle(document.querySelector('facefolds-player'), '::after').content"
+    player.page.wait_for_function(f"() => document.querySelector('facefolds-player') && {code} === '\"Loading\"'")
+    while not held:
+        player.page.wait_for_timeout(20)
+    for route in held:
+        route.continue_()
+    player.wait("e.ready")
+    assert player.page.evaluate(code) == "none"
+
+
 def test_all_requests_stay_on_the_server(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich})
     player.open("asset", "")

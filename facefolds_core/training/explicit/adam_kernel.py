@@ -64,7 +64,7 @@ def adam_step(  # type: ignore[no-untyped-def]
         adam_texel(k, static, own, texture, gradient, rates, keep, correct, decay)
 
 
-@compiled
+@inlined  # a call with so many arrays costs
 def adam_texel(
     k: Any, static: Any, own: Any, texture: Any, gradient: Any, rates: Any, keep: Any, correct: Any, decay: Any
 ) -> None:

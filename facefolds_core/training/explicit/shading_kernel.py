@@ -115,7 +115,7 @@ def _shade(
     return total
 
 
-@compiled
+@inlined  # a call with so many arrays costs
 def shade_ray(
     k: Any,
     p: Any,

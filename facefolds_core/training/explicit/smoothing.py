@@ -13,7 +13,7 @@ import torch
 from numba import prange
 from torch import Tensor
 
-from facefolds_core.jit import compiled, kernel
+from facefolds_core.jit import inlined, kernel
 
 
 @kernel(parallel=True)
@@ -37,7 +37,7 @@ def smooth(values, height, width):  # type: ignore[no-untyped-def]
     return out
 
 
-@compiled
+@inlined
 def column_sum(i: Any, j: Any, values: Any, height: Any, width: Any, out: Any) -> None:
     """out (N,): sum over texel (i, j), the one above, and the one below."""
     above, below = max(i - 1, 0) * width + j, min(i + 1, height - 1) * width + j
@@ -45,7 +45,7 @@ def column_sum(i: Any, j: Any, values: Any, height: Any, width: Any, out: Any) -
         out[n] = values[above, n] + values[i * width + j, n] + values[below, n]
 
 
-@compiled
+@inlined
 def mean(left: Any, middle: Any, right: Any, out: Any) -> None:
     """out (N,): mean of nine texels of which the sums of threes are given."""
     for n in range(out.shape[0]):

@@ -232,7 +232,7 @@ def adam_step(  # type: ignore[no-untyped-def]
                 )
 
 
-@compiled
+@inlined  # a call with so many arrays costs
 def adam_voxel(
     i: Any,
     j: Any,
