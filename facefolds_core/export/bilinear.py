@@ -8,15 +8,14 @@ alone (an L2 projection; Unser, Aldroubi and Eden 1995). Rows and columns are in
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Float = NDArray[np.float32]
-
-PLACES = 4
-"""At which pictures are compared, a texel of the new grid along each side."""
 
 
 def interpolation(positions: Array, size: int) -> Array:
@@ -64,8 +63,14 @@ class Projection:
 def _along(source: int, target: int, start: float, end: float) -> tuple[Float, NDArray[np.intp]]:
     """(target, source) weights of the texels of a side for those along [start, end] of it, and the nearest (target,)
     of them."""
-    places = (np.arange(PLACES * target) + 0.5) / (PLACES * target)
+    knots = [(np.arange(target) + 0.5) / target, ((np.arange(source) + 0.5) / source - start) / (end - start)]
+    ends = np.unique(np.concatenate([*knots, [0.0, 1.0]]).clip(0, 1))
+    # Both are linear between knots: two Gauss points an interval integrate their products exactly.
+    half = 0.5 * np.diff(ends)
+    middle = ends[:-1] + half
+    places = np.concatenate([middle - half / math.sqrt(3), middle + half / math.sqrt(3)])
     shown, wanted = interpolation(places, target), interpolation(start + (end - start) * places, source)
-    weights = np.linalg.solve(shown.T @ shown, shown.T @ wanted)
+    weighed = (shown * np.tile(half, 2)[:, None]).T
+    weights = np.linalg.solve(weighed @ shown, weighed @ wanted)
     centres = start + (end - start) * (np.arange(target) + 0.5) / target
     return weights.astype(np.float32), (centres * source).astype(np.intp).clip(0, source - 1)
