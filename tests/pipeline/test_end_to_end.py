@@ -68,7 +68,7 @@ def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
     assert stages_run(output) == ["configure", "compress@actor", "evaluate@actor"]
     assert "2 of the asset's 4 frames have photos" in output
     texture = json.loads((project.root / "data/actor/asset/manifest.json").read_text())["levels"][-1]["texture"]
-    assert (texture["frames"], texture["frame_rate"]) == (4, [60, 1])
+    assert (texture["frames"], texture["frame_rate"]) == (4, [8, 3])  # 2 frames of 1.5 s, doubled
     project.write_params(before)
     status, output = project.repro("evaluate@actor")
     assert status == 0, output

@@ -136,7 +136,7 @@ def test_playing_goes_over_the_borders_of_segments_and_round(new_player: NewPlay
 def test_ten_minutes_start_within_two_seconds(new_player: NewPlayer, ten_minutes: Path) -> None:
     """On 5 Mbit/s with 40 ms to the server, an empty cache; and only what is needed is fetched."""
     seconds = []
-    for _ in range(3):  # the machine may be busy: the best counts
+    for _ in range(5):  # the machine may be busy: the best counts
         player = new_player({"asset": ten_minutes})
         session = player.page.context.new_cdp_session(player.page)
         session.send("Network.enable")
