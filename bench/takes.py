@@ -34,7 +34,7 @@ from facefolds_core.params import STAGE_SECTIONS
 CYCLE = 60
 """Frames that the actor is filmed in."""
 
-WATCH = 0.02
+WATCH = 0.1
 """Seconds between two looks at a stage's memory."""
 
 PARAMS: dict[str, Any] = {

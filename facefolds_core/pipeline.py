@@ -58,7 +58,7 @@ def train(scene: Scene, params: TrainParams | None = None, scratch: str | Path |
     Args:
         params: of either model; by default the preset `fast`.
         scratch: folder of the log and, of the perceptrons, of checkpoints, from which a later call with the same
-            parameters goes on. By default there is none.
+            parameters goes on; of a take that is trained in segments, of these. By default there is none.
 
     Raises:
         UserError: if an image is missing, nothing stands out from the background, or training diverges.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from tempfile import TemporaryFile
 from typing import Any
 
@@ -22,6 +22,16 @@ def spilled(shape: tuple[int, ...], dtype: DTypeLike = float) -> NDArray[Any]:
         return np.empty(shape, dtype)
     with TemporaryFile() as file:
         return np.memmap(file, dtype, "w+", shape=shape).view(np.ndarray)
+
+
+def running_mean(arrays: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """`np.mean` of arrays of one shape over all of them, bit for bit, with two in memory; at least one."""
+    iterator = iter(arrays)
+    total, count = np.array(next(iterator)), 1
+    for array in iterator:
+        total += array
+        count += 1
+    return total / count
 
 
 def by_rows(rows: int, make: Callable[[slice], NDArray[Any]], dtype: DTypeLike = float) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track, rigid_motion
 from facefolds_core.params import NormalizeParams
-from facefolds_core.spill import by_rows
+from facefolds_core.spill import by_rows, running_mean
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str
     shape, motions = vertices[0], []
     for _ in range(3):
         motions = [rigid_motion(shape, points) for points in vertices]
-        shape = np.mean([(points - t) @ R for points, (R, t) in zip(vertices, motions, strict=True)], 0)
+        shape = running_mean((points - t) @ R for points, (R, t) in zip(vertices, motions, strict=True))
     return np.array([R for R, _ in motions]), np.array([t for _, t in motions]), "laid over the tracked meshes"
 
 

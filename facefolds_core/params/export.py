@@ -140,7 +140,7 @@ class BakeParams(Section):
     """How dear a change of a texel from one frame to the next is, against the error that keeping still makes in
     training views (export/hold.py); larger values make smaller videos. 0 lets all texels tremble."""
 
-    hold_megabytes: Count = 512
+    hold_megabytes: Count = 32
     """Memory for all frames of one layer while they are held; longer takes go through a file, block by block."""
 
     hold_frames: Count = 6

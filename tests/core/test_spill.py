@@ -38,3 +38,9 @@ def test_meshes_are_the_same_in_parts(frames: list[int] | None) -> None:
     assert np.array_equal(at_once, in_parts)
     moved = np.einsum("kij,kvj->kvi", tracking.poses[:, :, :3], tracking.vertices) + tracking.poses[:, None, :, 3]
     assert np.array_equal(at_once, moved if frames is None else moved[frames])
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 40, 300])
+def test_a_running_mean_is_the_mean(count: int) -> None:
+    arrays = np.random.default_rng(count).normal(size=(count, 50, 3))
+    assert np.array_equal(spill.running_mean(iter(arrays)), np.mean(list(arrays), 0))

@@ -23,7 +23,7 @@ from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.training.segments.frames import FrameFitter
-from facefolds_core.training.segments.loop import train_take
+from facefolds_core.training.segments.loop import fit_take, train_take
 from tests.scenes import make_scene
 
 pytestmark = pytest.mark.slow
@@ -174,6 +174,17 @@ def test_a_changed_frame_trains_itself_alone(again: tuple[Scene, Path]) -> None:
 def load_keys(folder: Path) -> list[int]:
     """Key frames of a trained model; frames of these scenes are named by their numbers."""
     return [int(name) for name in read_json(folder / "model" / "fit.json")["key_frames"]]
+
+
+def test_a_model_is_saved_after_its_segments_have_gone_from_where_they_were_made(
+    trained: tuple[Scene, Path], again: tuple[Scene, Path]
+) -> None:
+    scene, folder = again
+    fitted = fit_take(scene, params(), folder / "checkpoints", folder / "log")
+    shutil.rmtree(folder / "checkpoints")
+    fitted.save(folder / "saved")
+    assert same(folder / "saved", trained[1] / "model")
+    assert {p.name for p in (folder / "saved").iterdir()} == {p.name for p in (trained[1] / "model").iterdir()}
 
 
 @pytest.mark.parametrize("keep", [0, 100, -8])

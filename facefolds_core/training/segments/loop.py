@@ -171,13 +171,14 @@ class _Take:
         )
         before = read_json(base.folder / "training.json", _REMEDY)
         report = replace(report, iterations=report.iterations + int(before["iterations"]))
-        picture = base.folder / "fit.png"
+        drawn = base.folder / "fit.png"
+        picture = drawn.read_bytes() if drawn.exists() else None
         return Trained(
             RadianceManifolds(base.manifolds, textures).eval(),
             spec,
             report,
             self._summary(base),
-            partial(shutil.copyfile, picture) if picture.exists() else None,
+            None if picture is None else partial(_write, picture),
         )
 
     def _summary(self, base: Base) -> dict[str, Any]:
@@ -186,3 +187,7 @@ class _Take:
         names = [self.scene.frame_ids[k] for k in self.keys]
         told = fact("in_segments", frames=self.scene.num_frames, segments=len(self.segments), keys=len(names))
         return {**found, "events": [*found["events"], told.to_json()], "key_frames": names}
+
+
+def _write(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
