@@ -53,7 +53,7 @@ report: $(READY) $(if $(shell command -v npm),$(PLAYER)) # the page shows the as
 	$(BIN)/facefolds report $(SUBJECT)
 
 hero: $(READY) $(PLAYER)
-	$(BIN)/python -m bench.hero
+	$(BIN)/python -m docs.tools.hero
 
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -50,6 +50,10 @@ class Ellipsoids:
     def num_layers(self) -> int:
         return len(self.axes)
 
+    def texel_grid(self) -> None:
+        """None: it has no texels."""
+        return None
+
     def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         n = uv_to_directions(uv)
         radius = torch.stack([1 / (n / torch.tensor(a, dtype=n.dtype)).norm(dim=-1) for a in self.axes])

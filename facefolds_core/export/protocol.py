@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.sphere_uv import Window
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -33,6 +34,16 @@ class RenderedLike(Protocol):
         ...
 
 
+class TexelGridLike(Protocol):
+    """Texels of an image of `shape` (H, W) over `window`."""
+
+    @property
+    def window(self) -> Window: ...
+
+    @property
+    def shape(self) -> tuple[int, int]: ...
+
+
 class LayeredModel(Protocol):
     """N nested surfaces with textures in time, outermost first. See `RadianceManifolds` for each method."""
 
@@ -53,6 +64,10 @@ class LayeredModel(Protocol):
 
     def reflection_maps(self) -> ReflectionMaps | None:
         """What it adds by the direction, the same for all layers and frames; None for nothing."""
+        ...
+
+    def texel_grid(self) -> TexelGridLike | None:
+        """The texels between which its textures are bilinear; None where there are none."""
         ...
 
     def surface_points(self, uv: Tensor) -> tuple[Tensor, Tensor]:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.errors import UserError
+from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.frame_store import write_frames
-from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv
+from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
 
 DIRECTIONS_AT_ONCE = 16384
@@ -132,25 +133,49 @@ def texture_rows(
     Raises:
         UserError: if the model gives a colour or an alpha that is not finite.
     """
-    centre = model.centre.detach()
-    r = grids.resolution
-    lookups = []
-    for layer in range(grids.num_layers):
-        uv = texel_uv(r, r, grids.window(layer))[grids.valid[layer]]
-        lookups.append(torch.as_tensor(uv).to(centre))
-    with progress_bar(
-        total=model.num_frames * grids.num_layers, desc="textures", unit="image", disable=not progress
-    ) as bar:
+    sheets = [_Sheet(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
+    total = model.num_frames * grids.num_layers
+    with progress_bar(total=total, desc="textures", unit="image", disable=not progress) as bar:
         for frame in range(model.num_frames):
-            for layer, uv in enumerate(lookups):
-                image = np.zeros((r, r, 4), np.uint8)
-                image[grids.valid[layer]] = _texels(model, uv, layer, frame)
-                yield layer, frame, image
+            for layer, sheet in enumerate(sheets):
+                yield layer, frame, sheet.image(frame)
                 bar.update()
 
 
+class _Sheet:
+    """The texels of one layer, which show what it has in its window.
+
+    Args:
+        model: of the layer.
+        layer: index.
+        window, valid: of the layer's grid.
+    """
+
+    def __init__(self, model: LayeredModel, layer: int, window: Window, valid: NDArray[np.bool_]) -> None:
+        self._model, self._layer, self._valid = model, layer, valid
+        self._grid = grid = model.texel_grid()
+        if grid is None:
+            self._uv = texel_uv(len(valid), len(valid), window)[valid]
+            return
+        self._uv = texel_uv(grid.shape[0], grid.shape[1], grid.window).reshape(-1, 2)
+        corners = np.array([[window[1], window[2]], [window[0], window[3]]])
+        (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
+        self._projection = Projection(grid.shape, (len(valid), len(valid)), (top, bottom, left, right))
+
+    def image(self, frame: int) -> NDArray[np.uint8]:
+        """(R, R, 4) RGBA: of a model with texels, those that interpolate to what it shows; of others, its values."""
+        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
+        values = _texels(self._model, uv, self._layer, frame)
+        if self._grid is not None:
+            values = self._projection(values.reshape(*self._grid.shape, 4))[self._valid]
+        image = np.zeros((*self._valid.shape, 4), np.uint8)
+        image[self._valid] = np.rint(values * np.float32(255))
+        return image
+
+
 @torch.no_grad()
-def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[np.uint8]:
+def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[np.float32]:
+    """(M, 4) RGBA in [0, 1] at uv [M, 2]."""
     rgb, alpha = model.texture(uv, layer, float(frame))
     rgba = torch.cat([rgb, alpha[:, None]], -1)
     if not torch.isfinite(rgba).all():
@@ -161,7 +186,7 @@ def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[
             found="NaN or infinity",
             remedy="train again, with lower learning rates or another seed",
         )
-    return np.asarray((rgba.clamp(0, 1) * 255).round().to(torch.uint8).cpu().numpy())
+    return np.asarray(rgba.clamp(0, 1).cpu().numpy(), np.float32)
 
 
 def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool = True) -> NDArray[np.uint8]:

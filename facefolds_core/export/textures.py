@@ -8,6 +8,7 @@ player interpolates colour and alpha apart, and because the video codec spends n
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
+from facefolds_core.export.bilinear import Projection
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.progress import progress as progress_bar
 
@@ -23,7 +25,7 @@ Image = NDArray[np.uint8]
 
 
 def resample(image: Image, size: int) -> Image:
-    """One texture to `size` x `size` texels: area means when shrinking, bilinear when enlarging.
+    """One texture to `size` x `size` texels: least squares when shrinking (`bilinear`), bilinear when enlarging.
 
     Args:
         image: (R, R, 4) uint8 RGBA, straight alpha.
@@ -33,13 +35,21 @@ def resample(image: Image, size: int) -> Image:
     """
     premultiplied = premultiply(image)
     if size != len(image):
-        method = cv2.INTER_AREA if size < len(image) else cv2.INTER_LINEAR
-        premultiplied = np.asarray(cv2.resize(premultiplied, (size, size), interpolation=method), np.float32)
+        if size < len(image):
+            premultiplied = _shrinking(len(image), size)(premultiplied)
+        else:
+            enlarged = cv2.resize(premultiplied, (size, size), interpolation=cv2.INTER_LINEAR)
+            premultiplied = np.asarray(enlarged, np.float32)
     result = straight(premultiplied)
     if size == len(image):  # exactly what was there, where it shows
         shown = result[..., 3] > 0
         result[shown] = image[shown]
     return result
+
+
+@lru_cache(maxsize=8)
+def _shrinking(source: int, size: int) -> Projection:
+    return Projection((source, source), (size, size))
 
 
 def premultiply(image: Image) -> Float:

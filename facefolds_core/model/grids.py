@@ -11,7 +11,7 @@ from torch.nn.functional import grid_sample
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model.reflection import Reflection
-from facefolds_core.model.textures import Shaded
+from facefolds_core.model.textures import Shaded, TexelGrid
 
 
 class GridTextures(nn.Module):
@@ -65,6 +65,10 @@ class GridTextures(nn.Module):
     @property
     def shape(self) -> tuple[int, int]:
         return self.colour.shape[0], self.colour.shape[1]
+
+    def texel_grid(self) -> TexelGrid:
+        """The texels themselves."""
+        return TexelGrid(self.window, self.shape)
 
     def frame(self, index: int) -> tuple[Tensor, Tensor]:
         """What frame `index` adds: colour [H, W, 3], and to the logits of alpha [H, W, N]."""

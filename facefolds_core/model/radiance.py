@@ -12,7 +12,7 @@ from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.intersection import Crossings
 from facefolds_core.model.manifolds import Manifolds
-from facefolds_core.model.textures import Textures
+from facefolds_core.model.textures import TexelGrid, Textures
 
 RAYS_AT_ONCE = 8192
 """Rays that `render` and `surface_points` work on together: bounds their memory."""
@@ -80,6 +80,10 @@ class RadianceManifolds(nn.Module):
     def reflection_maps(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share, where the textures have one."""
         return self.textures.reflection_maps()
+
+    def texel_grid(self) -> TexelGrid | None:
+        """The texels between which the textures are bilinear, where they have some."""
+        return self.textures.texel_grid()
 
     def trace(self, origins: Tensor, directions: Tensor, time: Tensor, view_effects: bool) -> Traced:
         """Cross, shade and composite rays, all at once and differentiable.

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torch.nn.functional import embedding, relu
 
 from facefolds_core.geometry.reflections import ReflectionMaps
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.encoding import encoded_size, positional_encoding
 from facefolds_core.model.layers import LinearStack
 
@@ -35,6 +36,14 @@ class Shaded:
         return self.view[:, None] if self.view is not None and self.view.dim() == 1 else self.view
 
 
+@dataclass(frozen=True)
+class TexelGrid:
+    """Texels between which textures are bilinear: an image of `shape` (H, W) over `window`."""
+
+    window: Window
+    shape: tuple[int, int]
+
+
 class Textures(Protocol):
     """What a model of the appearance must offer."""
 
@@ -43,6 +52,10 @@ class Textures(Protocol):
 
     def reflection_maps(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share, or None."""
+        ...
+
+    def texel_grid(self) -> TexelGrid | None:
+        """Of all layers; None where there are no texels."""
         ...
 
     def shade(self, uv: Tensor, layer: Tensor, time: Tensor, directions: Tensor | None) -> Shaded:
@@ -111,6 +124,10 @@ class MlpTextures(nn.Module):
 
     def reflection_maps(self) -> ReflectionMaps | None:
         """None: the view branch is dropped at export."""
+        return None
+
+    def texel_grid(self) -> TexelGrid | None:
+        """None: it is looked up anywhere alike."""
         return None
 
     @property

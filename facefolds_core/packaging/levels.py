@@ -19,7 +19,7 @@ MOST_KEPT = 1024
 
 
 class Resampled:
-    """Textures at another size, premultiplied area means (export/textures.py); what was asked for last is kept."""
+    """Textures at another size, by least squares (export/textures.py); what was asked for last is kept."""
 
     def __init__(self, textures: Textures, size: int) -> None:
         self._textures, self._size = textures, size

@@ -8,9 +8,8 @@ import pytest
 
 from bench.hazard_rows import EXTREME, HAZARDS, loss_of
 from bench.results import Cell, Row
-from bench.tables import hazard_tables, interpolated, markdown, rate_tables, readme_table, replace_between, sweep_table
+from bench.tables import hazard_tables, interpolated, markdown, rate_tables, replace_between, sweep_table
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
 
 GLOSS = next(hazard for hazard in HAZARDS if hazard.key == "gloss")
 
@@ -110,29 +109,6 @@ def test_a_subject_with_its_whole_budget_has_a_table_of_its_own() -> None:
     assert "| glossy skin | x 4 | 3.00 |" in text
 
 
-def test_nothing_measured_is_said(tmp_path: Path) -> None:
+def test_nothing_measured_is_said() -> None:
     with pytest.raises(UserError, match="nothing measured"):
         hazard_tables([])
-    with pytest.raises(UserError, match="no results"):
-        readme_table(tmp_path)
-
-
-def test_the_readme_has_a_row_a_subject(tmp_path: Path) -> None:
-    scores = {"psnr": 11.0, "ssim": 0.5, "psnr_subject": 24.5, "ssim_subject": 0.875}
-    sizes = {"triangles": 90702, "mesh_bytes": 219_000, "texture_bytes": 260_000, "reflection_bytes": 15_000}
-    cost = {**sizes, "device": "cpu (2 threads)", "train_seconds": 60.4}
-    metrics = {"headline": "psnr_subject", "asset": scores, "model": {"psnr_subject": 25.0}, "cost": cost}
-    cameras = [
-        {"name": name, "split": split, "width": 128, "height": 192, "w2c": w2c}
-        for name, split, w2c in (
-            ("A", "train", [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 1]]),
-            ("B", "holdout", [[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 1]]),
-        )
-    ]
-    write_json(tmp_path / "actor" / "metrics.json", metrics)
-    write_json(tmp_path / "actor" / "scene" / "scene.json", {"cameras": cameras, "frame_ids": ["0", "1"]})
-    write_json(tmp_path / "actor" / "model" / "training.json", {"preset": "quick"})
-    assert readme_table(tmp_path).splitlines()[-1] == (
-        "| `actor`, quick | **24.50** | of the subject | 25.00 | 0.875 | 2, 2, 192 x 128 | B (90) "
-        "| 90 702 | 219 KB + 260 KB + 15 KB | 60 s |"
-    )

@@ -140,7 +140,7 @@ def test_nothing_else_compiles(project_root: Path) -> None:
     """Every kernel goes through `jit.py`, for GPUs through `gpu.py`: nothing but `prange`, threads and `cuda`'s words
     inside kernels is taken from numba."""
     found = []
-    for folder in ("facefolds_core", "stages", "bench"):
+    for folder in ("facefolds_core", "stages", "bench", "docs"):
         for path in (project_root / folder).rglob("*.py"):
             if path.name in ("jit.py", "gpu.py"):
                 continue

@@ -37,7 +37,7 @@ def unknown(text: str, root: Path) -> list[str]:
     said = [f"facefolds {name}" for name in re.findall(r"\bfacefolds ([a-z][a-z-]*)", code_of(text))]
     said = [name for name in said if name.split()[1] not in COMMANDS]
     said += [f"make {name}" for name in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE) if name not in targets]
-    modules = re.findall(r"python -m ((?:bench|stages|tests|facefolds_core)[a-z_.]*)\b", text)
+    modules = re.findall(r"python -m ((?:bench|docs|stages|tests|facefolds_core)[a-z_.]*)\b", text)
     said += [f"python -m {name}" for name in modules if importlib.util.find_spec(name) is None]
     used = re.findall(r"(?<!com\.)\bfacefolds\.(\w+)", text)
     said += [f"facefolds.{name}" for name in used if name not in facefolds_core.__all__]

@@ -9,6 +9,7 @@ import pytest
 
 PLACES = ["*.md", "bench/*.md", "data/*.md", "docs/**/*.md", "engines/**/*.md", "viewer/*.md"]
 CODE = ["*.yaml", "Makefile", "*.toml", "bench/*.py", "stages/*.py", "facefolds_core/**/*.py", "engines/**/*.py"]
+CODE += ["docs/**/*.py"]
 CODE += ["tests/**/*.py", "tests/**/*.js", "viewer/src/**/*.js", "*.md", "bench/*.md", "docs/**/*.md"]
 
 

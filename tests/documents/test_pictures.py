@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-import bench.pictures
-from bench.pictures import Picture, make, stale
+import docs.tools.pictures
+from docs.tools.pictures import Picture, make, stale
 from facefolds_core.errors import UserError
 
 LARGEST = 1_000_000
@@ -36,7 +36,7 @@ def subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def copy(folder: Path, out: Path) -> None:
         out.write_bytes((folder / "scores").read_bytes())
 
-    monkeypatch.setattr(bench.pictures, "PICTURES", {"a.jpg": Picture("scores", {"quality": 1}, copy)})
+    monkeypatch.setattr(docs.tools.pictures, "PICTURES", {"a.jpg": Picture("scores", {"quality": 1}, copy)})
     (tmp_path / "scores").write_text("1")
     make("a.jpg", tmp_path, tmp_path)
     return tmp_path
@@ -57,8 +57,8 @@ def test_other_results_make_a_picture_stale(subject: Path) -> None:
 
 
 def test_other_options_make_a_picture_stale(subject: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    picture = bench.pictures.PICTURES["a.jpg"]._replace(options={"quality": 2})
-    monkeypatch.setattr(bench.pictures, "PICTURES", {"a.jpg": picture})
+    picture = docs.tools.pictures.PICTURES["a.jpg"]._replace(options={"quality": 2})
+    monkeypatch.setattr(docs.tools.pictures, "PICTURES", {"a.jpg": picture})
     assert stale(subject, subject) == ["a.jpg: made with other options"]
 
 

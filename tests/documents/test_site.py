@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import facefolds_core
-from bench.site import FRAME, api_page, first_page, relinked
+from docs.tools.site import FRAME, api_page, first_page, relinked
 from facefolds_core.errors import UserError
 
 

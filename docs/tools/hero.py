@@ -1,7 +1,7 @@
 """The hero: the embedded actor's whole take at full size, through the whole pipeline, and its asset packed for others.
 
-    make hero                                              or python -m bench.hero; hours on two cores
-    python -m bench.hero --frames 12 --seconds 1.5         a shorter one: minutes
+    make hero                                              or python -m docs.tools.hero; hours on two cores
+    python -m docs.tools.hero --frames 12 --seconds 1.5         a shorter one: minutes
 
 In dist/hero: run/ (a project of its own, so that an interrupted run goes on), asset/, hero.html (plays by a double
 click; `make docs` shows it on the first page), hero.zip (both, with the scores and the licence).
@@ -32,7 +32,7 @@ from facefolds_core.player import find_player
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 NAME = "hero"
-PARAMS = ROOT / "bench" / "hero.yaml"
+PARAMS = Path(__file__).with_name("hero.yaml")
 
 
 def hero_params(capture: dict[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mkdocs.structure.files import Files
     from mkdocs.structure.pages import Page
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 HERO = "dist/hero/hero.html"
 MOVED = {
     "README.md": "index.md",
@@ -40,7 +40,8 @@ def place_of(path: str) -> str:
     """Where a file of the checkout is on the site; other files than documents lie under files/ as they are."""
     if path in MOVED:
         return MOVED[path]
-    return path.removeprefix("docs/") if path.startswith("docs/") else f"files/{path}"
+    page = path.startswith("docs/") and not path.startswith("docs/tools/")
+    return path.removeprefix("docs/") if page else f"files/{path}"
 
 
 def relinked(text: str, source: str, root: Path = ROOT) -> tuple[str, set[str]]:

@@ -1,7 +1,7 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
-python -m bench.pictures              makes docs/images/face.webp, actor.jpg, limits.jpg, report.jpg from data/actor
-python -m bench.pictures --check      refuses pictures that are not of this asset, these options, or were edited
+python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg from data/actor
+python -m docs.tools.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
 What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium.
 """
@@ -170,7 +170,7 @@ def main(
     """Make the documents' pictures of the embedded actor, or say which of them are stale."""
     with report_user_errors("pictures"):
         if check and (found := stale(subject)):
-            raise UserError("; ".join(found), file=IMAGES / RECORD, remedy="run `python -m bench.pictures`")
+            raise UserError("; ".join(found), file=IMAGES / RECORD, remedy="run `python -m docs.tools.pictures`")
         if unknown := set(names or []) - set(PICTURES):
             expected = ", ".join(PICTURES)
             raise UserError("no such picture", expected=expected, found=", ".join(unknown), remedy="name one of these")

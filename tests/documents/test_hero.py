@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import hero
+from docs.tools import hero
 from facefolds_core.asset import read_asset
 from facefolds_core.files import write_json
 from facefolds_core.params import CaptureParams

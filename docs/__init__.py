@@ -1,0 +1,1 @@
+"""The documents; docs/tools makes what in them is made."""
