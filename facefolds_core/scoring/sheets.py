@@ -146,10 +146,12 @@ def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequ
 
 
 def _caption(score: ImageScore) -> str:
-    """What says most of a picture, and within the subject beside it."""
+    """What says most of a picture, and within the subject beside it: no wider than the narrowest picture. What the first
+    figure is of stands in the sheet's heading."""
     key, within = score.headline, score.values.get("psnr_subject")
-    text = f"{score.values[key]:.2f} dB {HEADLINE_WORDS[key]}"
-    return text if within is None or key == "psnr_subject" else f"{text}, {within:.2f} of the subject"
+    if within is None or key == "psnr_subject":
+        return f"{score.values[key]:.2f} dB {HEADLINE_WORDS[key]}"
+    return f"{score.values[key]:.2f} dB, subject {within:.2f}"
 
 
 class _Sheet:

@@ -11,6 +11,7 @@ import pytest
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
 from facefolds_core.scoring.sheets import (
     BLOCK_HEAD,
+    CAPTION,
     FRAME_LABEL,
     GAP,
     MARGIN,
@@ -55,6 +56,22 @@ def test_the_images_stand_where_the_headings_say(tmp_path: Path) -> None:
     for column, colour in enumerate(COLOURS.values()):
         x = MARGIN + FRAME_LABEL + column * (layout.cell[0] + GAP) + layout.cell[0] // 2
         np.testing.assert_array_equal(sheet[row, x], colour)
+
+
+def test_captions_under_narrow_pictures_do_not_meet(tmp_path: Path) -> None:
+    one = panel("cam0", "000000", 128, 192)
+    scores = [
+        ImageScore(s.camera, s.frame, s.variant, s.values | {"psnr_over_plate": 29.19})
+        for s in (one.model_score, one.asset_score)
+    ]
+    over = Panel("cam0", "000000", one.truth, one.model, one.asset, *scores)
+    write_contact_sheet(tmp_path / "sheet.png", "somebody", [over], averages())
+    sheet, layout = cv2.imread(str(tmp_path / "sheet.png")), plan(128, 192, 1, 1)
+    top = TITLE + BLOCK_HEAD + layout.cell[1]
+    edges = [MARGIN + FRAME_LABEL + column * (layout.cell[0] + GAP) - GAP // 2 for column in (2, 3)]
+    for edge in edges:
+        between = sheet[top + 2 : top + CAPTION - 2, edge]
+        assert (between == between[0, 0]).all()
 
 
 def test_images_keep_their_aspect() -> None:
