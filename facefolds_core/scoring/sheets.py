@@ -146,8 +146,8 @@ def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequ
 
 
 def _caption(score: ImageScore) -> str:
-    """What says most of a picture, and within the subject beside it: no wider than the narrowest picture. What the first
-    figure is of stands in the sheet's heading."""
+    """What says most of a picture, and within the subject beside it; no wider than a narrow picture: what the first
+    figure is of stands in the heading."""
     key, within = score.headline, score.values.get("psnr_subject")
     if within is None or key == "psnr_subject":
         return f"{score.values[key]:.2f} dB {HEADLINE_WORDS[key]}"
