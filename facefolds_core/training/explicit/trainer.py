@@ -1,0 +1,248 @@
+"""The levels of a training of the explicit model, one after the other, and the model that comes out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from dvclive.live import Live
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from facefolds_core.errors import UserError
+from facefolds_core.facts import fact
+from facefolds_core.model.grids import GridTextures
+from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.model.radiance import RadianceManifolds
+from facefolds_core.model.storage import ExplicitSpec
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.device import Device
+from facefolds_core.training.explicit.background import first_background
+from facefolds_core.training.explicit.cameras import CameraChoice
+from facefolds_core.training.explicit.clearing import clear_texels
+from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
+from facefolds_core.training.explicit.gloss import GlossFit
+from facefolds_core.training.explicit.plan import Epochs, Level
+from facefolds_core.training.explicit.state import LossWeights, TextureState, state_type
+from facefolds_core.training.explicit.views import Images, Rays, rays_of
+from facefolds_core.training.log import log_metrics
+from facefolds_core.training.volume.fit import Volume
+
+
+class Trainer:
+    """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings."""
+
+    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: Device) -> None:
+        self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
+        self.scene = cameras.scene
+        self.images = Images(self.scene, cameras.gains)
+        self.random = np.random.default_rng(params.seed)
+        self.middle = torch.from_numpy(fit.middle).float()
+        self.geometry = 0.0
+        x, y, z = (float(v) for v in fit.centre)
+        self.centre = (x, y, z)
+        self.views: Rays | None = None
+        self.stride = 0
+        self.state: TextureState | None = None
+        self.iteration = self.rays = 0
+        self.rate = params.textures.learning_rate
+        self.psnr = 0.0
+        self.events = list(cameras.notes)
+        self.gloss = GlossFit(fit.window, params.reflection, cameras.scene.poses is not None)
+
+    def manifolds(self) -> RadialManifolds:
+        halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
+        return RadialManifolds(self.centre, self.fit.window, self.middle, halfwidth, self.params.layers)
+
+    def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+        """One level, again from its start at a lower learning rate if it diverges."""
+        self._prepare(level)
+        assert self.state is not None and self.views is not None
+        saved = self.state.snapshot()
+        for _ in range(self.params.divergence.attempts):
+            if self._attempt(level, number, live, bar):
+                self._judge_reflection(number, bar)
+                return
+            self.state.restore(saved)
+            self.rate /= self.params.divergence.slow_down
+            self.events.append(fact("diverged", level=number, rate=self.rate))
+            bar.write(f"train: {self.events[-1]}")
+        raise UserError(
+            "training diverged",
+            place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {self.rate:.3g}",
+            expected="an error that falls",
+            remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
+        )
+
+    def _judge_reflection(self, number: int, bar: tqdm) -> None:
+        """After a level, where it is time: whether the reflection helps."""
+        assert self.state is not None and self.views is not None
+        rounds = len(self.params.geometry.rounds)
+        found = self.gloss.after(number, rounds, self.state, self.views, self.images)
+        if found is not None:
+            self.events.append(found)
+            bar.write(f"train: {found}")
+
+    def _prepare(self, level: Level) -> None:
+        """Geometry, stored crossings and grids of this level."""
+        moved = self.geometry != level.geometry
+        if moved and self.state is not None:
+            self._recentre()
+        self.geometry = level.geometry
+        new_rays = moved or self.stride != level.stride
+        if new_rays:
+            finest = level.texels if level.stride > 1 else self.fit.texels
+            share = self.params.textures.rays_per_texel * finest[0] * finest[1]
+            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
+            self.stride = level.stride
+        assert self.views is not None
+        if self.state is None:
+            background = first_background(self.scene, self.images, self.volume, self.params.background)
+            start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
+            shape = (self.params.layers, self.scene.num_frames)
+            self.state = state_type(self.device.gpu)(level.texels, *shape, start, background, self.params)
+        elif self.state.shape != level.texels:
+            self.state.grow(level.texels)
+        if moved:
+            self.state.reset_alpha()
+        if new_rays:
+            self.gloss.follow(self.state, self.views, self.images, self.middle)
+
+    def _recentre(self) -> None:
+        """Move the middle radius to where this round found opacity, mean over frames."""
+        assert self.state is not None
+        h, w = self.state.shape
+        alpha = torch.stack([self.state.activated(k)[..., 3].clone() for k in range(self.scene.num_frames)]).mean(0)
+        seen = self.state.layers[2, ..., 3] > 0
+        alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
+        nodes = torch.nn.functional.interpolate(
+            alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
+        )
+        radii = self.manifolds().radii().detach().double().numpy()
+        moved = (
+            self.middle
+            + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)).float()
+        )
+        start = torch.from_numpy(self.fit.middle).float()
+        # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
+        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        self.middle = torch.maximum(
+            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
+        )
+
+    def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
+        """All iterations of a level; False if it diverges."""
+        assert self.state is not None and self.views is not None
+        stride = self._stride()
+        coarse = number < len(self.params.geometry.rounds)
+        weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
+        best, recent = float("inf"), float("nan")
+        epochs = Epochs(self.scene.num_frames, self.random)
+        for i in range(level.iterations):
+            frame = epochs.next()
+            views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
+            rates = self._rates(i / level.iterations if level.last else 0.0)
+            error = self.state.step(
+                views,
+                rays,
+                self.images,
+                frame,
+                weights,
+                rates,
+            )
+            if not coarse and i % self.params.textures.smooth_every == 0:
+                self.state.smooth_alpha(frame)
+            recent = error if i == 0 else (1 - smoothing) * recent + smoothing * error
+            best = min(best, recent)
+            if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
+                return False
+            if self.gloss.due(i, level):
+                done = level.last and i == level.iterations - 1
+                self.gloss.fit(self.state, self.views, self.images, done)
+            self.iteration += 1
+            self.rays += len(rays)
+            self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
+            if i % 10 == 9:
+                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
+            bar.update()
+            bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
+        return True
+
+    def _weights(self, coarse: bool) -> LossWeights:
+        """Once the rounds have decided what the background explains, opacity is cheap, and half opacity dear."""
+        losses = self.params.losses
+        if coarse:
+            return LossWeights(losses.opacity, 0.0, 0.0)
+        return LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, self.params.textures.min_alpha)
+
+    def _stride(self) -> int:
+        """Steps look at every so-manieth ray."""
+        assert self.state is not None and self.views is not None
+        texels = self.state.shape[0] * self.state.shape[1]
+        return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
+
+    def _rates(self, progress: float) -> NDArray[np.float32]:
+        to = self.params.textures
+        rate = self.rate * (1 - (1 - to.final_rate) * progress)
+        rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
+        return rates.astype(np.float32)
+
+    def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
+        """The model, without the layers that show nothing."""
+        assert self.state is not None
+        state, n = self.state, self.params.layers
+        state.forget_moments()
+        assert self.views is not None
+        self.events += clear_texels(state, self.views, self._stride(), self.params)
+        peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
+        kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
+        # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
+        first, last = kept[0], kept[-1]
+        self.events += [
+            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(n) if not first <= i <= last
+        ]
+        radii = self.manifolds().radii().detach()
+        outer, inner = radii[..., first], radii[..., last]
+        h, w = state.shape
+        halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
+        manifolds = RadialManifolds(self.centre, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
+        reflection = self.gloss.model()
+        textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames, reflection)
+        with torch.no_grad():
+            textures.colour.copy_(state.colour[0].view(h, w, 3))
+            textures.layers.copy_(state.layers[0].view(h, w, n, 4)[:, :, first : last + 1])
+            textures.frame_colour.copy_(state.frame_colour[0].view(-1, h, w, 3))
+            textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., first : last + 1])
+        spec = ExplicitSpec(
+            centre=self.centre,
+            window=self.fit.window,
+            nodes=(self.middle.shape[0], self.middle.shape[1]),
+            texels=(h, w),
+            num_layers=last - first + 1,
+            num_frames=self.scene.num_frames,
+            reflection=None if reflection is None else (*reflection.shape.maps, reflection.shape.environment),
+            fingerprint=fingerprint,
+        )
+        return RadianceManifolds(manifolds, textures), spec
+
+    def summary(self, spec: ExplicitSpec) -> dict[str, Any]:
+        """`fit.json`: what was chosen, and why."""
+        return {
+            "window": list(spec.window),
+            "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
+            "centre": list(spec.centre),
+            "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
+            "layers": spec.num_layers,
+            "texels": list(spec.texels),
+            "reasons": [reason.to_json() for reason in self.fit.reasons],
+            "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
+            "volume_psnr": self.fit.volume_psnr,
+            "cameras": self.cameras.summary,
+            "events": [event.to_json() for event in self.events],
+        }
+
+
+def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:
+    """Towards 0 by `by`, not beyond."""
+    return values.sign() * (values.abs() - by).clamp(min=0)
