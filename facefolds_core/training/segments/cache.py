@@ -38,9 +38,7 @@ class SegmentCache:
     def _read(self, path: Path) -> None:
         """What is damaged is made again."""
         with suppress(SafetensorError, OSError, ValueError, KeyError), safe_open(str(path), "pt") as file:
-            about = file.metadata()
-            pairs = zip(json.loads(about["frames"]), json.loads(about["psnr"]), strict=True)
-            for position, (frame, psnr) in enumerate(pairs):
+            for position, (frame, psnr) in enumerate(json.loads(file.metadata()["frames"])):
                 self.frames.setdefault(frame, (path, position, float(psnr)))
 
     def path(self, frames: Sequence[str]) -> Path:
@@ -68,7 +66,8 @@ class SegmentCache:
         path = self.path(frames)
         parts = [one[0] for one in fitted], [one[1] for one in fitted]
         tensors = {name: torch.stack(part) for name, part in zip(NAMES, parts, strict=True)}
-        about = {"frames": json.dumps(list(frames)), "psnr": json.dumps([one[2] for one in fitted])}
+        # One entry: safetensors writes several in any order, and equal segments are to be equal files.
+        about = {"frames": json.dumps([[frame, one[2]] for frame, one in zip(frames, fitted, strict=True)])}
         patiently(lambda: write_tensors(path, tensors, about))
         self._read(path)
 
