@@ -14,7 +14,6 @@ from typing import Annotated, Any
 import typer
 from playwright.sync_api import Browser, CDPSession, sync_playwright
 
-from bench.players import chromium
 from bench.results import commit_name, machine_name, now
 from bench.tables import markdown
 from facefolds_core.asset import read_asset
@@ -25,7 +24,7 @@ from facefolds_core.player import find_player
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.serving import serving
-from tests.chromium import FLAGS
+from tests.chromium import FLAGS, chromium
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
 from tests.viewer.captured import captured
 

@@ -19,7 +19,6 @@ import typer
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
-from bench.players import chromium
 from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.actor import ActorOptions, camera_at, render
@@ -33,7 +32,7 @@ from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.serving import serving
-from tests.chromium import FLAGS
+from tests.chromium import FLAGS, chromium
 
 IMAGES = ROOT / "docs" / "images"
 RECORD = "made.json"
