@@ -7,33 +7,26 @@ picture, and how long tasks blocked it. And how near the pixels come to those of
 
 from __future__ import annotations
 
-import base64
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
-from PIL import Image
-from playwright.sync_api import Browser, CDPSession, Page, sync_playwright
+from playwright.sync_api import Browser, CDPSession, sync_playwright
 
-from bench.players import chromium
 from bench.results import commit_name, machine_name, now
 from bench.tables import markdown
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.render import parse_size
 from facefolds_core.errors import report_user_errors
-from facefolds_core.files import atomic_file, write_json
-from facefolds_core.geometry.cameras import Camera
-from facefolds_core.pictures import open_picture
+from facefolds_core.files import write_json
 from facefolds_core.player import find_player
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.serving import serving
-from tests.chromium import FLAGS
+from tests.chromium import FLAGS, chromium
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
+from tests.viewer.captured import captured
 
 PATIENCE = 120_000
 """Milliseconds for the full level over the slowest line."""
@@ -42,10 +35,6 @@ DELAY = 40.0
 BLOCKING = 50.0
 """Milliseconds of a task that are not felt."""
 AGREEMENT_SIDE = 320
-SCREENS, PARTS, GAP = ((1440, 900), (390, 844), (360, 240)), (0.5, 0.533, 1.0), 20
-"""CSS pixels of the windows; how much smaller they are in the picture, and what is between them."""
-SETTLE = 1500
-"""Milliseconds for what glides."""
 WATCH = """(() => {
   window.marks = { tasks: [] };
   new PerformanceObserver((list) => marks.tasks.push(...list.getEntries().map((e) => [e.startTime, e.duration])))
@@ -120,18 +109,6 @@ def _counted(session: CDPSession, megabits: float | None) -> list[tuple[str, int
     return received
 
 
-def captured(page: Page, camera: Camera) -> NDArray[np.float64]:
-    """What the player shows from a camera: (H, W, 3) in [0, 1]."""
-    given = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": camera.width, "height": camera.height}
-    code = """(camera) => {
-        const { data, height, width } = document.querySelector('facefolds-player').capture(camera);
-        let text = '';
-        for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
-        return JSON.stringify([height, width, btoa(text)]); }"""
-    height, width, data = json.loads(page.evaluate(code, given))
-    return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4)[..., :3] / 255
-
-
 def agreement(browser: Browser, address: str, asset: Path) -> dict[str, float]:
     """PSNR of the player's pixels to those of `facefolds render`, first frame, full level, by camera."""
     page = browser.new_page()
@@ -140,34 +117,11 @@ def agreement(browser: Browser, address: str, asset: Path) -> dict[str, float]:
     level, grey = read_asset(asset).full, (GREY_VALUE,) * 3
     with OpenGLRenderer(level, Glossy.of(level)) as renderer:
         found = {
-            camera.name: psnr(captured(page, camera), renderer.render(camera, 0, grey)[0])
+            camera.name: psnr(captured(page, camera)[..., :3], renderer.render(camera, 0, grey)[0])
             for camera in five_cameras(AGREEMENT_SIDE)
         }
     page.close()
     return found
-
-
-def screens(browser: Browser, address: str, out: Path) -> None:
-    """The page on a desktop, a phone, and in a small frame of somebody's page, side by side."""
-    shots = []
-    for width, height in SCREENS:
-        page = browser.new_page(viewport={"width": width, "height": height}, has_touch=width < 500)
-        page.goto(f"{address}?src=asset/#frame=0&level=full")
-        page.wait_for_function("() => document.querySelector('facefolds-player').level === 'full'", timeout=PATIENCE)
-        page.wait_for_timeout(SETTLE)
-        shots.append(open_picture(page.screenshot()).convert("RGB"))
-        page.close()
-    shots = [
-        shot.resize((round(shot.width * part), round(shot.height * part)))
-        for shot, part in zip(shots, PARTS, strict=True)
-    ]
-    whole = Image.new(
-        "RGB", (sum(shot.width for shot in shots) + GAP * (len(shots) - 1), max(s.height for s in shots)), "white"
-    )
-    for index, shot in enumerate(shots):
-        whole.paste(shot, (sum(before.width + GAP for before in shots[:index]), 0))
-    with atomic_file(out) as temporary:
-        whole.save(temporary, "JPEG", quality=84, optimize=True)
 
 
 def table(rows: Sequence[Figures]) -> str:
@@ -188,7 +142,6 @@ def main(
     lines: Annotated[str, typer.Option(help="Speeds of the line, Mbit/s; 0 for the machine's own.")] = "1.6,5,0",
     size: Annotated[str, typer.Option(help="Of the window.")] = "800x600",
     out: Annotated[Path | None, typer.Option(help="JSON to write.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="JPEG to write: the page at three sizes.")] = None,
 ) -> None:
     """Bytes, times and main-thread time of the player's page, and its pixels' agreement with `facefolds render`."""
     with report_user_errors("page"):
@@ -202,8 +155,6 @@ def main(
         ):
             rows = [measure(browser, address, line, window) for line in wanted]
             near = agreement(browser, address, asset)
-            if picture is not None:
-                screens(browser, address, picture)
         typer.echo(table(rows))
         typer.echo("dB to `facefolds render`: " + ", ".join(f"{name} {value:.1f}" for name, value in near.items()))
         if out is not None:

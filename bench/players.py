@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import trimesh
 import typer
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, sync_playwright
+from trimesh.sample import sample_surface
 
 from bench.results import ROOT, commit_name, machine_name, now
 from bench.tables import markdown
@@ -30,7 +32,7 @@ from facefolds_core.files import write_json
 from facefolds_core.player import find_player
 from facefolds_core.rendering.reference import sample_texture
 from facefolds_core.serving import serving
-from tests.chromium import BROWSERS, FLAGS, find_browser
+from tests.chromium import FLAGS, chromium
 
 PAGES = ROOT / "bench" / "browser"
 PATIENCE = 300_000
@@ -54,43 +56,25 @@ def sample_splats(asset: Asset, count: int) -> NDArray[np.void]:
 
     Nothing is fitted: centre, colour and opacity are the layer's at that place, all have one isotropic size.
     """
-    rng = np.random.default_rng(0)
-    corners = [mesh.vertices[mesh.faces].astype(np.float64) for mesh in asset.layers]
-    areas = [np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1) / 2 for c in corners]
-    total = sum(float(area.sum()) for area in areas)
-    found: list[tuple[NDArray[np.float64], NDArray[np.float32]]] = []
-    drawn = kept = 0
-    textures = asset.frame(0)
-    while kept < count:
-        shares = rng.multinomial(2 * count, [area.sum() / total for area in areas])
-        for mesh, texture, c, area, share in zip(asset.layers, textures, corners, areas, shares, strict=True):
-            chosen = rng.choice(len(area), share, p=area / area.sum())
-            weights = rng.dirichlet((1, 1, 1), share)
-            st = np.einsum("nk,nkc->nc", weights, mesh.st[mesh.faces[chosen]]).astype(np.float32)
+    solids = [trimesh.Trimesh(mesh.vertices, mesh.faces, process=False) for mesh in asset.layers]
+    total, drawn, textures = sum(solid.area for solid in solids), count, asset.frame(0)
+    places, colours = np.empty((0, 3)), np.empty((0, 4), np.float32)
+    while len(places) < count:
+        drawn, found = 2 * drawn, []
+        for seed, (mesh, texture, solid) in enumerate(zip(asset.layers, textures, solids, strict=True)):
+            share = round(drawn * solid.area / total)
+            at, faces, weights = sample_surface(solid, share, return_barycentric=True, seed=seed)
+            st = np.einsum("nk,nkc->nc", weights, mesh.st[mesh.faces[faces]]).astype(np.float32)
             rgba = sample_texture(texture, st)
             seen = rgba[:, 3] >= VISIBLE
-            found.append((np.einsum("nk,nkc->nc", weights, c[chosen])[seen], rgba[seen]))
-            kept += int(seen.sum())
-        drawn += 2 * count
-    centres, colours = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    pick = rng.permutation(kept)[:count]
+            found.append((at[seen], rgba[seen]))
+        places, colours = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    kept, pick = len(places), np.random.default_rng(0).permutation(len(places))[:count]
     splats = np.zeros(count, SPLAT)
-    splats["centre"], splats["scale"] = centres[pick], SPREAD * np.sqrt(total * (kept / drawn) / count)
+    splats["centre"], splats["scale"] = places[pick], SPREAD * np.sqrt(total * (kept / drawn) / count)
     splats["rgba"] = np.rint(255 * colours[pick])
     splats["rotation"] = (255, 128, 128, 128)
     return splats
-
-
-def chromium() -> str:
-    """Where the browser lies.
-
-    Raises:
-        UserError: if there is none.
-    """
-    path = find_browser()
-    if path is None:
-        raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
-    return path
 
 
 def build_pages(out: Path) -> None:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import torch
 import yaml
@@ -45,21 +45,25 @@ class Project:
         self.root.mkdir(parents=True, exist_ok=True)
         write_text(self.root / "params.yaml", yaml.safe_dump(dict(params), sort_keys=False))
 
+    def begin(self, stage: str, stdout: int | IO[str], stderr: int | IO[str]) -> subprocess.Popen[str]:
+        """A stage's command with this checkout's code."""
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": path}
+        command = [sys.executable, "-m", f"stages.{stage}", "--subject", self.subject]
+        return subprocess.Popen(command, cwd=self.root, env=environment, stdout=stdout, stderr=stderr, text=True)
+
     def run(self, *stages: str) -> None:
-        """The stages' commands with this checkout's code.
+        """The stages, one after the other.
 
         Raises:
             UserError: with what a stage said last, if it failed.
         """
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": path}
         for stage in stages:
-            command = [sys.executable, "-m", f"stages.{stage}", "--subject", self.subject]
-            done = subprocess.run(command, cwd=self.root, env=environment, capture_output=True, text=True, check=False)
-            if done.returncode:
-                said = [line for line in f"{done.stdout}\n{done.stderr}".splitlines() if line.strip()]
+            with self.begin(stage, subprocess.PIPE, subprocess.PIPE) as running:
+                said = [line for line in "\n".join(running.communicate()).splitlines() if line.strip()]
+            if running.returncode:
                 errors = " ".join([line for line in said if line.startswith(f"{stage}: ")] or said[-3:])[:300]
-                message = errors or f"ended with {done.returncode}"
+                message = errors or f"ended with {running.returncode}"
                 raise UserError(message, place=f"{stage} of {self.subject}", file=self.root)
 
 

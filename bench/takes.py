@@ -2,43 +2,34 @@
 
 python -m bench.takes FOLDER [--frames 60,240,960]
 
-The actor performs one cycle of 60 frames, in small pictures; longer takes repeat it (but for one pixel the same
-pictures again, which saves hours of filming them). Each stage runs in a process of its own. Memory is anonymous memory,
-of the process and its children together, at most: pages of mapped files can be taken back at any time, and are not
-counted.
+The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own. Memory is anonymous
+memory, of the process and its children together, at most: pages of mapped files can be taken back at any time, and are
+not counted.
 """
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import cv2
 import psutil
 import typer
 
-from bench.results import ROOT
 from bench.run import Project
 from bench.tables import markdown
-from facefolds_core.captures.actor.capture import SEGMENT, frame_name
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import atomic_folder, write_json
-from facefolds_core.params import STAGE_SECTIONS
-
-CYCLE = 60
-"""Frames that the actor is filmed in."""
+from facefolds_core.files import write_json
+from facefolds_core.params import STAGE_SECTIONS, merged
 
 WATCH = 0.1
 """Seconds between two looks at a stage's memory."""
 
 PARAMS: dict[str, Any] = {
-    "capture": {"cameras": 6, "frames": CYCLE, "height": 64, "width": 48},
+    "capture": {"cameras": 6, "height": 64, "width": 48},
     "normalize": {},
     "train": {"preset": "fast", "segments": {"key_frames": 16}},
     "sample": {"resolution": 128},
@@ -79,16 +70,10 @@ def watched(project: Project, stage: str) -> Watched:
     Raises:
         UserError: if it fails.
     """
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", f"stages.{stage}"]
-    command += [] if stage == "configure" else ["--subject", project.subject]
     log = project.root / f"{stage}.log"
     start, peak = time.perf_counter(), 0
     before = os.times()
-    with (
-        log.open("w") as out,
-        subprocess.Popen(command, cwd=project.root, env=environment, stdout=out, stderr=out) as running,
-    ):
+    with log.open("w") as out, project.begin(stage, out, out) as running:
         process = psutil.Process(running.pid)
         while running.poll() is None:
             peak = max(peak, anonymous(process))
@@ -100,43 +85,18 @@ def watched(project: Project, stage: str) -> Watched:
     return Watched(time.perf_counter() - start, used, peak)
 
 
-def lengthen(capture: Path, frames: int) -> None:
-    """Replace a capture of a cycle by one that repeats it, one pixel of each picture changed."""
-    with atomic_folder(capture) as temporary:
-        for path in sorted(p for p in capture.rglob("*") if p.is_file()):
-            name = path.relative_to(capture)
-            number, rest = path.name[:6], path.name[6:]
-            target = temporary / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            if not number.isdecimal() or SEGMENT not in name.parts:
-                os.link(path, target)
-                continue
-            for k in range(int(number) - 1, frames, CYCLE):
-                again = target.with_name(frame_name(k) + rest)
-                if k < CYCLE or path.suffix != ".png" or "images" not in name.parts:
-                    os.link(path, again)
-                else:
-                    picture = cv2.imread(str(path))
-                    assert picture is not None
-                    picture[0, 0] ^= k // CYCLE  # equal frames would be fitted once
-                    cv2.imwrite(str(again), picture)
-        listing = temporary / "frame_list.txt"
-        listing.unlink()
-        listing.write_text("".join(f"{SEGMENT} {frame_name(k)}\n" for k in range(frames)), encoding="utf-8")
-
-
 def measure(folder: Path, frames: int) -> dict[str, Watched]:
     """All stages of a take, by their names."""
     project = Project(folder / f"frames{frames}", "take")
     subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 6}}
-    project.write({"subjects": {"take": subject}, **PARAMS})
-    watched(project, "configure")
+    project.write(
+        merged({"subjects": {"take": subject}, **PARAMS}, {"capture": {"frames": frames, "seconds": frames / 40}})
+    )
+    project.run("configure")
     found = {}
     for stage in STAGE_SECTIONS:
         found[stage] = watched(project, stage)
         typer.echo(f"{frames} frames, {stage}: {found[stage].seconds:.1f} s, {found[stage].memory / 1e6:.0f} MB")
-        if stage == "capture" and frames != CYCLE:
-            lengthen(project.folders.capture, frames)
     return found
 
 
@@ -145,7 +105,7 @@ def table(found: dict[int, dict[str, Watched]]) -> str:
     lengths = sorted(found)
     head = ["stage", *(f"MB, {k} frames" for k in lengths), "growth", *(f"s, {k} frames" for k in lengths), "growth"]
     rows = []
-    for stage in STAGE_SECTIONS[1:]:  # the actor is filmed picture by picture, one cycle only
+    for stage in STAGE_SECTIONS[1:]:  # the actor is filmed picture by picture
         runs = [found[k][stage] for k in lengths]
         memory, seconds = [run.memory for run in runs], [run.processor for run in runs]
         rows.append(

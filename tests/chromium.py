@@ -14,6 +14,8 @@ import psutil
 import pytest
 from playwright.sync_api import Browser, Playwright
 
+from facefolds_core.errors import UserError
+
 BROWSERS = ("chromium", "google-chrome", "google-chrome-stable", "chromium-browser")
 FLAGS = (
     "--use-angle=gl-egl",  # Mesa's llvmpipe: several times faster than Chromium's own software renderer
@@ -33,6 +35,18 @@ def find_browser() -> str | None:
         if path and subprocess.run([path, "--version"], capture_output=True, check=False, timeout=60).returncode == 0:
             return path
     return None
+
+
+def chromium() -> str:
+    """Where the browser lies, for commands that need one.
+
+    Raises:
+        UserError: if there is none.
+    """
+    path = find_browser()
+    if path is None:
+        raise UserError("no Chromium", expected=" or ".join(BROWSERS), remedy="apt-get install chromium")
+    return path
 
 
 class Chromium:

@@ -1,22 +1,24 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
-python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg from data/actor
+python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg, player.jpg
 python -m docs.tools.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
-What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium.
+What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium,
+player.jpg Chromium and the player that `make view` builds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
 from PIL import Image
+from playwright.sync_api import Browser, sync_playwright
 
-from bench.players import chromium
 from bench.results import ROOT, commit_name
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.actor import ActorOptions, camera_at, render
@@ -25,10 +27,12 @@ from facefolds_core.cli.render import shrink
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
 from facefolds_core.pictures import open_picture
+from facefolds_core.player import find_player
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
-from tests.chromium import FLAGS
+from facefolds_core.serving import serving
+from tests.chromium import FLAGS, chromium
 
 IMAGES = ROOT / "docs" / "images"
 RECORD = "made.json"
@@ -38,6 +42,11 @@ FILM |= {"field_of_view": 18.5, "target": [-0.1, 0.0, -0.035], "background": [22
 SHEET: dict[str, Any] = {"quality": 88}
 PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patience": 6000, "quality": 82}
 """CSS pixels: a desktop, and a phone beside it; milliseconds until the player in it plays."""
+PLAYER: dict[str, Any] = {"height": 660, "gap": 20, "width": 1600, "patience": 1500, "quality": 86}
+PLAYER |= {"panes": [[1000, "frame=4"], [1000, "frame=0&spread=1&view=55,10,2.9,0.25,0,-0.05"], [390, "frame=0"]]}
+"""CSS pixels of the windows, and what each shows, as in the player's links; the picture's width; milliseconds for what
+glides."""
+FULL = "document.querySelector('facefolds-player').level === 'full'"
 LIMITS: dict[str, Any] = {"size": [500, 768], "panel": [216, 264], "gap": 6, "frame": 2, "quality": 85}
 LIMITS |= {"views": [[115, 8, 30, 40, 440], [24, 12, 220, 25, 216], [4, 2, 130, 380, 216]]}
 """Azimuth and elevation in degrees, then left, top and width of what is cut out of a picture of `size`, pixels."""
@@ -101,24 +110,59 @@ def page(subject: Path, out: Path) -> None:
     Raises:
         UserError: if there is no report, or no Chromium.
     """
-    from playwright.sync_api import sync_playwright
-
     if not (report := subject / "report.html").exists():
         raise UserError("no report", file=report, remedy=f"run `facefolds report {subject}` first")
-    browser = chromium()
-    shots = []
+    with browser() as started:
+        sizes = [(width, PAGE["height"]) for width in PAGE["widths"]]
+        shots = [screen(started, report.resolve().as_uri(), size, PAGE["patience"]) for size in sizes]
+    side_by_side(shots, PAGE["gap"], out, PAGE["quality"])
+
+
+def player(subject: Path, out: Path) -> None:
+    """The player's page on a desktop, with its layers pulled apart, and on a phone.
+
+    Raises:
+        UserError: if there is no player, or no Chromium.
+    """
+    with serving(find_player(), {"asset": subject / "asset"}) as address, browser() as started:
+        shots = [
+            screen(
+                started, f"{address}?src=asset/#level=full&{view}", (wide, PLAYER["height"]), PLAYER["patience"], FULL
+            )
+            for wide, view in PLAYER["panes"]
+        ]
+    side_by_side(shots, PLAYER["gap"], out, PLAYER["quality"], PLAYER["width"])
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Chromium, without a screen."""
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=browser, args=list(FLAGS))
-        for width in PAGE["widths"]:
-            tab = started.new_page(viewport={"width": width, "height": PAGE["height"]})
-            tab.goto(report.resolve().as_uri())
-            tab.wait_for_timeout(PAGE["patience"])
-            shots.append(open_picture(tab.screenshot()).convert("RGB"))
+        started = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+        yield started
         started.close()
-    whole = Image.new("RGB", (sum(shot.width + PAGE["gap"] for shot in shots) - PAGE["gap"], PAGE["height"]), "white")
+
+
+def screen(started: Browser, address: str, size: Sequence[int], patience: int, there: str = "true") -> Image.Image:
+    """A page in a window of `size` CSS pixels (a narrow one is a phone's), `patience` ms after `there` holds."""
+    tab = started.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=size[0] < 500)
+    tab.goto(address)
+    tab.wait_for_function(f"() => {there}", timeout=120_000)
+    tab.wait_for_timeout(patience)
+    shot = open_picture(tab.screenshot()).convert("RGB")
+    tab.close()
+    return shot
+
+
+def side_by_side(shots: Sequence[Image.Image], gap: int, out: Path, quality: int, width: int | None = None) -> None:
+    """On white, all made so much smaller that they have `width` together."""
+    height = max(shot.height for shot in shots)
+    whole = Image.new("RGB", (sum(shot.width + gap for shot in shots) - gap, height), "white")
     for index, shot in enumerate(shots):
-        whole.paste(shot, (sum(before.width + PAGE["gap"] for before in shots[:index]), 0))
-    whole.save(out, "JPEG", quality=PAGE["quality"], optimize=True)
+        whole.paste(shot, (sum(before.width + gap for before in shots[:index]), 0))
+    if width is not None:
+        whole = whole.resize((width, round(width * whole.height / whole.width)), Image.Resampling.LANCZOS)
+    whole.save(out, "JPEG", quality=quality, optimize=True)
 
 
 PICTURES = {
@@ -126,6 +170,7 @@ PICTURES = {
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
     "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
+    "player.jpg": Picture("asset/manifest.json", PLAYER, player),
 }
 
 

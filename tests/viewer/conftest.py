@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -17,6 +15,7 @@ from playwright.sync_api import Browser, BrowserContext, Page
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving import serving
+from tests.viewer.captured import captured
 from tests.viewer.fixtures import rich_asset
 
 PATIENCE = 60_000
@@ -96,16 +95,7 @@ class Player:
 
     def capture(self, camera: Camera | None = None) -> NDArray[np.float64]:
         """What is shown: (H, W, 4) in [0, 1]."""
-        given = None
-        if camera:
-            size = {"width": camera.width, "height": camera.height}
-            given = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), **size}
-        code = """const { data, height, width } = e.capture(v ?? undefined);
-            let text = '';
-            for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
-            return JSON.stringify([height, width, btoa(text)]);"""
-        height, width, data = json.loads(str(self.run(code, given)))
-        return np.frombuffer(base64.b64decode(data), np.uint8).reshape(height, width, 4) / 255
+        return captured(self.page, camera)
 
 
 def page_of_yours(player: Player, body: str) -> None:
