@@ -63,8 +63,8 @@ def without_fingerprint(content: bytes) -> bytes:
     """A safetensors file whose description says nothing of the configuration: numbers, names and shapes only."""
     size = int.from_bytes(content[:8], "little")
     header = json.loads(content[8 : 8 + size])
-    spec = json.loads(header["__metadata__"]["spec"])
-    header["__metadata__"] = without_times(spec)
+    about = header.get("__metadata__", {})
+    header["__metadata__"] = without_times(json.loads(about["spec"])) if "spec" in about else about
     return json.dumps(header, sort_keys=True).encode() + content[8 + size :]
 
 
