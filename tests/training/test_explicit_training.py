@@ -17,7 +17,7 @@ from facefolds_core.frame_store import write_frames
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
-from facefolds_core.training.explicit import fit, loop
+from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import TextureState
@@ -186,7 +186,7 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
     trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Thin hair does that: the search for crossings needs a radius to step along."""
-    monkeypatch.setattr(loop, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
+    monkeypatch.setattr(trainer, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
     few = {"levels": [{"resolution": 32, "iterations": 30}]}
     train_explicit(trained[0], _params(iterations=40, volume=few), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
