@@ -162,7 +162,8 @@ export class LevelChoice {
     try {
       await this.#firstOf(this.#nearest(level.info.name).filter((name) => !this.broken.has(name)));
     } catch (failure) {
-      player.fail(failure?.kind === "codec" ? failure : error);
+      // That a file is damaged says more than that nothing is left to try.
+      player.fail(failure?.kind === "codec" && !(error instanceof PlayerError) ? failure : error);
     }
   }
 
