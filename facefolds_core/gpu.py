@@ -1,9 +1,9 @@
 """Kernels on NVIDIA GPUs: the bodies that `jit` compiles for CPUs, compiled again by numba-cuda (the extra `cuda`).
 
 An entry point is a plain function under `@entry`: one thread takes one ray, texel or voxel, and calls the body that the
-CPU's kernel calls, with arrays of its own. `jit.add`, with which bodies add to sums that others add to as well, is
-atomic here; so the order of sums, and with it their last bits, differ from run to run. Constants of an entry's module
-that its caller knows better (`LAYERS`, the size of a local array) are given when it is run.
+CPU's kernel calls, with arrays of its own. `jit.add` and `jit.add4`, with which bodies add to sums that others add to
+as well, are atomic here; so the order of sums, and with it their last bits, differ from run to run. Constants of an
+entry's module that its caller knows better (`LAYERS`, the size of a local array) are given when it is run.
 
 This module, and those of entries (`*_gpu.py`), are imported where a GPU is used: the extra may be missing. With
 NUMBA_ENABLE_CUDASIM=1 all of it runs in numba's simulator, slowly, without a GPU.
@@ -23,7 +23,7 @@ from numba import config, cuda
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
-from facefolds_core.jit import add, names_of
+from facefolds_core.jit import add, add4, names_of
 
 THREADS = 128
 """Of a block."""
@@ -122,6 +122,8 @@ def _there(value: Any, made: dict[types.FunctionType, Any]) -> Any:
     """What stands on a GPU for a value that a function uses; all but compiled functions stay what they are."""
     if value is add:
         return _atomic
+    if value is add4:
+        return _atomic4
     if not isinstance(value, Dispatcher):
         return value
     function: types.FunctionType = value.py_func
@@ -134,3 +136,12 @@ def _there(value: Any, made: dict[types.FunctionType, Any]) -> Any:
 @cuda.jit(device=True)
 def _atomic(array: Any, at: Any, value: Any) -> None:
     cuda.atomic.add(array, at, value)
+
+
+@cuda.jit(device=True)
+def _atomic4(array: Any, at: Any, v0: Any, v1: Any, v2: Any, v3: Any) -> None:
+    a0, a1, a2, a3 = at + (0,), at + (1,), at + (2,), at + (3,)  # noqa: RUF005 - numba knows no (*at, 0)
+    cuda.atomic.add(array, a0, v0)
+    cuda.atomic.add(array, a1, v1)
+    cuda.atomic.add(array, a2, v2)
+    cuda.atomic.add(array, a3, v3)

@@ -16,13 +16,13 @@ from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import share_off
-from facefolds_core.training.volume import fit, kernel, outline, reference
+from facefolds_core.training.volume import fit, kernel, outline, reference, sight
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.subject import subject_of
-from tests.scenes import OPAQUE, make_scene
+from tests.scenes import OPAQUE, look_at_origin, make_scene
 
 PARAMS = ExplicitParams()
 START, LEAST = PARAMS.start, PARAMS.start.subject_opacity
@@ -98,6 +98,15 @@ def test_shading_at_extreme_densities(density: float) -> None:
     gradient, _, transmittance, squares = _shade(p, 0.1, 0.1, 0.1)
     assert np.isfinite(gradient).all() and math.isfinite(squares)
     assert ((transmittance >= 0) & (transmittance <= 1)).all()
+
+
+def test_the_share_of_cameras_that_see_a_point_matches_the_reference() -> None:
+    """Cameras in front of the points, behind them, and among them."""
+    cameras = [look_at_origin(str(k), 40.0 * k, 10.0 * k - 30, 24, 1.0 if k < 5 else 0.2) for k in range(7)]
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (500, 3))
+    expected = reference.seen_share(cameras, points)
+    assert len(set(expected)) > 4
+    np.testing.assert_array_equal(sight.seen_share(cameras, points), expected)
 
 
 def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Volume:

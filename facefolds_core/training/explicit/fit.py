@@ -15,7 +15,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
 from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
-from facefolds_core.training.volume.fit import Volume, seen_share
+from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import (
     Profile,
     choose_centre,
@@ -23,6 +23,7 @@ from facefolds_core.training.volume.outline import (
     visible_points,
     window_directions,
 )
+from facefolds_core.training.volume.sight import seen_share
 
 Array = NDArray[np.float64]
 

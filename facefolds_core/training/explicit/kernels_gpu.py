@@ -42,7 +42,6 @@ def shade(
     layer = cuda.local.array(LAYERS, np.int64)
     c = cuda.local.array((LAYERS, 4), np.float32)
     before = cuda.local.array(LAYERS, np.float32)
-    added = cuda.local.array(3, np.float32)
     square = shade_ray(
         0,
         rays[k],
@@ -57,7 +56,6 @@ def shade(
         index,
         wish,
         (layer, c, before),
-        added,
     )
     cuda.atomic.add(squares, k % squares.shape[0], square)
     for n in range(LAYERS):

@@ -28,10 +28,11 @@ def look(codes, camera, pixel, images, background, texture, seen, min_light):  #
                 continue
             j, b = corner(codes[p, n, 0], width)
             i, a = corner(codes[p, n, 1], height)
-            light = through * rgba_tap(texture, i, j, n, 3, a, b)
-            r0 += light * rgba_tap(texture, i, j, n, 0, a, b)
-            r1 += light * rgba_tap(texture, i, j, n, 1, a, b)
-            r2 += light * rgba_tap(texture, i, j, n, 2, a, b)
+            row, column, of = np.uint64(i), np.uint64(j), np.uint64(n)
+            light = through * rgba_tap(texture, row, column, of, 3, a, b)
+            r0 += light * rgba_tap(texture, row, column, of, 0, a, b)
+            r1 += light * rgba_tap(texture, row, column, of, 1, a, b)
+            r2 += light * rgba_tap(texture, row, column, of, 2, a, b)
             s += light * (np.float32(codes[p, n, 0]) - one) / np.float32(SCALE)
             t += light * (np.float32(codes[p, n, 1]) - one) / np.float32(SCALE)
             through -= light

@@ -19,11 +19,16 @@ Array = NDArray[Any]
 _scatter = scatter_of(4)
 
 
+ONE = np.uint64(1)
+"""Texels are numbered without a sign: numba then need not ask whether an index counts from the end."""
+
+
 @inlined
 def rgba_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
+    """Channel q of layer n, bilinear, between the texels (i, j), uint64, and (i + 1, j + 1)."""
     one = np.float32(1.0)
-    top = texture[i, j, n, q] * (one - b) + texture[i, j + 1, n, q] * b
-    bottom = texture[i + 1, j, n, q] * (one - b) + texture[i + 1, j + 1, n, q] * b
+    top = texture[i, j, n, q] * (one - b) + texture[i, j + ONE, n, q] * b
+    bottom = texture[i + ONE, j, n, q] * (one - b) + texture[i + ONE, j + ONE, n, q] * b
     return top * (one - a) + bottom * a
 
 
@@ -106,11 +111,10 @@ def _shade(
     """A block of R rays, see `shade_ray`. Returns the sum of |C - I|^2."""
     layers = texture.shape[2]
     own = (np.empty(layers, np.int64), np.empty((layers, 4), np.float32), np.empty(layers, np.float32))
-    added = np.empty(3, np.float32)
     total = 0.0
     for k in range(rays.shape[0]):
         total += shade_ray(
-            k, rays[k], codes, camera, pixel, images, background, texture, shine, terms, index, wish, own, added
+            k, rays[k], codes, camera, pixel, images, background, texture, shine, terms, index, wish, own
         )
     return total
 
@@ -130,41 +134,44 @@ def shade_ray(
     index: Any,
     wish: Any,
     own: Any,
-    added: Any,
 ) -> Any:
     """Ray p of `shade`, number k of its block: the texels before its crossings in index (N, R), -1 where there is none,
     and what is wanted there in wish (N, R, 6): fractions of row and column, gradient of rgba. Returns |C - I|^2.
 
-    Scratch: own, arrays (N,) int64, (N, 4) and (N,); added (3,).
+    Scratch: own, arrays (N,) int64, (N, 4) and (N,).
     """
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
     opacity_weight, binarisation_weight, rate, min_alpha, min_light = terms
     one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
     layer, c, before = own
     transmittance, r0, r1, r2 = one, zero, zero, zero
-    for q in range(3):
-        added[q] = shine[p, q] if shine.shape[0] > 0 else zero
+    e0, e1, e2 = zero, zero, zero
+    if shine.shape[0] > 0:
+        e0, e1, e2 = shine[p, 0], shine[p, 1], shine[p, 2]
     m = 0
     for n in range(layers):
         index[n, k] = -1
     for n in range(layers):
         if codes[p, n, 0] == 0:
             continue
-        j, b = corner(codes[p, n, 0], width)
-        i, a = corner(codes[p, n, 1], height)
-        alpha = rgba_tap(texture, i, j, n, 3, a, b)
+        column, b = corner(codes[p, n, 0], width)
+        row, a = corner(codes[p, n, 1], height)
+        i, j, of = np.uint64(row), np.uint64(column), np.uint64(n)
+        alpha = rgba_tap(texture, i, j, of, 3, a, b)
         if alpha < min_alpha:
             continue
-        index[n, k] = i * width + j
+        # All is read before anything is written: for all a compiler knows, scratch may be the texture.
+        c0 = rgba_tap(texture, i, j, of, 0, a, b) + e0
+        c1 = rgba_tap(texture, i, j, of, 1, a, b) + e1
+        c2 = rgba_tap(texture, i, j, of, 2, a, b) + e2
+        index[n, k] = row * width + column
         wish[n, k, 0], wish[n, k, 1] = a, b
-        for q in range(3):
-            c[m, q] = rgba_tap(texture, i, j, n, q, a, b) + added[q]
-        c[m, 3] = alpha
+        c[m, 0], c[m, 1], c[m, 2], c[m, 3] = c0, c1, c2, alpha
         layer[m], before[m] = n, transmittance
         light = transmittance * alpha
-        r0 += light * c[m, 0]
-        r1 += light * c[m, 1]
-        r2 += light * c[m, 2]
+        r0 += light * c0
+        r1 += light * c1
+        r2 += light * c2
         transmittance *= one - alpha
         m += 1
         if transmittance < min_light:
@@ -225,7 +232,7 @@ def light_before(k: Any, p: Any, codes: Any, texture: Any, before: Any, min_ligh
         if codes[p, n, 0] > 0 and transmittance >= min_light:
             j, b = corner(codes[p, n, 0], width)
             i, a = corner(codes[p, n, 1], height)
-            transmittance *= 1 - rgba_tap(texture, i, j, n, 3, a, b)
+            transmittance *= 1 - rgba_tap(texture, np.uint64(i), np.uint64(j), np.uint64(n), 3, a, b)
 
 
 @inlined

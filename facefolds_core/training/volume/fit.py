@@ -22,6 +22,7 @@ from facefolds_core.training.volume import kernel, look_kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.optimise import Rays, clear, rays_of, train
 from facefolds_core.training.volume.room import Room, room_type
+from facefolds_core.training.volume.sight import seen_share
 
 Array = NDArray[np.float32]
 
@@ -71,17 +72,6 @@ class Volume:
             self.step * self.voxel,
         )
         return rgb, alpha, depth
-
-
-def seen_share(cameras: list[Camera], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(P,) share of the cameras in whose images points (P, 3) lie."""
-    count = np.zeros(len(points))
-    for camera in cameras:
-        at = (points @ camera.rotation.T + camera.w2c[:, 3]) @ camera.K.T
-        pixel = at[:, :2] / np.maximum(at[:, 2:], 1e-9)
-        inside = (pixel >= 0).all(1) & (pixel[:, 0] < camera.width) & (pixel[:, 1] < camera.height)
-        count += inside & (at[:, 2] > 0)
-    return count / len(cameras)
 
 
 def bounding_box(cameras: list[Camera], params: VolumeParams) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,9 +11,10 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from facefolds_core.jit import add, compiled, inlined, kernel
+from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.training.adam import EPSILON
-from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE, sample, softplus, span
+from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE, span
+from facefolds_core.training.volume.trilinear import cell, put, value, weights
 
 Array = NDArray[Any]
 
@@ -23,6 +24,8 @@ which so many have work. Of a part's gradient only the rows (i, j) that it has t
 
 BLOCK = 4
 """Voxels a side of a block of the occupancy map."""
+
+SIDE = np.uint64(BLOCK)
 
 LIMIT = 12.0
 """Of |raw density|."""
@@ -71,11 +74,9 @@ def shade(  # type: ignore[no-untyped-def]
         alpha = np.empty(samples, np.float32)
         slope = np.empty(samples, np.float32)
         before = np.empty(samples, np.float32)
-        value, c, behind = np.empty(4, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
         total = 0.0
         for r in range(count * part // gradient.shape[0], count * (part + 1) // gradient.shape[0]):
-            total = shade_ray(
-                total,
+            total += shade_ray(
                 r,
                 (origins, directions, jitter, target, background, matte),
                 grid,
@@ -88,7 +89,6 @@ def shade(  # type: ignore[no-untyped-def]
                 transmittance,
                 (opacity_weight, binarisation_weight, matte_weight),
                 (corner, fraction, colour, alpha, slope, before),
-                (value, c, behind),
             )
         sums[part] = total
     total = 0.0  # not sums.sum(), which numba shares out among the threads
@@ -99,7 +99,6 @@ def shade(  # type: ignore[no-untyped-def]
 
 @compiled
 def shade_ray(
-    total: Any,
     r: Any,
     rays: Any,
     grid: Any,
@@ -110,82 +109,66 @@ def shade_ray(
     touched: Any,
     residual: Any,
     transmittance: Any,
-    weights: Any,
+    prices: Any,
     kept: Any,
-    own: Any,
 ) -> Any:
-    """`shade` of ray r into the gradient (X, Y, Z, 4) and touched (X, Y) of its part; returns `total` and |C - I|^2.
+    """`shade` of ray r into the gradient (X, Y, Z, 4) and touched (X, Y) of its part; returns |C - I|^2.
 
-    rays, lengths and weights are arguments of `shade`. Scratch: kept, arrays of S samples, (S, 3) int32, twice (S, 3)
-    and thrice (S,) float32; own, arrays (4,), (3,) and (3,).
+    rays, lengths and prices are arguments of `shade`. Scratch: kept, arrays of S samples, (S, 3) int32, twice (S, 3)
+    and thrice (S,) float32.
     """
     origins, directions, jitter, target, background, matte = rays
-    (voxel, step), (opacity_weight, binarisation_weight, matte_weight) = lengths, weights
-    (corner, fraction, colour, alpha, slope, before), (value, c, behind) = kept, own
-    density = step / voxel
+    (voxel, step), (opacity_weight, binarisation_weight, matte_weight) = lengths, prices
+    corner, fraction, colour, alpha, slope, before = kept
+    one, density = np.float32(1.0), np.float32(step / voxel)
     o, d = origins[r], directions[r]
     near, far = span(o, d, lower, voxel, grid)
-    for q in range(3):
-        c[q] = 0
-    t = np.float32(1.0)
+    x0, y0, z0 = (o[0] - lower[0]) / voxel, (o[1] - lower[1]) / voxel, (o[2] - lower[2]) / voxel
+    dx, dy, dz = d[0] / voxel, d[1] / voxel, d[2] / voxel
+    c0, c1, c2, t = np.float32(0.0), np.float32(0.0), np.float32(0.0), one
     m = 0
     s = near + jitter[r] * step
     while s < far and m < corner.shape[0] and t >= OPAQUE:
-        x = (o[0] + s * d[0] - lower[0]) / voxel
-        y = (o[1] + s * d[1] - lower[1]) / voxel
-        z = (o[2] + s * d[2] - lower[2]) / voxel
+        i, j, k, fx, fy, fz = cell(grid, x0 + s * dx, y0 + s * dy, z0 + s * dz)
         s += step
-        if not occupied[int(max(x, 0.0)) // BLOCK, int(max(y, 0.0)) // BLOCK, int(max(z, 0.0)) // BLOCK]:
+        if not occupied[i // SIDE, j // SIDE, k // SIDE]:
             continue
-        i, j, k, fx, fy, fz = sample(grid, x, y, z, value)
-        rest = math.exp(-softplus(value[0]) * density)
-        a = np.float32(1 - rest)
+        w = weights(fx, fy, fz)
+        # exp(-softplus(raw) density) and its slope from one exponential; beyond 15 softplus is its argument.
+        e = math.exp(min(value(grid, i, j, k, w, 0), np.float32(15.0)))
+        rest = math.exp(-math.log1p(e) * density)
+        a = np.float32(one - rest)
         if a < CLEAR:
             continue
+        v1, v2, v3 = value(grid, i, j, k, w, 1), value(grid, i, j, k, w, 2), value(grid, i, j, k, w, 3)
         corner[m, 0], corner[m, 1], corner[m, 2] = i, j, k
         fraction[m, 0], fraction[m, 1], fraction[m, 2] = fx, fy, fz
-        alpha[m] = a
-        slope[m] = rest * density / (1 + math.exp(-value[0]))
-        before[m] = t
-        for q in range(3):
-            colour[m, q] = value[q + 1]
-            c[q] += t * a * value[q + 1]
-        t *= 1 - a
+        colour[m, 0], colour[m, 1], colour[m, 2] = v1, v2, v3
+        alpha[m], slope[m], before[m] = a, rest * density * (e / (one + e)), t
+        c0 += t * a * v1
+        c1 += t * a * v2
+        c2 += t * a * v3
+        t *= one - a
         m += 1
     transmittance[r] = t
-    for q in range(3):
-        behind[q] = background[r, q]
-        residual[r, q] = c[q] + t * background[r, q] - target[r, q]
-        total += residual[r, q] * residual[r, q]
-    # From the back: `behind` is the colour, `after` the transmittance of all that lies behind sample n.
-    push = np.float32(opacity_weight - binarisation_weight * max(1 - 2 * t, np.float32(0.0)))
+    b0, b1, b2 = background[r, 0], background[r, 1], background[r, 2]
+    d0, d1, d2 = c0 + t * b0 - target[r, 0], c1 + t * b1 - target[r, 1], c2 + t * b2 - target[r, 2]
+    residual[r, 0], residual[r, 1], residual[r, 2] = d0, d1, d2
+    # From the back: b is the colour, `after` the transmittance of all that lies behind sample n.
+    push = np.float32(opacity_weight - binarisation_weight * max(one - 2 * t, np.float32(0.0)))
     if matte[r] >= 0:
-        push += np.float32(matte_weight) * (1 - t - matte[r])
-    after = np.float32(1.0)
+        push += np.float32(matte_weight) * (one - t - matte[r])
+    after = one
     for n in range(m - 1, -1, -1):
         a, light = alpha[n], before[n]
-        pull = push * after
-        for q in range(3):
-            pull += residual[r, q] * (colour[n, q] - behind[q])
-            behind[q] = a * colour[n, q] + (1 - a) * behind[q]
-        after *= 1 - a
-        place = (corner[n, 0], corner[n, 1], corner[n, 2], fraction[n, 0], fraction[n, 1], fraction[n, 2])
-        put(place, light * pull * slope[n], light, a, residual[r], gradient, touched)
-    return total
-
-
-@inlined
-def put(place, g, light, a, slope, gradient, touched):  # type: ignore[no-untyped-def]
-    """Add a sample's wishes at its eight voxels: g of raw density, light a slope (3,) of colour; say so in touched."""
-    i, j, k, fx, fy, fz = place
-    for tap in range(4):
-        touched[i + (tap >> 1), j + (tap & 1)] = True
-    for tap in range(8):
-        di, dj, dk = tap >> 2, (tap >> 1) & 1, tap & 1
-        w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
-        add(gradient, (i + di, j + dj, k + dk, 0), w * g)
-        for q in range(3):
-            add(gradient, (i + di, j + dj, k + dk, q + 1), w * light * a * slope[q])
+        g0, g1, g2 = colour[n, 0] - b0, colour[n, 1] - b1, colour[n, 2] - b2
+        pull = push * after + d0 * g0 + d1 * g1 + d2 * g2
+        b0, b1, b2 = b0 + a * g0, b1 + a * g1, b2 + a * g2
+        after *= one - a
+        w = weights(fraction[n, 0], fraction[n, 1], fraction[n, 2])
+        wish = (light * pull * slope[n], light * a * d0, light * a * d1, light * a * d2)
+        put(gradient, touched, np.uint64(corner[n, 0]), np.uint64(corner[n, 1]), np.uint64(corner[n, 2]), w, wish)
+    return d0 * d0 + d1 * d1 + d2 * d2
 
 
 @kernel(parallel=True)

@@ -34,15 +34,11 @@ def shade(
     t = cuda.grid(1)
     if t >= corners.shape[1]:
         return
-    value = cuda.local.array(4, np.float32)
-    c = cuda.local.array(3, np.float32)
-    behind = cuda.local.array(3, np.float32)
     at = values[:, t]
     kept = (corners[:, t], at[:, 0:3], at[:, 3:6], at[:, 6], at[:, 7], at[:, 8])
     total = 0.0
     for r in range(t, residual.shape[0], corners.shape[1]):
-        total = _shade_ray(
-            total,
+        total += _shade_ray(
             r,
             rays,
             grid,
@@ -55,7 +51,6 @@ def shade(
             transmittance,
             weights,
             kept,
-            (value, c, behind),
         )
     cuda.atomic.add(squares, t % squares.shape[0], total)
 
@@ -64,8 +59,7 @@ def shade(
 def render(origins, directions, grid, lower, voxel, step, rgb, alpha, depth):
     r = cuda.grid(1)
     if r < alpha.shape[0]:
-        value = cuda.local.array(4, np.float32)
-        _render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth, value)
+        _render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth)
 
 
 @entry
@@ -98,9 +92,7 @@ def look(origins, directions, jitter, grid, lengths, rgb, through):
     """lengths: radius, step, side of a voxel, `farthest`, as of `room_kernel.look_ray`."""
     r = cuda.grid(1)
     if r < through.shape[0]:
-        value = cuda.local.array(4, np.float32)
-        at = cuda.local.array(3, np.float64)
-        _look_ray(r, origins, directions, jitter, grid, lengths, rgb, through, value, at)
+        _look_ray(r, origins, directions, jitter, grid, lengths, rgb, through)
 
 
 @entry
@@ -110,10 +102,7 @@ def splat(rays, grid, lengths, gradient, touched, corners, values):
     t = cuda.grid(1)
     if t >= corners.shape[1]:
         return
-    value = cuda.local.array(4, np.float32)
-    behind = cuda.local.array(3, np.float32)
-    place = cuda.local.array(3, np.float64)
     at = values[:, t]
     for r in range(t, rays[0].shape[0], corners.shape[1]):
         samples = (corners[:, t], at[:, 0:3], at[:, 3:9])
-        _splat_ray(r, rays, grid, lengths, gradient[0], touched[0], samples, (value, behind, place))
+        _splat_ray(r, rays, grid, lengths, gradient[0], touched[0], samples)

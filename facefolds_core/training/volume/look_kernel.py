@@ -9,6 +9,7 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.training.volume.trilinear import sample
 
 CLEAR, OPAQUE = 1e-4, 1e-3
 """Samples with less alpha are left out, and so is what lies behind less transmittance."""
@@ -32,25 +33,6 @@ def span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     return near, far
 
 
-@inlined
-def sample(grid, x, y, z, out):  # type: ignore[no-untyped-def]
-    """Trilinear values at voxel coordinates (x, y, z) into out[0:4]; returns the lower corner and the fractions."""
-    i = min(max(int(x), 0), grid.shape[0] - 2)
-    j = min(max(int(y), 0), grid.shape[1] - 2)
-    k = min(max(int(z), 0), grid.shape[2] - 2)
-    fx = np.float32(min(max(x - i, 0.0), 1.0))
-    fy = np.float32(min(max(y - j, 0.0), 1.0))
-    fz = np.float32(min(max(z - k, 0.0), 1.0))
-    for q in range(4):
-        out[q] = 0
-    for t in range(8):
-        di, dj, dk = t >> 2, (t >> 1) & 1, t & 1
-        w = (fx if di else 1 - fx) * (fy if dj else 1 - fy) * (fz if dk else 1 - fz)
-        for q in range(4):
-            out[q] += w * grid[i + di, j + dj, k + dk, q]
-    return i, j, k, fx, fy, fz
-
-
 @kernel(parallel=True)
 def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-untyped-def]
     """(R, 3) rays -> rgb over black (R, 3), alpha (R,), distance where half of the light is left (R,) or 0."""
@@ -59,8 +41,7 @@ def render(origins, directions, grid, lower, voxel, step):  # type: ignore[no-un
     alpha = np.zeros(count, np.float32)
     depth = np.zeros(count, np.float32)
     for r in prange(count):
-        value = np.empty(4, np.float32)
-        render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth, value)
+        render_ray(r, origins, directions, grid, lower, voxel, step, rgb, alpha, depth)
     return rgb, alpha, depth
 
 
@@ -76,25 +57,26 @@ def render_ray(
     rgb: Any,
     alpha: Any,
     depth: Any,
-    value: Any,
 ) -> None:
-    """`render` of ray r into rgb, alpha and depth, which are 0. Scratch: value (4,)."""
+    """`render` of ray r into rgb, alpha and depth, which are 0."""
     o, d = origins[r], directions[r]
     near, far = span(o, d, lower, voxel, grid)
-    t = np.float32(1.0)
+    t, red, green, blue = np.float32(1.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
     s = near + 0.5 * step
     while s < far and t >= OPAQUE:
         x = (o[0] + s * d[0] - lower[0]) / voxel
         y = (o[1] + s * d[1] - lower[1]) / voxel
         z = (o[2] + s * d[2] - lower[2]) / voxel
-        sample(grid, x, y, z, value)
-        a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
-        for q in range(3):
-            rgb[r, q] += t * a * value[q + 1]
+        v0, v1, v2, v3 = sample(grid, x, y, z)
+        a = np.float32(1 - math.exp(-softplus(v0) * step / voxel))
+        red += t * a * v1
+        green += t * a * v2
+        blue += t * a * v3
         t *= 1 - a
         if depth[r] == 0 and t < 0.5:
             depth[r] = s
         s += step
+    rgb[r, 0], rgb[r, 1], rgb[r, 2] = red, green, blue
     alpha[r] = 1 - t
 
 
@@ -112,7 +94,6 @@ def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # 
     radius = np.zeros((count, shares.shape[0]), np.float32)
     for r in prange(count):
         reached = np.zeros(samples + 1, np.float32)
-        value = np.empty(4, np.float32)
         t = np.float32(1.0)
         for n in range(samples):
             s = farthest - (n + 0.5) * step
@@ -121,10 +102,11 @@ def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # 
             z = (centre[2] + s * directions[r, 2] - lower[2]) / voxel
             inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
             if inside and t >= OPAQUE:
-                sample(grid, x, y, z, value)
-                a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
-                for q in range(3):
-                    rgb[r, q] += t * a * value[q + 1]
+                v0, v1, v2, v3 = sample(grid, x, y, z)
+                a = np.float32(1 - math.exp(-softplus(v0) * step / voxel))
+                rgb[r, 0] += t * a * v1
+                rgb[r, 1] += t * a * v2
+                rgb[r, 2] += t * a * v3
                 t *= 1 - a
             reached[n + 1] = 1 - t
         opacity[r] = 1 - t

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model.compositing import compositing_weights, transmittances
 from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE
 
@@ -64,3 +69,14 @@ def shade(
     loss = loss + 0.5 * matte_weight * (1 - transmittance - matte)[matte >= 0].square().sum()
     (gradient,) = torch.autograd.grad(loss, grid)
     return gradient, residual.detach(), transmittance.detach(), squares.detach()
+
+
+def seen_share(cameras: Sequence[Camera], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As `sight.seen_share`."""
+    count = np.zeros(len(points))
+    for camera in cameras:
+        at = (points @ camera.rotation.T + camera.w2c[:, 3]) @ camera.K.T
+        pixel = at[:, :2] / np.maximum(at[:, 2:], 1e-9)
+        inside = (pixel >= 0).all(1) & (pixel[:, 0] < camera.width) & (pixel[:, 1] < camera.height)
+        count += inside & (at[:, 2] > 0)
+    return count / len(cameras)

@@ -15,8 +15,8 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.training.volume.kernel import put
-from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE, sample, softplus
+from facefolds_core.training.volume.look_kernel import CLEAR, OPAQUE, softplus
+from facefolds_core.training.volume.trilinear import cell, put, sample, value, weights
 
 
 @inlined
@@ -39,12 +39,12 @@ def _stride(o, d, s, radius, step):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _contracted(o, d, s, radius, voxel, out):  # type: ignore[no-untyped-def]
-    """Voxel coordinates of a point of the ray into out[0:3]."""
+def _contracted(o, d, s, radius, voxel):  # type: ignore[no-untyped-def]
+    """Voxel coordinates of a point of the ray."""
     y0, y1, y2 = (o[0] + s * d[0]) / radius, (o[1] + s * d[1]) / radius, (o[2] + s * d[2]) / radius
     n = max(math.sqrt(y0 * y0 + y1 * y1 + y2 * y2), 1.0)
     scale = (2 - 1 / n) / n
-    out[0], out[1], out[2] = (scale * y0 + 2) / voxel, (scale * y1 + 2) / voxel, (scale * y2 + 2) / voxel
+    return (scale * y0 + 2) / voxel, (scale * y1 + 2) / voxel, (scale * y2 + 2) / voxel
 
 
 @kernel(parallel=True)
@@ -55,8 +55,7 @@ def look(origins, directions, jitter, grid, radius, step, farthest):  # type: ig
     through = np.ones(count, np.float32)
     voxel = 4.0 / (grid.shape[0] - 1)
     for r in prange(count):
-        value, at = np.empty(4, np.float32), np.empty(3)
-        look_ray(r, origins, directions, jitter, grid, (radius, step, voxel, farthest), rgb, through, value, at)
+        look_ray(r, origins, directions, jitter, grid, (radius, step, voxel, farthest), rgb, through)
     return rgb, through
 
 
@@ -70,25 +69,24 @@ def look_ray(
     lengths: Any,
     rgb: Any,
     through: Any,
-    value: Any,
-    at: Any,
 ) -> None:
-    """`look` of ray r into rgb, which is 0, and through. lengths: radius, step, side of a voxel, `farthest`. Scratch:
-    value (4,), at (3,) float64."""
+    """`look` of ray r into rgb and through. lengths: radius, step, side of a voxel, `farthest`."""
     radius, step, voxel, farthest = lengths
     o, d = origins[r], directions[r]
-    t = np.float32(1.0)
+    t, red, green, blue = np.float32(1.0), np.float32(0.0), np.float32(0.0), np.float32(0.0)
     s = _start(o, d, radius)
     stride, n = _stride(o, d, s, radius, step)
     while n < farthest and t >= OPAQUE:
-        _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
-        sample(grid, at[0], at[1], at[2], value)
-        a = np.float32(1 - math.exp(-softplus(value[0]) * step / voxel))
-        for q in range(3):
-            rgb[r, q] += t * a * value[q + 1]
+        x, y, z = _contracted(o, d, s + jitter[r] * stride, radius, voxel)
+        v0, v1, v2, v3 = sample(grid, x, y, z)
+        a = np.float32(1 - math.exp(-softplus(v0) * step / voxel))
+        red += t * a * v1
+        green += t * a * v2
+        blue += t * a * v3
         t *= 1 - a
         s += stride
         stride, n = _stride(o, d, s, radius, step)
+    rgb[r, 0], rgb[r, 1], rgb[r, 2] = red, green, blue
     through[r] = t
 
 
@@ -114,7 +112,6 @@ def splat(  # type: ignore[no-untyped-def]
         corner = np.empty((samples, 3), np.int32)
         fraction = np.empty((samples, 3), np.float32)
         kept = np.empty((samples, 6), np.float32)
-        value, behind, at = np.empty(4, np.float32), np.empty(3, np.float32), np.empty(3)
         for r in range(count * part // parts, count * (part + 1) // parts):
             splat_ray(
                 r,
@@ -124,46 +121,48 @@ def splat(  # type: ignore[no-untyped-def]
                 gradient[part],
                 touched[part],
                 (corner, fraction, kept),
-                (value, behind, at),
             )
 
 
 @compiled
-def splat_ray(r: Any, rays: Any, grid: Any, lengths: Any, gradient: Any, touched: Any, samples: Any, own: Any) -> None:
+def splat_ray(r: Any, rays: Any, grid: Any, lengths: Any, gradient: Any, touched: Any, samples: Any) -> None:
     """`splat` of ray r into the gradient (M, M, M, 4) and touched (M, M) of its part. rays are arguments of `splat`,
     lengths as of `look_ray`. Scratch: samples, arrays (S, 3) int32, (S, 3) and (S, 6): colour, alpha, its slope in raw
-    density, transmittance before; own, arrays (4,), (3,), and (3,) float64."""
+    density, transmittance before."""
     origins, directions, jitter, beyond, slope = rays
     radius, step, voxel, farthest = lengths
-    (corner, fraction, kept), (value, behind, at) = samples, own
-    density = step / voxel
+    corner, fraction, kept = samples
+    one, density = np.float32(1.0), np.float32(step / voxel)
     o, d = origins[r], directions[r]
-    t = np.float32(1.0)
+    t = one
     m = 0
     s = _start(o, d, radius)
     stride, n = _stride(o, d, s, radius, step)
     while n < farthest and m < corner.shape[0] and t >= OPAQUE:
-        _contracted(o, d, s + jitter[r] * stride, radius, voxel, at)
+        x, y, z = _contracted(o, d, s + jitter[r] * stride, radius, voxel)
         s += stride
         stride, n = _stride(o, d, s, radius, step)
-        i, j, k, fx, fy, fz = sample(grid, at[0], at[1], at[2], value)
-        rest = math.exp(-softplus(value[0]) * density)
-        a = np.float32(1 - rest)
+        i, j, k, fx, fy, fz = cell(grid, x, y, z)
+        w = weights(fx, fy, fz)
+        e = math.exp(min(value(grid, i, j, k, w, 0), np.float32(15.0)))
+        rest = math.exp(-math.log1p(e) * density)
+        a = np.float32(one - rest)
         if a < CLEAR:
             continue
         corner[m, 0], corner[m, 1], corner[m, 2] = i, j, k
         fraction[m, 0], fraction[m, 1], fraction[m, 2] = fx, fy, fz
-        kept[m, 0], kept[m, 1], kept[m, 2] = value[1], value[2], value[3]
-        kept[m, 3], kept[m, 4], kept[m, 5] = a, rest * density / (1 + math.exp(-value[0])), t
-        t *= 1 - a
+        kept[m, 0], kept[m, 1] = value(grid, i, j, k, w, 1), value(grid, i, j, k, w, 2)
+        kept[m, 2], kept[m, 3] = value(grid, i, j, k, w, 3), a
+        kept[m, 4], kept[m, 5] = rest * density * (e / (one + e)), t
+        t *= one - a
         m += 1
-    for q in range(3):
-        behind[q] = beyond[r, q]
+    b0, b1, b2 = beyond[r, 0], beyond[r, 1], beyond[r, 2]
+    d0, d1, d2 = slope[r, 0], slope[r, 1], slope[r, 2]
     for p in range(m - 1, -1, -1):
         a, light = kept[p, 3], kept[p, 5]
-        pull = np.float32(0.0)
-        for q in range(3):
-            pull += slope[r, q] * (kept[p, q] - behind[q])
-            behind[q] = a * kept[p, q] + (1 - a) * behind[q]
-        place = (corner[p, 0], corner[p, 1], corner[p, 2], fraction[p, 0], fraction[p, 1], fraction[p, 2])
-        put(place, light * pull * kept[p, 4], light, a, slope[r], gradient, touched)
+        g0, g1, g2 = kept[p, 0] - b0, kept[p, 1] - b1, kept[p, 2] - b2
+        pull = d0 * g0 + d1 * g1 + d2 * g2
+        b0, b1, b2 = b0 + a * g0, b1 + a * g1, b2 + a * g2
+        w = weights(fraction[p, 0], fraction[p, 1], fraction[p, 2])
+        wish = (light * pull * kept[p, 4], light * a * d0, light * a * d1, light * a * d2)
+        put(gradient, touched, np.uint64(corner[p, 0]), np.uint64(corner[p, 1]), np.uint64(corner[p, 2]), w, wish)
