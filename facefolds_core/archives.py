@@ -38,10 +38,6 @@ _DAMAGE = (
 )
 
 
-_BLOCK = 1 << 20
-"""Bytes that are checked at a time of an array that is mapped."""
-
-
 def read_npz(
     path: Path, message: str, names: Collection[str] | None = None, mapped: bool = False
 ) -> dict[str, NDArray[Any]]:
@@ -89,7 +85,7 @@ def _mapped(archive: zipfile.ZipFile, member: zipfile.ZipInfo, size: int) -> NDA
     with _opened(archive, member, size) as stream:
         shape, columns_first, kind = _header(stream, member)
         start = stream.tell()
-        while stream.read(_BLOCK):
+        while stream.read(1 << 20):
             pass
     file = archive.fp
     assert file is not None

@@ -88,26 +88,23 @@ class Places:
 
     def find(self, index: int, frame: int) -> int:
         """Row of an image, -1 without one."""
-        if not (0 <= index < _FRAMES and 0 <= frame < _FRAMES):
+        if min(index, frame) < 0 or max(index, frame) >> 32:
             return -1
-        key = index * _FRAMES + frame
+        key = index << 32 | frame
         row = int(np.searchsorted(self.keys, key))
         return row if row < len(self.keys) and self.keys[row] == key else -1
 
     def pairs(self) -> list[tuple[int, int]]:
         """All (index, frame), sorted."""
-        return list(zip((self.keys // _FRAMES).tolist(), (self.keys % _FRAMES).tolist(), strict=True))
+        return list(zip((self.keys >> 32).tolist(), (self.keys & 0xFFFFFFFF).tolist(), strict=True))
 
     def part(self, frames: Sequence[int]) -> Places:
         """Those of some frames, numbered anew from 0 on."""
         known = {frame: position for position, frame in enumerate(frames)}
-        rows = [(i * _FRAMES + known[k], row) for row, (i, k) in enumerate(self.pairs()) if k in known]
+        rows = [(i << 32 | known[k], row) for row, (i, k) in enumerate(self.pairs()) if k in known]
         rows.sort()
         keys, taken = np.array([key for key, _ in rows], np.int64), np.array([row for _, row in rows], np.intp)
         return Places(keys, self.offsets[taken], self.sizes[taken], self.after[taken])
-
-
-_FRAMES = 1 << 32
 
 
 class FrameStore:
@@ -227,7 +224,7 @@ def _places(reader: pa.RecordBatchFileReader, file: pa.Buffer, shape: tuple[int,
         index, frame = batch.column("camera")[0].as_py(), batch.column("frame")[0].as_py()
         if min(index, frame) < 0:
             raise ValueError(f"an image of index {index}, frame {frame}")
-        keys[row], data = index * _FRAMES + frame, pixels.buffers()[1]
+        keys[row], data = index << 32 | frame, pixels.buffers()[1]
         offsets[row], sizes[row] = data.address - file.address, size
         if packed:
             after[row] = batch.column("after")[0].as_py()
@@ -240,7 +237,7 @@ def _places(reader: pa.RecordBatchFileReader, file: pa.Buffer, shape: tuple[int,
     if count and not (np.diff(places.keys) > 0).all():
         raise ValueError("an image twice")
     chained = places.after >= 0
-    before = (places.keys[chained] // _FRAMES) * _FRAMES + places.after[chained]
+    before = (places.keys[chained] >> 32 << 32) + places.after[chained]
     found = np.minimum(np.searchsorted(places.keys, before), max(count - 1, 0))
     if not ((places.keys[found] == before) & (order[found] < order[chained])).all() or (places.after < -1).any():
         raise ValueError("an image after one that does not come before it")
