@@ -28,7 +28,7 @@ class Player:
 
     def __init__(self, folder: Path, level: int = -1) -> None:
         manifest = json.loads((folder / "manifest.json").read_text())
-        assert manifest["format"] == "facefolds" and manifest["version"] == 3
+        assert manifest["format"] == "facefolds" and manifest["version"] == 4
         self.folder, self.level = folder, manifest["levels"][level]
         files = {x["file"]: (folder / x["file"]).read_bytes() for x in self.level["meshes"]}
         parts = [files[x["mesh"]][x["offset"] : x["offset"] + x["bytes"]] for x in self.level["layers"]]
