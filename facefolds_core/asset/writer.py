@@ -29,10 +29,10 @@ from facefolds_core.asset.manifest import (
     Video,
 )
 from facefolds_core.asset.manifest_base import StoredFile
-from facefolds_core.asset.manifest_extras import Pose
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -104,7 +104,7 @@ def write_asset(
 
 
 def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> Manifest:
-    """A manifest without sound and pictures, of levels whose files lie in `folder`."""
+    """A manifest without sound and pictures, of levels whose files lie in `folder`; writes the track there."""
     corners = [mesh.vertices for level in levels for mesh in read_level(folder, level).layers]
     low, high = (np.stack([pick(vertices, 0) for vertices in corners]) for pick in (np.min, np.max))
     manifest = Manifest(
@@ -116,9 +116,7 @@ def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> M
     )
     if source.track is None:
         return manifest
-    pairs = zip(source.track.quaternions.tolist(), source.track.translations.tolist(), strict=True)
-    poses = tuple(Pose(quaternion=tuple(q), translation=tuple(t)) for q, t in pairs)
-    return manifest.model_copy(update={"track": poses})
+    return manifest.model_copy(update={"track_file": write_track(folder, source.track)})
 
 
 @dataclass(frozen=True)

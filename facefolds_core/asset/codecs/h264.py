@@ -8,7 +8,7 @@ X264_FIXED = {
     "scenecut": 0,
     "open-gop": 0,
     "bframes": 0,
-    "chromaloc": 0,
+    "chromaloc": 1,  # centre
     "psy": 0,  # a texture is warped and blended before it is seen: +0.25 dB at equal size
     "chroma-qp-offset": -4,  # a wrong hue shows: +0.5 dB of rendered views for 3 % of the bytes
     "threads": 1,

@@ -39,7 +39,8 @@ def _options(params: VideoSettings, crf: int) -> dict[str, str]:
 
 def _level_and_mime(stream: Stream) -> tuple[str, str]:
     level = _level(stream)
-    # Profile 0, 8 bits, 4:2:0 sited left, primaries BT.709, transfer sRGB, matrix BT.709, limited range.
+    # Profile 0, 8 bits, 4:2:0 (sited left: no number is of the centre), primaries BT.709, transfer sRGB, matrix BT.709,
+    # limited range.
     return level, f'video/webm; codecs="vp09.00.{round(10 * float(level)):02d}.08.00.01.13.01.00"'
 
 
