@@ -130,7 +130,8 @@ class AssetLevel:
 
     def _decode(self, start: int) -> Iterator[Frame]:
         layout = layout_of(self.entry)
-        return (unpack_picture(picture, layout) for picture in self.pictures(start))
+        location = self.entry.texture.chroma_location
+        return (unpack_picture(picture, layout, location) for picture in self.pictures(start))
 
     def _wrong_count(self, found: int) -> UserError:
         return UserError(
