@@ -177,6 +177,7 @@ class LevelContent:
             return
         step = self.part_frames if self.part_frames and frames is None else count
         borders = [*range(0, count, step), count]
+        options = codec.of_part(options) if self.part_frames else options
         encode_parts(path, self._filmed(), borders, codec, options, self.parts)
 
     def _filmed(self) -> Filmed:
