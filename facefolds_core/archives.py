@@ -14,7 +14,7 @@ import zipfile
 import zlib
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,11 +38,14 @@ _DAMAGE = (
 )
 
 
-def read_npz(path: Path, message: str, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
+def read_npz(
+    path: Path, message: str, names: Collection[str] | None = None, mapped: bool = False
+) -> dict[str, NDArray[Any]]:
     """The arrays of an archive of `np.savez` by name; all, or those of `names` that are there.
 
     Args:
         message: of the error, if the archive is damaged.
+        mapped: read-only arrays that stay in the file: the memory that they take can be had back at any time.
 
     Raises:
         UserError: if the file is missing, not a regular file, damaged, or too large for the memory.
@@ -54,7 +57,7 @@ def read_npz(path: Path, message: str, names: Collection[str] | None = None) -> 
             if len(members) != len(archive.infolist()):
                 raise ValueError("two arrays of one name")
             return {
-                name: _array(archive, member, size)
+                name: (_mapped if mapped else _array)(archive, member, size)
                 for name, member in members.items()
                 if names is None or name in names
             }
@@ -70,14 +73,41 @@ def read_npz(path: Path, message: str, names: Collection[str] | None = None) -> 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, size: int) -> NDArray[Any]:
     """One array; ValueError for anything that `np.savez` does not write."""
+    with _opened(archive, member, size) as stream:
+        data = io.BytesIO(stream.read())
+    _header(data, member)
+    data.seek(0)
+    return np.asarray(np.lib.format.read_array(data, allow_pickle=False))
+
+
+def _mapped(archive: zipfile.ZipFile, member: zipfile.ZipInfo, size: int) -> NDArray[Any]:
+    """The same where it lies in the file, after its checksum was compared."""
+    with _opened(archive, member, size) as stream:
+        shape, columns_first, kind = _header(stream, member)
+        start = stream.tell()
+        while stream.read(1 << 20):
+            pass
+    file = archive.fp
+    assert file is not None
+    file.seek(member.header_offset)
+    local = struct.unpack("<4s5H3I2H", file.read(30))  # the entry's own header: its name and more lie before the data
+    offset = member.header_offset + 30 + local[-2] + local[-1] + start
+    order: Literal["F", "C"] = "F" if columns_first else "C"
+    return np.memmap(file, kind, "r", offset=offset, shape=shape, order=order).view(np.ndarray)
+
+
+def _opened(archive: zipfile.ZipFile, member: zipfile.ZipInfo, size: int) -> IO[bytes]:
     if member.compress_type != zipfile.ZIP_STORED or member.file_size > size:
         raise ValueError(f"{member.filename}: {member.file_size} bytes in a file of {size}")
-    data = io.BytesIO(archive.read(member))
+    return archive.open(member)
+
+
+def _header(data: IO[bytes], member: zipfile.ZipInfo) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether columns come first, and type: those of as many bytes as follow."""
     version = np.lib.format.read_magic(data)
     if version != (1, 0):
         raise ValueError(f"{member.filename}: an array of format {version}")
-    shape, _, kind = np.lib.format.read_array_header_1_0(data)
+    shape, columns_first, kind = np.lib.format.read_array_header_1_0(data)
     if math.prod(shape) * kind.itemsize != member.file_size - data.tell() or kind.hasobject:
         raise ValueError(f"{member.filename}: {member.file_size} bytes are no array {shape} of {kind}")
-    data.seek(0)
-    return np.asarray(np.lib.format.read_array(data, allow_pickle=False))
+    return shape, columns_first, kind

@@ -5,8 +5,6 @@ Textures of neighbouring frames differ little, those that `bake` holds hardly at
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
@@ -20,27 +18,20 @@ RUN = 12
 """Images that hang together, at most: who looks at a single one unpacks so many."""
 
 
-@dataclass(frozen=True)
-class Packed:
-    """Attributes:
-    data: Zstandard.
-    after: frame whose image it is the difference from; -1 if it stands alone.
+def unpacked(data: pa.Buffer, shape: tuple[int, int, int], before: Image | None) -> Image:
+    """The image of what `Packer` made of it.
+
+    Args:
+        before: the image that it is the difference from, None if it stands alone.
+
+    Raises:
+        ValueError, ArrowException: if the data are damaged.
     """
-
-    data: pa.Buffer
-    after: int
-
-    def image(self, shape: tuple[int, int, int], before: Image | None) -> Image:
-        """Unpacked. Args: `before`: the image of frame `after`.
-
-        Raises:
-            ValueError, ArrowException: if the data are damaged.
-        """
-        flat = pa.decompress(self.data, shape[0] * shape[1] * shape[2], PACKING)
-        difference = np.frombuffer(flat, np.uint8).reshape(shape)
-        if before is None:
-            return np.cumsum(difference, axis=1, dtype=np.uint8)
-        return np.asarray(before + difference, np.uint8)
+    flat = pa.decompress(data, shape[0] * shape[1] * shape[2], PACKING)
+    difference = np.frombuffer(flat, np.uint8).reshape(shape)
+    if before is None:
+        return np.cumsum(difference, axis=1, dtype=np.uint8)
+    return np.asarray(before + difference, np.uint8)
 
 
 class Packer:

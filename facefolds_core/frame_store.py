@@ -14,7 +14,9 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
+from dataclasses import dataclass
 from pathlib import Path
+from threading import local
 
 import numpy as np
 import pyarrow as pa
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError, disk_error, is_disk_error
 from facefolds_core.files import atomic_file
-from facefolds_core.frame_packing import PACKING, Packed, Packer
+from facefolds_core.frame_packing import PACKING, Packer, unpacked
 from facefolds_core.reading import check_regular, no_memory, remake
 
 Image = NDArray[np.uint8]
@@ -70,6 +72,49 @@ def write_frames(
             writer.write_batch(pa.record_batch(columns, schema=schema))
 
 
+@dataclass(frozen=True)
+class Places:
+    """Where the images lie in a file: numbers alone, since a take has as many images as it has frames and cameras.
+
+    Attributes:
+        keys: (M,) int64, sorted: index * 2^32 + frame.
+        offsets, sizes: (M,) int64, bytes of what is stored of each.
+        after: (M,) int32, frame that it is the difference from; -1 if it stands alone.
+    """
+
+    keys: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    after: NDArray[np.int32]
+
+    def find(self, index: int, frame: int) -> int:
+        """Row of an image, -1 without one."""
+        if min(index, frame) < 0 or max(index, frame) >> 32:
+            return -1
+        key = index << 32 | frame
+        row = int(np.searchsorted(self.keys, key))
+        return row if row < len(self.keys) and self.keys[row] == key else -1
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """All (index, frame), sorted."""
+        return list(zip((self.keys >> 32).tolist(), (self.keys & 0xFFFFFFFF).tolist(), strict=True))
+
+    def part(self, frames: Sequence[int]) -> Places:
+        """Those of some frames, numbered anew from 0 on."""
+        known = {frame: position for position, frame in enumerate(frames)}
+        rows = [(i << 32 | known[k], row) for row, (i, k) in enumerate(self.pairs()) if k in known]
+        rows.sort()
+        keys, taken = np.array([key for key, _ in rows], np.int64), np.array([row for _, row in rows], np.intp)
+        return Places(keys, self.offsets[taken], self.sizes[taken], self.after[taken])
+
+
+class _Last(local):
+    """The image of each index that was unpacked last, on each thread: threads read at different places."""
+
+    def __init__(self) -> None:
+        self.images: dict[int, tuple[int, Image]] = {}
+
+
 class FrameStore:
     """Read-only, memory-mapped view of a file of `write_frames`.
 
@@ -84,12 +129,14 @@ class FrameStore:
         self.path = Path(path)
         check_regular(self.path, remake(path))
         try:
-            table = pa.ipc.open_file(pa.memory_map(str(path), "r")).read_all()
-            meta = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
+            self._file = pa.memory_map(str(path), "r").read_buffer()
+            reader = pa.ipc.open_file(self._file)
+            meta = {k.decode(): v.decode() for k, v in (reader.schema.metadata or {}).items()}
             shape = (int(meta["height"]), int(meta["width"]), int(meta["channels"]))
             if meta.get("packing", PACKING) != PACKING:
                 raise ValueError(f"packed by {meta['packing']!r}")
-            self._images = _views(table, shape, "packing" in meta)
+            self._packed = "packing" in meta
+            self._places = _places(reader, self._file, shape, self._packed)
         except MemoryError:  # Arrow's own too
             raise no_memory(path) from None
         except (pa.ArrowException, KeyError, ValueError, TypeError, OverflowError, OSError) as error:
@@ -97,11 +144,10 @@ class FrameStore:
                 raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
             raise UserError("damaged frame store", file=path, found=str(error), remedy=remake(path)) from None
         self.height, self.width, self.channels = shape
-        self._table = table  # holds the mapped file
-        self._last: dict[int, tuple[int, Image]] = {}
+        self._last = _Last()
 
     def __contains__(self, key: tuple[int, int]) -> bool:
-        return key in self._images
+        return self._places.find(*key) >= 0
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
         """All (index, frame) that the file holds, sorted."""
@@ -109,15 +155,14 @@ class FrameStore:
 
     def keys(self) -> list[tuple[int, int]]:
         """All (index, frame) that the file holds, sorted."""
-        return sorted(self._images)
+        return self._places.pairs()
 
     def part(self, frames: Sequence[int]) -> FrameStore:
         """Some of the frames, numbered anew from 0 on, of the same mapped file."""
-        if any(not isinstance(image, np.ndarray) for image in self._images.values()):
+        if self._packed:
             raise ValueError("a part of a packed store")  # its images hang together
-        known = {frame: position for position, frame in enumerate(frames)}
         found = copy(self)
-        found._images = {(i, known[k]): image for (i, k), image in self._images.items() if k in known}
+        found._places = self._places.part(frames)
         return found
 
     def image(self, index: int, frame: int) -> Image:
@@ -126,27 +171,32 @@ class FrameStore:
         Raises:
             UserError: if the file does not hold it, or it is damaged.
         """
-        found = self._images.get((index, frame))
-        if found is None:
+        row = self._places.find(index, frame)
+        if row < 0:
             place = f"index {index} (camera or layer), frame {frame}"
             raise UserError(
                 "an image is missing in a frame store", file=self.path, place=place, remedy=remake(self.path)
             )
-        return found if isinstance(found, np.ndarray) else self._unpacked(index, frame)
+        if self._packed:
+            return self._unpacked(index, frame)
+        size = self.height * self.width * self.channels
+        plain = np.frombuffer(self._file, np.uint8, count=size, offset=int(self._places.offsets[row]))
+        return plain.reshape(self.height, self.width, self.channels)
 
     def _unpacked(self, index: int, frame: int) -> Image:
         """An image, by way of those that it is a difference from; the last one of each index is kept."""
-        shape = (self.height, self.width, self.channels)
-        last, image = self._last.get(index, (-1, None))
-        chain: list[Packed] = []
+        shape, places = (self.height, self.width, self.channels), self._places
+        last, image = self._last.images.get(index, (-1, None))
+        chain: list[int] = []
         at = frame
         while at >= 0 and at != last:
-            chain.append(self._images[index, at])  # type: ignore[arg-type]
-            at = chain[-1].after
+            chain.append(places.find(index, at))
+            at = int(places.after[chain[-1]])
         image = image if at >= 0 else None
         try:
-            for packed in reversed(chain):
-                image = packed.image(shape, image)
+            for row in reversed(chain):
+                data = self._file.slice(int(places.offsets[row]), int(places.sizes[row]))
+                image = unpacked(data, shape, image)
         except (pa.ArrowException, ValueError, OSError) as error:
             raise UserError(
                 "damaged frame store",
@@ -157,35 +207,46 @@ class FrameStore:
             ) from None
         assert image is not None
         image.flags.writeable = False
-        self._last[index] = (frame, image)
+        self._last.images[index] = (frame, image)
         return image
 
 
-def _views(table: pa.Table, shape: tuple[int, int, int], packed: bool) -> dict[tuple[int, int], Image | Packed]:
-    """(index, frame) -> the image, or what is packed of it, in the mapped file.
+def _places(reader: pa.RecordBatchFileReader, file: pa.Buffer, shape: tuple[int, int, int], packed: bool) -> Places:
+    """Where the images lie in the mapped file.
 
     Raises:
-        ValueError, ArrowException: if the table is not what `write_frames` writes.
+        ValueError, ArrowException: if it is not what `write_frames` writes.
     """
     size = shape[0] * shape[1] * shape[2]
-    if min(shape) < 1 or table.schema.types != _types(size, packed):
-        raise ValueError(f"columns {table.schema.types} are no images of {shape}")
-    images: dict[tuple[int, int], Image | Packed] = {}
-    for batch in table.to_batches():
+    if min(shape) < 1 or reader.schema.types != _types(size, packed):
+        raise ValueError(f"columns {reader.schema.types} are no images of {shape}")
+    count = reader.num_record_batches
+    keys, offsets, sizes = (np.empty(count, np.int64) for _ in range(3))
+    after = np.full(count, -1, np.int32)
+    for row in range(count):
+        batch = reader.get_batch(row)
         batch.validate(full=True)
         pixels = batch.column("pixels")
         if len(batch) != 1 or any(column.null_count for column in batch.columns) or pixels.offset:
             raise ValueError("a batch that is not one image")
-        key = (batch.column("camera")[0].as_py(), batch.column("frame")[0].as_py())
-        if min(key) < 0 or key in images:
-            raise ValueError(f"image {key} twice, or none")
-        if not packed:
-            images[key] = np.frombuffer(pixels.buffers()[1], np.uint8, count=size).reshape(shape)
-            continue
-        after = batch.column("after")[0].as_py()
-        if after != -1 and (key[0], after) not in images:
-            raise ValueError(f"image {key} after one that does not come before it")
-        first, last = np.frombuffer(pixels.buffers()[1], np.int32, count=2)
-        # A scalar of the column would be a copy.
-        images[key] = Packed(pixels.buffers()[2].slice(int(first), int(last - first)), after)
-    return images
+        index, frame = batch.column("camera")[0].as_py(), batch.column("frame")[0].as_py()
+        if min(index, frame) < 0:
+            raise ValueError(f"an image of index {index}, frame {frame}")
+        keys[row], data = index << 32 | frame, pixels.buffers()[1]
+        offsets[row], sizes[row] = data.address - file.address, size
+        if packed:
+            after[row] = batch.column("after")[0].as_py()
+            first, last = np.frombuffer(data, np.int32, count=2)
+            offsets[row], sizes[row] = pixels.buffers()[2].address - file.address + int(first), int(last - first)
+    if not ((offsets >= 0) & (offsets + sizes <= file.size)).all():
+        raise ValueError("images that do not lie in the file")  # compressed by another writer
+    order = np.argsort(keys)
+    places = Places(keys[order], offsets[order], sizes[order], after[order])
+    if count and not (np.diff(places.keys) > 0).all():
+        raise ValueError("an image twice")
+    chained = places.after >= 0
+    before = (places.keys[chained] >> 32 << 32) + places.after[chained]
+    found = np.minimum(np.searchsorted(places.keys, before), max(count - 1, 0))
+    if not ((places.keys[found] == before) & (order[found] < order[chained])).all() or (places.after < -1).any():
+        raise ValueError("an image after one that does not come before it")
+    return places

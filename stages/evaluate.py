@@ -50,7 +50,7 @@ def evaluate_subject(folders: SubjectFolders) -> str:
     cost = read_cost(folders, asset.manifest)
     perceptual, model = find_perceptual(device), load_model(folders.model, device)
     with atomic_folder(folders.evaluation) as temporary:
-        result = evaluate(scene, model, asset, params, perceptual, temporary)
+        result = evaluate(scene, model, asset, params, perceptual, temporary, folders.checkpoints / "scores.npz")
         fresh = None
         if params.fresh_views and read_subject(folders.config).source == "actor":
             capture = read_stage(CaptureParams, folders.config)

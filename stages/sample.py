@@ -20,7 +20,8 @@ def sample(folders: SubjectFolders) -> str:
     scene = read_scene(folders.scene)
     check_frames(model, scene, folders.model)
     with atomic_folder(folders.samples) as temporary:
-        grids = sample_model(model, scene.views_of("train", params.auto_window.moving_views), params, temporary)
+        cameras = scene.views_of("train", params.auto_window.moving_views)
+        grids = sample_model(model, cameras, params, temporary, folders.checkpoints / "sampled")
         write_grids(temporary / "grids.npz", grids)
     u0, u1, v0, v1 = grids.windows[0]
     return (

@@ -15,7 +15,8 @@ from stages.common import run_stage
 def texture(folders: SubjectFolders) -> str:
     size = read_stage(TextureParams, folders.config).resolution
     with atomic_folder(folders.resampled) as temporary:
-        source = resample_store(folders.samples / "textures.arrow", temporary / "textures.arrow", size)
+        kept = folders.checkpoints / "resampled"
+        source = resample_store(folders.samples / "textures.arrow", temporary / "textures.arrow", size, kept)
     if size > source.height:
         typer.echo(
             f"texture: warning: texture.resolution {size} is above sample.resolution {source.height}; "

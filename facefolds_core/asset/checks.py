@@ -18,6 +18,7 @@ from facefolds_core.asset.manifest_extras import Photo
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, seal_is_whole
 from facefolds_core.asset.packing import MAX_PIXELS, MAX_SIDE, AtlasLayout, inside
 from facefolds_core.asset.segments import segment_problems
+from facefolds_core.asset.track_file import track_problems
 from facefolds_core.geometry.meshes import TexturedMesh
 
 FARTHEST = 1e3
@@ -60,7 +61,7 @@ def manifest_problems(path: Path, manifest: Manifest) -> list[str]:
         problems += [f"level {level.name}: {problem}" for problem in _level_problems(level)]
     problems += _order_problems(manifest) + _switchable_problems(manifest)
     problems += _coordinate_problems(manifest.coordinates)
-    problems += _track_problems(manifest) + _extent_problems(manifest)
+    problems += [f"track: {problem}" for problem in track_problems(manifest)] + _extent_problems(manifest)
     for photo in manifest.photos:
         problems += [f"{photo.file}: {problem}" for problem in _photo_problems(photo, manifest.full.texture.frames)]
     problems += _poster_problems(manifest)
@@ -98,16 +99,6 @@ def _extent_problems(manifest: Manifest) -> list[str]:
         problems.append(f"view has distances that are not within 0 and {FARTHEST:g}")
     if not set(manifest.extensions_required or ()) <= set(manifest.extensions_used or ()):
         problems.append("extensionsRequired has names that extensionsUsed lacks")
-    return problems
-
-
-def _track_problems(manifest: Manifest) -> list[str]:
-    track = manifest.head_track()
-    if track is None:
-        return []
-    problems = [f"track: {problem}" for problem in track.problems(manifest.full.texture.frames)]
-    if not problems and np.abs(track.translations).max() > FARTHEST:
-        problems.append(f"track: the head is more than {FARTHEST:g} units away")
     return problems
 
 

@@ -1,4 +1,4 @@
-"""What manifest.json of an asset says, format version 3 (docs/reference/asset-format.md), as validated models.
+"""What manifest.json of an asset says, format version 4 (docs/reference/asset-format.md), as validated models.
 
 `manifest_file.py` reads and writes the file, and makes the JSON schema beside it; `older.py` brings manifests of older
 versions into this form.
@@ -10,10 +10,10 @@ import json
 from fractions import Fraction
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from facefolds_core.asset.codecs import CodecName
+from facefolds_core.asset.colour import ChromaLocation
 from facefolds_core.asset.manifest_base import (
     UV,
     ByteRange,
@@ -33,9 +33,9 @@ from facefolds_core.asset.manifest_base import (
 )
 from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pose, Poster, Stream
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.track import Track
 
-FORMAT_VERSION = 3
+FORMAT_VERSION, LEAST_VERSION = 4, 3
+"""What is written, and the oldest version whose readers show it right."""
 REMEDY = "make the asset again (`dvc repro`), or copy it again from where it is whole"
 
 UNSEALED = "0" * 64
@@ -127,6 +127,7 @@ class Texture(Part):
         colour_rect, alpha_rect: in pixels of the decoded picture; of one size.
         frame_rate: numerator and denominator of the frames a second.
         keyframes: the numbers of the frames that can be decoded without the ones before, in order.
+        chroma_location: where chroma lies across; "left" in older assets.
         videos: the same pictures; a player takes the first that it can decode.
     """
 
@@ -139,7 +140,7 @@ class Texture(Part):
     keyframes: Annotated[tuple[Offset, ...], Field(min_length=1)]
     colour_space: Literal["bt709"] = "bt709"
     colour_range: Literal["tv"] = "tv"
-    chroma_location: Literal["left"] = "left"
+    chroma_location: ChromaLocation = "center"
     videos: Annotated[tuple[Video, ...], Field(min_length=1)]
 
     @property
@@ -238,13 +239,14 @@ class Manifest(Part):
         stream: for players of DASH and HLS; absent where there are no segments.
         audio: of the sequence.
         photos: for comparison.
-        track: the meshes' motion as a whole, one pose a frame; absent where they stand still.
+        track_file: the meshes' motion as a whole, one pose a frame (`track_file.py`); absent where they stand still.
+        track: the same in manifests of version 3.
         view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
 
     format: Literal["facefolds"] = "facefolds"
-    version: Literal[3] = 3
+    version: Literal[4] = 4
     min_version: Annotated[Literal[3], Field(alias="minVersion")] = 3
     extensions_used: Annotated[Maybe[tuple[ExtensionName, ...]], Field(alias="extensionsUsed")] = None
     extensions_required: Annotated[Maybe[tuple[ExtensionName, ...]], Field(alias="extensionsRequired")] = None
@@ -258,6 +260,7 @@ class Manifest(Part):
     audio: Audio | None = None
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
+    track_file: Maybe[StoredFile] = None
     track: Maybe[tuple[Pose, ...]] = None
     view: Maybe[FilmedView] = None
     manifest_sha256: Sha256 = UNSEALED
@@ -266,19 +269,10 @@ class Manifest(Part):
     def full(self) -> Level:
         return self.levels[-1]
 
-    def head_track(self) -> Track | None:
-        """`track` as it is computed with."""
-        if self.track is None:
-            return None
-        quaternions, translations = (
-            [list(getattr(pose, name)) for pose in self.track] for name in ("quaternion", "translation")
-        )
-        return Track(np.array(quaternions, float), np.array(translations, float))
-
     def files(self) -> list[tuple[str, int, str]]:
         """(name, bytes, sha256) of every file but the manifest, each once."""
         others: list[StoredFile] = [*self.photos]
         others += [] if self.stream is None else [self.stream.dash, *self.stream.hls]
-        others += [one for one in (self.audio, self.poster) if one is not None]
+        others += [one for one in (self.audio, self.poster, self.track_file) if one is not None]
         found = list(dict.fromkeys(entry for level in self.levels for entry in level.files()))  # some are shared
         return found + [(other.file, other.bytes, other.sha256) for other in others]

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from facefolds_core.asset.manifest import FORMAT_VERSION, REMEDY, UNSEALED, Manifest
+from facefolds_core.asset.manifest import FORMAT_VERSION, LEAST_VERSION, REMEDY, UNSEALED, Manifest
 from facefolds_core.asset.manifest_base import without_absent
 from facefolds_core.asset.older import OLDEST, brought_up
 from facefolds_core.asset.stored import MISSING, special_problem
@@ -101,7 +101,7 @@ def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
     elif version < FORMAT_VERSION:
         return brought_up(value)
     elif version == FORMAT_VERSION:
-        least = FORMAT_VERSION  # a wrong one is said with the other keys
+        least = LEAST_VERSION  # a wrong one is said with the other keys
     if not isinstance(least, int) or isinstance(least, bool) or least > FORMAT_VERSION:
         raise UserError(
             "an asset of another format version",
@@ -126,7 +126,7 @@ def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
 def _validated(path: Path, value: dict[str, Any]) -> Manifest:
     newer = value["version"] != FORMAT_VERSION
     if newer:
-        value = {**value, "version": FORMAT_VERSION, "minVersion": FORMAT_VERSION}
+        value = {**value, "version": FORMAT_VERSION, "minVersion": LEAST_VERSION}
     try:
         try:
             manifest = Manifest.model_validate_json(json.dumps(value))

@@ -1,5 +1,7 @@
 """Manifests of older format versions, brought into the form of this one when they are read.
 
+Version 3 has the poses of a head that moves in the manifest, which is read as it stands.
+
 Version 1 (facefolds 0.1): one level without a name, one video, no MIME type, no sound, no pictures. Version 2: a file a
 mesh, frames a second as a decimal number; early ones had `view_effects` in each level, null or a picture with a place
 in it for each layer, which a player was always free to ignore: it is left out.
@@ -16,11 +18,13 @@ MOST_RATE = 1001
 
 
 def brought_up(value: dict[str, Any]) -> dict[str, Any]:
-    """The JSON of a manifest of version 1 or 2 as version 3 would say it; what makes no sense is left as it is."""
+    """The JSON of a manifest of an older version as this one would say it; what makes no sense is left as it is."""
+    if value["version"] == 3:
+        return value | {"version": 4}
     try:
         return _from_2(_from_1(value) if value["version"] == 1 else value)
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
-        return value | {"version": 3, "minVersion": 3}  # the models say what is wrong
+        return value | {"version": 4, "minVersion": 3}  # the models say what is wrong
 
 
 def _from_1(value: dict[str, Any]) -> dict[str, Any]:
@@ -41,7 +45,7 @@ def _from_1(value: dict[str, Any]) -> dict[str, Any]:
 
 def _from_2(value: dict[str, Any]) -> dict[str, Any]:
     levels = [_level(level) for level in value["levels"]]
-    return value | {"version": 3, "minVersion": 3, "levels": levels}
+    return value | {"version": 4, "minVersion": 3, "levels": levels}
 
 
 def _level(level: dict[str, Any]) -> dict[str, Any]:

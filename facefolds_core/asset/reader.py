@@ -21,6 +21,7 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.segments import decode_segments
 from facefolds_core.asset.stored import check_file, is_folder, read_slice, refuse_changed
+from facefolds_core.asset.track_file import read_track
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
@@ -129,7 +130,8 @@ class AssetLevel:
 
     def _decode(self, start: int) -> Iterator[Frame]:
         layout = layout_of(self.entry)
-        return (unpack_picture(picture, layout) for picture in self.pictures(start))
+        location = self.entry.texture.chroma_location
+        return (unpack_picture(picture, layout, location) for picture in self.pictures(start))
 
     def _wrong_count(self, found: int) -> UserError:
         return UserError(
@@ -210,7 +212,7 @@ def read_asset(folder: str | Path) -> Asset:
         problem = check_file(folder / name, size, sha256)
         if problem:
             raise UserError("damaged asset", file=folder / name, found=problem, remedy=REMEDY)
-    track = manifest.head_track()
+    track = read_track(folder, manifest)
     return Asset(folder, manifest, tuple(read_level(folder, level, track) for level in manifest.levels))
 
 

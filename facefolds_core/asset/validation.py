@@ -17,6 +17,7 @@ from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import layer_bytes
 from facefolds_core.asset.segments import decode_segments, probe_segments
 from facefolds_core.asset.stored import check_file, is_folder, leads_out
+from facefolds_core.asset.track_file import track_problems
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -78,6 +79,10 @@ def _content_problems(folder: Path, manifest: Manifest, whole: set[str]) -> Iter
             if video.file in whole:
                 found = _video_problems(folder, video, level.texture)
                 yield from (f"{video.file}: {problem}" for problem in found)
+    track = manifest.track_file
+    if track is not None and track.file in whole:
+        data = (folder / track.file).read_bytes()
+        yield from (f"{track.file}: {problem}" for problem in track_problems(manifest, data))
     pictures: list[StoredPicture | Reflection] = [
         *manifest.photos,
         *([manifest.poster] if manifest.poster else []),

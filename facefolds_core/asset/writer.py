@@ -29,10 +29,11 @@ from facefolds_core.asset.manifest import (
     Video,
 )
 from facefolds_core.asset.manifest_base import StoredFile
-from facefolds_core.asset.manifest_extras import Pose
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.parts import Filmed, Parts, encode_parts
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -104,7 +105,7 @@ def write_asset(
 
 
 def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> Manifest:
-    """A manifest without sound and pictures, of levels whose files lie in `folder`."""
+    """A manifest without sound and pictures, of levels whose files lie in `folder`; writes the track there."""
     corners = [mesh.vertices for level in levels for mesh in read_level(folder, level).layers]
     low, high = (np.stack([pick(vertices, 0) for vertices in corners]) for pick in (np.min, np.max))
     manifest = Manifest(
@@ -116,9 +117,7 @@ def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> M
     )
     if source.track is None:
         return manifest
-    pairs = zip(source.track.quaternions.tolist(), source.track.translations.tolist(), strict=True)
-    poses = tuple(Pose(quaternion=tuple(q), translation=tuple(t)) for q, t in pairs)
-    return manifest.model_copy(update={"track": poses})
+    return manifest.model_copy(update={"track_file": write_track(folder, source.track)})
 
 
 @dataclass(frozen=True)
@@ -132,6 +131,9 @@ class LevelContent:
         fps: frames a second; 0 for a static scene.
         unit: the layout can be scaled down by it and its divisors; one of the crops' numbers.
         placed: the layout, where it is not to be chosen.
+        parts: where encoded parts of its videos are kept; None encodes all anew, in one go.
+        part_frames: frames that are encoded by themselves, each a group of pictures; 0: all of them at once.
+        originals: what the textures are made of, where they are resampled.
     """
 
     layers: Sequence[CroppedLayer]
@@ -140,6 +142,9 @@ class LevelContent:
     fps: float
     unit: int = 1
     placed: AtlasLayout | None = None
+    parts: Parts | None = None
+    part_frames: int = 0
+    originals: Textures | None = None
 
     @cached_property
     def layout(self) -> AtlasLayout:
@@ -165,9 +170,28 @@ class LevelContent:
     def encode(self, path: Path, codec: Codec, params: VideoSettings, crf: int, frames: int | None = None) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
-        pictures = (pack_frame(self.frame(index), layout) for index in range(count))
-        size = (layout.width, layout.height)
-        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf))
+        size, options = (layout.width, layout.height), codec.options(params, crf)
+        if self.parts is None:
+            pictures = (pack_frame(self.frame(index), layout) for index in range(count))
+            encode_video(path, pictures, size, self.rate, codec, options)
+            return
+        step = self.part_frames if self.part_frames and frames is None else count
+        borders = [*range(0, count, step), count]
+        options = codec.of_part(options) if self.part_frames else options
+        encode_parts(path, self._filmed(), borders, codec, options, self.parts)
+
+    def _filmed(self) -> Filmed:
+        layout, textures = self.layout, self.originals or self.textures
+        used = [layer.source for layer in self.layers]
+        side = self.textures.image(used[0], 0).shape[0]
+        made = repr(([layer.crop for layer in self.layers], used, layout.rects, layout.unit, side))
+        return Filmed(
+            picture=lambda k: pack_frame(self.frame(k), layout),
+            sources=lambda k: (textures.image(layer, k) for layer in used),
+            size=(layout.width, layout.height),
+            rate=self.rate,
+            made=made,
+        )
 
 
 def write_level(

@@ -144,7 +144,7 @@ class Scene:
         return FrameStore(path) if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
-        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None.
+        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many.
 
         Raises:
             UserError: if the file is damaged.
@@ -153,7 +153,7 @@ class Scene:
         if not is_there(path):
             return None
         message = "the tracked mesh of the scene is damaged"
-        arrays = read_npz(path, message)
+        arrays = read_npz(path, message, mapped=True)
         vertices, faces = arrays.get("vertices"), arrays.get("faces")
         if (
             vertices is None
@@ -161,7 +161,7 @@ class Scene:
             or (vertices.dtype.name, faces.dtype.name) != ("float32", "int32")
             or (vertices.shape[:1], vertices.shape[2:], faces.shape[1:]) != ((self.num_frames,), (3,), (3,))
             or min(vertices.size, faces.size) == 0
-            or not np.isfinite(vertices).all()
+            or not all(np.isfinite(points).all() for points in vertices)
             or faces.min() < 0
             or faces.max() >= vertices.shape[1]
         ):

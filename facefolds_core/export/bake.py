@@ -164,7 +164,7 @@ def _finished(shown: Float) -> Image:
 
 def baked_frame(baker: Baker, textures: FrameStore, samples: FrameStore, frame: int, iterations: int) -> Image:
     """(N, size, size, 4) of one frame; `textures` and `samples` as in `baked_rows`."""
-    layers = sorted({layer for layer, _ in textures})
+    layers = range(baker.rays.shipped.shape[1])
     own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
     return baker.frame(own, theirs, iterations)
 

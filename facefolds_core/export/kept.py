@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder, read_json, write_json
@@ -31,13 +32,12 @@ def digest_of(values: Mapping[str, Any]) -> bytes:
     return digest.digest()
 
 
-def digests_of_frames(common: bytes, stores: Sequence[FrameStore], frames: Sequence[int]) -> dict[int, str]:
-    """Frame -> digest of its images in all stores, and of `common`."""
-    found = {frame: hashlib.blake2b(common, digest_size=16) for frame in frames}
-    for store in stores:
-        for index, frame in sorted(store, key=lambda key: (key[1], key[0])):
-            found[frame].update(np.ascontiguousarray(store.image(index, frame)).data)
-    return {frame: digest.hexdigest() for frame, digest in found.items()}
+def digest_of_frame(common: bytes, images: Iterable[NDArray[Any]]) -> str:
+    """Of what a frame is made of: its arrays in their order, and `common`, which all frames are made of."""
+    digest = hashlib.blake2b(common, digest_size=16)
+    for image in images:
+        digest.update(np.ascontiguousarray(image).data)
+    return digest.hexdigest()
 
 
 class KeptFrames:
@@ -50,6 +50,7 @@ class KeptFrames:
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
         self._known: dict[str, int] = {}
+        self._made: dict[int, str] = {}
         self._store: FrameStore | None = None
         if folder is not None and (folder / INDEX).exists():
             with suppress(UserError, ValueError, TypeError, AttributeError):  # what is damaged is made again
@@ -58,19 +59,27 @@ class KeptFrames:
                 self._known = {str(digest): int(frame) for digest, frame in known.items()}
 
     def rows(
-        self, digests: Mapping[int, str], layers: int, make: Callable[[int], Image], done: Callable[[], object]
+        self,
+        frames: Iterable[int],
+        layers: int,
+        digest: Callable[[int], str],
+        make: Callable[[int], Image],
+        done: Callable[[], object],
     ) -> Iterator[tuple[int, int, Image]]:
         """All images, frame by frame.
 
         Args:
-            digests: of the frames, in their order.
+            frames: in their order.
             layers: N.
+            digest: of what a frame is made; not asked for where nothing is kept.
             make: makes a frame's images (N, S, S, 4).
             done: called after each frame.
         """
-        for frame, digest in digests.items():
-            known = self._known.get(digest)
-            images = None if known is None else self._images(known, layers)
+        for frame in frames:
+            images = None
+            if self.folder is not None:
+                found = self._made[frame] = digest(frame)
+                images = None if found not in self._known else self._images(self._known[found], layers)
             for layer, image in enumerate(make(frame) if images is None else images):
                 yield layer, frame, image
             done()
@@ -82,8 +91,8 @@ class KeptFrames:
         except UserError:
             return None
 
-    def keep(self, store: Path, digests: Mapping[int, str]) -> None:
-        """Keep what was made now instead; the file is linked where that is possible."""
+    def keep(self, store: Path) -> None:
+        """Keep what `rows` gave instead, as it was written; the file is linked where that is possible."""
         if self.folder is None:
             return
         self._store = None
@@ -92,4 +101,4 @@ class KeptFrames:
                 os.link(store, temporary / STORE)
             except OSError:
                 shutil.copyfile(store, temporary / STORE)
-            write_json(temporary / INDEX, {digest: frame for frame, digest in digests.items()})
+            write_json(temporary / INDEX, {digest: frame for frame, digest in self._made.items()})

@@ -15,11 +15,13 @@ from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
+from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
+from facefolds_core.source_code import digest_of_packages
 
 DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
@@ -123,9 +125,12 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], centre: 
 
 
 def texture_rows(
-    model: LayeredModel, grids: Grids, progress: bool = True
+    model: LayeredModel, grids: Grids, kept: KeptFrames | None = None, progress: bool = True
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-    """Texture images, one at a time: frame by frame, in each the layers from the outermost in.
+    """Texture images: frame by frame, in each the layers from the outermost in.
+
+    Args:
+        kept: of an earlier run; frames whose texels are the same are taken over.
 
     Yields:
         (layer, frame, (R, R, 4) uint8 RGBA, straight alpha). Alpha is 0 where the layer has no point.
@@ -134,12 +139,20 @@ def texture_rows(
         UserError: if the model gives a colour or an alpha that is not finite.
     """
     sheets = [_Sheet(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
-    total = model.num_frames * grids.num_layers
-    with progress_bar(total=total, desc="textures", unit="image", disable=not progress) as bar:
-        for frame in range(model.num_frames):
-            for layer, sheet in enumerate(sheets):
-                yield layer, frame, sheet.image(frame)
-                bar.update()
+    grid = model.texel_grid()
+    shape = None if grid is None else (*grid.shape, *grid.window)
+    parts = {"windows": grids.windows, "valid": grids.valid, "grid": shape, "code": digest_of_packages("export")}
+    common = digest_of(parts)
+
+    def digest(frame: int) -> str:
+        return digest_of_frame(common, (sheet.texels(frame) for sheet in sheets))
+
+    def make(frame: int) -> NDArray[np.uint8]:
+        return np.stack([sheet.image(frame) for sheet in sheets])
+
+    earlier = KeptFrames(None) if kept is None else kept
+    with progress_bar(total=model.num_frames, desc="textures", unit="frame", disable=not progress) as bar:
+        yield from earlier.rows(range(model.num_frames), len(sheets), digest, make, lambda: bar.update())
 
 
 class _Sheet:
@@ -162,10 +175,14 @@ class _Sheet:
         (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
         self._projection = Projection(grid.shape, (len(valid), len(valid)), (top, bottom, left, right))
 
+    def texels(self, frame: int) -> NDArray[np.float32]:
+        """(M, 4) RGBA in [0, 1]: the model's own texels where it has any, else what it shows at the layer's."""
+        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
+        return _texels(self._model, uv, self._layer, frame)
+
     def image(self, frame: int) -> NDArray[np.uint8]:
         """(R, R, 4) RGBA: of a model with texels, those that interpolate to what it shows; of others, its values."""
-        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
-        values = _texels(self._model, uv, self._layer, frame)
+        values = self.texels(frame)
         if self._grid is not None:
             values = self._projection(values.reshape(*self._grid.shape, 4))[self._valid]
         image = np.zeros((*self._valid.shape, 4), np.uint8)
@@ -189,18 +206,26 @@ def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[
     return np.asarray(rgba.clamp(0, 1).cpu().numpy(), np.float32)
 
 
-def write_textures(path: Path, model: LayeredModel, grids: Grids, progress: bool = True) -> NDArray[np.uint8]:
-    """Write all texture images to a layered frame store (camera := layer), holding one in memory.
+def write_textures(
+    path: Path, model: LayeredModel, grids: Grids, kept: Path | None = None, progress: bool = True
+) -> NDArray[np.uint8]:
+    """Write all texture images to a layered frame store (camera := layer), holding one frame's in memory.
+
+    Args:
+        kept: folder of an earlier run's; of a model without texels of its own nothing is taken over, since to ask it
+            is what takes the time.
 
     Returns:
         (N, R, R) largest alpha of any frame.
     """
     opacity = np.zeros(grids.valid.shape, np.uint8)
+    earlier = KeptFrames(None if model.texel_grid() is None else kept)
 
     def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-        for layer, frame, image in texture_rows(model, grids, progress):
+        for layer, frame, image in texture_rows(model, grids, earlier, progress):
             np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
             yield layer, frame, image
 
     write_frames(path, (grids.resolution, grids.resolution, 4), rows(), packed=True)
+    earlier.keep(path)
     return opacity

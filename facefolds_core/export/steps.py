@@ -21,7 +21,7 @@ from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
 from facefolds_core.export.collapse import decimate_sheets, decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
-from facefolds_core.export.kept import KeptFrames, digest_of, digests_of_frames
+from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.sheets import Gridded, grid_sheets
@@ -53,18 +53,21 @@ def check_frames(model: LayeredModel, scene: Scene, file: Path | None = None) ->
         )
 
 
-def sample_model(model: LayeredModel, cameras: Sequence[Camera], params: SampleParams, folder: Path) -> Grids:
+def sample_model(
+    model: LayeredModel, cameras: Sequence[Camera], params: SampleParams, folder: Path, kept: Path | None = None
+) -> Grids:
     """N grids of R x R points and normals; the textures of all frames go to `folder`/textures.arrow.
 
     Args:
         cameras: for training: they decide what the window must hold.
+        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
     """
     from facefolds_core.export.sampling import sample_grids, write_textures
     from facefolds_core.export.window import visible_window
 
     window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else FULL_WINDOW
     grids = sample_grids(model, params.resolution, window)
-    opacity = write_textures(folder / TEXTURES, model, grids)
+    opacity = write_textures(folder / TEXTURES, model, grids, kept)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
 
 
@@ -129,7 +132,7 @@ def bake(
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
         weights = texel_weights(rays, baked, len(cameras), params)
-        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20)
+        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20, params.hold_window)
         write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
         baked.path.unlink()
     return len(rays)
@@ -158,11 +161,14 @@ def _fit(
         def make(frame: int) -> NDArray[np.uint8]:
             return baked_frame(baker, textures, samples, frame, params.iterations)
 
+        def digest(frame: int) -> str:
+            layers = range(len(meshes))
+            return digest_of_frame(common, (store.image(n, frame) for store in (textures, samples) for n in layers))
+
         earlier = KeptFrames(kept)
-        digests = digests_of_frames(common, (textures, samples), frames)
-        rows = earlier.rows(digests, len(meshes), make, lambda: bar.update())
+        rows = earlier.rows(frames, len(meshes), digest, make, lambda: bar.update())
         write_frames(path, shape, rows, packed=True)
-    earlier.keep(path, digests)
+    earlier.keep(path)
     return rays.shipped
 
 

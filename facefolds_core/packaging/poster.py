@@ -10,6 +10,7 @@ from PIL import Image
 
 from facefolds_core.asset.manifest import Bounds, Manifest
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.track_file import read_track
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.camera_paths import Eye, camera_of
@@ -51,7 +52,7 @@ def write_poster(path: Path, manifest: Manifest, side: int, quality: int) -> Cam
         quality: 1..100.
     """
     assert manifest.bounds is not None
-    level = read_level(path.parent, manifest.full, manifest.head_track())
+    level = read_level(path.parent, manifest.full, read_track(path.parent, manifest))
     camera = home_camera(manifest.bounds, side)
     seen_by = level.camera_in_head(camera, 0)
     hits, maps = AssetCaster(level).cast(seen_by), level.reflection()

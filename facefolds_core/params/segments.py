@@ -70,6 +70,13 @@ class SegmentParams(Section):
     """Learning rate of a frame's parts against that of the training at once; it falls to `textures.final_rate` of
     itself."""
 
+    processes: Natural = 0
+    """That fit segments at once on this machine, its threads shared out among them. 0: as many as there are cores,
+    segments, memory and work (`process_seconds`) for; 1: the training's own. The result does not depend on it."""
+
+    process_seconds: Factor = 20.0
+    """Of work on one core that are worth a process: it takes some to begin."""
+
     ray_nanoseconds: Factor = 1500.0
     """Of one core, a ray and step, of twelve layers: what the time is foretold by. Measured."""
 

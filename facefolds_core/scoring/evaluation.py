@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,14 +27,15 @@ from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.analysis import Sums as SeenSums
 from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
-from facefolds_core.scoring.images import Rendering, region_of, score_renderings
+from facefolds_core.scoring.images import Rendering, Values, region_of, score_renderings
+from facefolds_core.scoring.kept_scores import KeptScores, digest_of_metrics
 from facefolds_core.scoring.metrics import Array, shown
 from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
-from facefolds_core.scoring.truths import MatteKind, Truths
+from facefolds_core.scoring.truths import MatteKind, Truth, Truths
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
 
@@ -78,17 +80,19 @@ def evaluate(
     params: EvaluateParams,
     perceptual: Perceptual,
     films: Path | None = None,
+    kept: Path | None = None,
 ) -> Evaluation:
     """Render and score every frame of every camera that did not train; shows a progress bar.
 
     Args:
         films: folder in which films of the held-out cameras are put; None makes none.
+        kept: file of the scores of an earlier run, which pictures that are the same have again; or None.
 
     Raises:
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
     _check(scene, model, scene.indices("holdout"))
-    scorer = _Scorer(scene, model, asset, params, perceptual)
+    scorer = _Scorer(scene, model, asset, params, perceptual, kept)
     show = _Show(asset, set(spread(scene.num_frames, params.sheet_frames)))
     rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
     found, changes = [], {}
@@ -113,6 +117,7 @@ def evaluate(
                 sums.append(film.sums())
                 judged.append(screening.judge(scene.fps))
             changes[split] = _changes(sums, mean_jod(judged))
+    scorer.kept.keep()
     if show.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
@@ -155,10 +160,17 @@ class _Scorer:
     Attributes:
         keys: (camera, frame) of all photos that are scored.
         kind: which opacity says where the subject is in them.
+        kept: scores of an earlier run.
     """
 
     def __init__(
-        self, scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, perceptual: Perceptual
+        self,
+        scene: Scene,
+        model: RadianceManifolds,
+        asset: Asset,
+        params: EvaluateParams,
+        perceptual: Perceptual,
+        kept: Path | None,
     ) -> None:
         self._scene, self._model, self._asset = scene, model, asset
         self._params, self._perceptual = params, perceptual
@@ -168,6 +180,7 @@ class _Scorer:
         cameras = [index for split in SCORED for index in scene.indices(split)]
         self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
         self.kind = self._truths.matte_kind(self.keys)
+        self.kept = KeptScores(kept, digest_of_metrics(perceptual, self.kind, params.background, params.band))
 
     def view(self, camera: Camera) -> PosedView:
         """Of a camera of the world."""
@@ -180,7 +193,7 @@ class _Scorer:
         for k, textures, renderings in rendered(view, self._asset, frames, self._step):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
-            values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
+            values = self.kept.of(renderings, truth, partial(self._scores, renderings, truth))
             group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
             pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
             region = region_of(self.kind, truth, renderings)
@@ -188,6 +201,10 @@ class _Scorer:
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
             yield k, _Shot(panel, list(group.values()), textures, pictures)
+
+    def _scores(self, renderings: Mapping[str, Rendering], truth: Truth) -> dict[str, Values]:
+        params = self._params
+        return score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
 
 
 def rendered(

@@ -68,8 +68,9 @@ class FilmRoll:
 
     def _open(self, width: int, height: int) -> None:
         muxer = {"fflags": "bitexact", "movflags": "faststart"}
+        options = {"crf": str(self._crf), "x264-params": "chromaloc=1"}  # where rgb_to_yuv420 puts chroma: the centre
         self._container = av.open(str(self._path), "w", format="mp4", options=muxer)
-        self._stream = self._container.add_stream("libx264", rate=self._fps, options={"crf": str(self._crf)})
+        self._stream = self._container.add_stream("libx264", rate=self._fps, options=options)
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, "yuv420p"
         self._stream.codec_context.time_base = 1 / self._fps
         self._stream.codec_context.thread_count = 1

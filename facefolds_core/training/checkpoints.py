@@ -22,6 +22,9 @@ from facefolds_core.model.tensor_files import check_tensors, read_tensors, write
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"
+PROCESSES = {"processes", "process_seconds", "ray_nanoseconds", "free_share"}
+"""Keys of `segments` that say who fits them, and what is foretold."""
+
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
 
 
@@ -48,12 +51,14 @@ class TrainingState:
 def fingerprint(params: TrainParams, scene: Scene) -> str:
     """16 hex digits that name a configuration and the scene it is trained on.
 
-    A digest of the section's dump and of the scene. The preset's name, the device and the checkpoint interval are left
-    out: they do not change what is computed. Of the frame store, its size and
+    A digest of the section's dump and of the scene. What does not change the result is left out: the preset's name, the
+    device, the checkpoint interval, how many processes there are. Of the frame store, its size and
     64 evenly spread blocks of 4 KiB are read.
     """
     digest = hashlib.sha256()
     values = params.model_dump(mode="json", exclude={"device", "checkpoint_seconds", "preset"})
+    for key in PROCESSES & values.get("segments", {}).keys():
+        del values["segments"][key]
     digest.update(json.dumps(values, sort_keys=True).encode())
     digest.update((scene.folder / "scene.json").read_bytes())
     surface = scene.folder / "surface.npz"

@@ -28,6 +28,7 @@ from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
 from facefolds_core.params import ExplicitParams, NormalizeParams, RegistrationParams
 from facefolds_core.progress import progress
+from facefolds_core.spill import by_rows
 from facefolds_core.training.alignment import Equations, Picture, Points, features, look_up, refined, unit
 from facefolds_core.training.volume.fit import Volume, iterations
 from facefolds_core.training.volume.search import find_subject
@@ -212,9 +213,11 @@ def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
     Raises:
         UserError: see `find_track`; of "found" only.
     """
+    asked, wanted = params.stabilize == "found", params.stabilize in ("found", "auto")
+    if scene.poses is not None or scene.num_frames < 2 or not wanted:
+        return scene
     surface = scene.load_surface()
-    asked = params.stabilize == "found"
-    if scene.poses is not None or scene.num_frames < 2 or not (asked or (params.stabilize == "auto" and not surface)):
+    if surface is not None and not asked:
         return scene
     try:
         found = find_track(scene, params.registration)
@@ -228,8 +231,11 @@ def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
     turns = fact("head_turns", degrees=found.degrees, shift=found.shift, source="found in the pictures")
     scene = replace(scene, poses=found.track, left_out=(*scene.left_out, turns, *found.facts))
     if surface is not None:
-        vertices = in_head(surface[0].astype(np.float64), found.track).astype(np.float32)
+        world, faces, track = *surface, found.track
+        vertices = by_rows(
+            len(world), lambda rows: in_head(world[rows].astype(np.float64), track, rows.start), np.float32
+        )
         with atomic_file(scene.folder / "surface.npz") as temporary, temporary.open("wb") as file:
-            np.savez(file, vertices=vertices, faces=surface[1])
+            np.savez(file, vertices=vertices, faces=faces)
     write_scene(scene, scene.folder)
     return scene

@@ -18,12 +18,13 @@ class TrainingReport:
 
     Attributes:
         seconds: of training (start included, over all runs that it took).
-        processor_seconds: of all threads, in the last run; imports left out.
+        processor_seconds: of all threads and worker processes, in the last run; imports left out.
         iterations: Adam steps.
         device: "cpu (2 threads)" or the GPU's name.
         preset: name in params.yaml.
         rays_per_second: mean over `seconds`.
-        peak_memory_bytes: resident (CPU) or allocated (CUDA) at most, in the last run.
+        peak_memory_bytes: resident (CPU) or allocated (CUDA) at most, in the last run; the sum of all processes', with
+            files that they share counted in each.
         final_psnr: of the training rays over the last log interval, dB.
     """
 

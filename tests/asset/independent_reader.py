@@ -1,7 +1,7 @@
 """A player written from docs/reference/asset-format.md alone: nothing of facefolds is imported. Slow and plain.
 
 Libraries: DracoPy for the meshes, PyAV for the video's planes, Pillow for the PNG. Everything else is the document's
-formulas: YCbCr to RGB with chroma sited left, rectangles, clamped bilinear look-ups, nearest hits, blending.
+formulas: YCbCr to RGB with centred chroma, rectangles, clamped bilinear look-ups, nearest hits, blending.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Player:
 
     def __init__(self, folder: Path, level: int = -1) -> None:
         manifest = json.loads((folder / "manifest.json").read_text())
-        assert manifest["format"] == "facefolds" and manifest["version"] == 3
+        assert manifest["format"] == "facefolds" and manifest["version"] == 4
         self.folder, self.level = folder, manifest["levels"][level]
         files = {x["file"]: (folder / x["file"]).read_bytes() for x in self.level["meshes"]}
         parts = [files[x["mesh"]][x["offset"] : x["offset"] + x["bytes"]] for x in self.level["layers"]]
@@ -112,9 +112,9 @@ class Player:
 
 
 def upsampled(chroma: Array) -> Array:
-    """Chroma at luma's pixels: sample (i, j) lies at row 2i + 0.5, column 2j; linear between, repeated outside."""
+    """Chroma at luma's pixels: (i, j) lies at row 2i + 0.5, column 2j + 0.5; linear between, repeated outside."""
     h, w = chroma.shape
-    rows, columns = np.clip((np.arange(2 * h) - 0.5) / 2, 0, h - 1), np.clip(np.arange(2 * w) / 2, 0, w - 1)
+    rows, columns = (np.clip((np.arange(2 * size) - 0.5) / 2, 0, size - 1) for size in (h, w))
     i, j = np.minimum(rows.astype(int), h - 2), np.minimum(columns.astype(int), w - 2)
     a, b = (rows - i)[:, None], (columns - j)[None]
     upper, lower = chroma[i], chroma[i + 1]

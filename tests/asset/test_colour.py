@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.ndimage
 
 from facefolds_core.asset.colour import alpha_to_luma, luma_to_alpha, rgb_to_yuv420, yuv420_to_rgb
 
@@ -36,14 +37,36 @@ def test_uniform_colours_come_back() -> None:
     assert worst <= 3  # half a code of chroma times 1.8556 * 255 / 224, and half a code of luma; 2 seen
 
 
-def test_chroma_lies_on_even_columns_between_rows() -> None:
-    # A hue ramp across and down: linear chroma, constant luma, must come back from its own siting (inner pixels).
+def ramp() -> np.ndarray:
+    """(64, 64, 3) in [0, 1], a hue that changes across and down: linear chroma, constant luma."""
     columns, rows = np.meshgrid(np.arange(64), np.arange(64))
     cr = (columns + 2 * rows) / 64 * 0.1
-    rgb = np.stack([0.5 + 1.5748 * cr, 0.5 - 0.2126 * 1.5748 / 0.7152 * cr, np.full(cr.shape, 0.5)], -1)
-    image = np.rint(255 * rgb).astype(np.uint8)
-    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float)[2:-2, 2:-2] - 255 * rgb[2:-2, 2:-2]
-    assert abs(error[..., 0].mean()) < 0.1  # centred siting would shift red by 0.31
+    return np.stack([0.5 + 1.5748 * cr, 0.5 - 0.2126 * 1.5748 / 0.7152 * cr, np.full(cr.shape, 0.5)], -1)
+
+
+def test_chroma_lies_between_columns_and_rows() -> None:
+    # It must come back from its own siting (inner pixels).
+    image = np.rint(255 * ramp()).astype(np.uint8)
+    error = yuv420_to_rgb(*rgb_to_yuv420(image)).astype(float)[2:-2, 2:-2] - 255 * ramp()[2:-2, 2:-2]
+    assert abs(error[..., 0].mean()) < 0.1  # sited left, red would be off by 0.31
+
+
+def test_chroma_is_read_by_a_linear_look_up_as_graphics_cards_do_it() -> None:
+    # OpenGL's GL_LINEAR with GL_CLAMP_TO_EDGE in a plane of half the size, at luma's own coordinate.
+    cr = np.random.default_rng(0).integers(100, 156, (8, 12)).astype(np.uint8)
+    at = [np.clip((np.arange(2 * size) + 0.5) / 2 - 0.5, 0, size - 1) for size in cr.shape]
+    expected = scipy.ndimage.map_coordinates(cr.astype(float), np.meshgrid(*at, indexing="ij"), order=1)
+    grey, neutral = np.full((16, 24), 126, np.uint8), np.full(cr.shape, 128, np.uint8)
+    red = 255 * ((126 - 16) / 219 + 1.5748 * (expected - 128) / 224)
+    assert np.abs(yuv420_to_rgb(grey, neutral, cr)[..., 0] - red).max() <= 0.51
+
+
+def test_chroma_of_older_assets_lies_on_even_columns() -> None:
+    codes = np.broadcast_to(np.arange(100, 156, dtype=np.uint8), (4, 56))
+    luma, neutral = np.full((8, 112), 126, np.uint8), np.full(codes.shape, 128, np.uint8)
+    red = yuv420_to_rgb(luma, neutral, codes, "left")[..., 0].astype(float)
+    on_samples = 255 * ((126 - 16) / 219 + 1.5748 * (codes - 128.0) / 224)
+    assert np.abs(red[::2, ::2] - on_samples).max() <= 0.51
 
 
 def test_fine_texture_keeps_48_db() -> None:

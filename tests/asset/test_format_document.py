@@ -72,10 +72,9 @@ def test_a_player_written_from_the_document(tmp_path: Path) -> None:
             w, h = entry["texture_rect"][2:]
             x, y = int(entry["texture_rect"][0] + s * w), int(entry["texture_rect"][1] + t * h)
             column, row = texture["colour_rect"][0] + x, texture["colour_rect"][1] + y
-            # chroma at an even column lies on luma's column, at an odd one between two; rows at +-0.25 of its own
-            i, di = divmod(row - 0.5, 2)
-            i, fi = int(i), di / 2
-            j, fj = column // 2, (column % 2) / 2
+            # luma's rows and columns lie at +-0.25 of a chroma sample's own
+            (i, di), (j, dj) = divmod(row - 0.5, 2), divmod(column - 0.5, 2)
+            i, fi, j, fj = int(i), di / 2, int(j), dj / 2
             weights = [
                 ((1 - fi) * (1 - fj), i, j),
                 ((1 - fi) * fj, i, j + 1),

@@ -125,6 +125,7 @@ def test_schema_and_models_accept_all_that_may_be_there(path: Path, tmp_path: Pa
     value |= {"audio": stored | {"mime": "audio/mp4"}, "poster": shown, "photos": [photo]}
     value["view"] = {"azimuth": [0.0, 1.0], "elevation": [0.0, 1.0], "distance": [1.0, 2.0], "measured": [row]}
     value |= {"extensionsUsed": ["A"], "extensions": {"A": {"b": [1, {}]}}, "extras": {"c": None}}
+    value["track_file"] = stored
     value["track"] = [{"quaternion": [1.0, 0.0, 0.0, 0.0], "translation": row}]
     level = value["levels"][0] | {"reflection": REFLECTION, "quality": {"psnr_to_model": 40.0, "target_psnr": 41.0}}
     level["layers"][0]["extras"] = "a note"
@@ -170,16 +171,16 @@ def test_another_version_is_said_in_plain_words(path: Path, tmp_path: Path) -> N
     (tmp_path / "manifest.json").write_text(json.dumps(value))
     with pytest.raises(UserError, match="another format version") as caught:
         parse_manifest(tmp_path / "manifest.json")
-    assert (caught.value.expected, caught.value.found) == ("1 to 3", 7)
+    assert (caught.value.expected, caught.value.found) == ("1 to 4", 7)
 
 
 def test_a_newer_version_that_says_so_is_read_without_what_it_added(path: Path, tmp_path: Path) -> None:
     value = json.loads(path.read_text())
-    newer = copy.deepcopy(value) | {"version": 4, "something": "new"}
+    newer = copy.deepcopy(value) | {"version": 5, "something": "new"}
     newer["levels"][0]["texture"]["more"] = [1]
     (tmp_path / "manifest.json").write_text(json.dumps(newer))
     assert parse_manifest(tmp_path / "manifest.json") == parse_manifest(path)
-    (tmp_path / "manifest.json").write_text(json.dumps(newer | {"minVersion": 4}))
+    (tmp_path / "manifest.json").write_text(json.dumps(newer | {"minVersion": 5}))
     with pytest.raises(UserError, match="another format version"):
         parse_manifest(tmp_path / "manifest.json")
 

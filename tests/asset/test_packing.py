@@ -85,8 +85,8 @@ def test_neighbours_do_not_leak(resolution: int) -> None:
     assert np.abs(back.astype(int) - textures).max() <= 2
 
 
-def test_neighbours_do_not_leak_into_chroma_centred_across() -> None:
-    # A player that takes chroma for centred reads half a pixel to the side: still within the gutter.
+def test_neighbours_do_not_leak_into_chroma_placed_otherwise() -> None:
+    # A player that takes chroma for sited left reads half a pixel to the side: still within the gutter.
     textures = cap_textures(3, 0, 64)
     layout = AtlasLayout.pack([(64, 64)] * 3)
     picture = pack_frame(list(textures), layout)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,17 +13,17 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.asset.checks import manifest_problems
 from facefolds_core.asset.glb import write_glb
-from facefolds_core.asset.manifest import Manifest
-from facefolds_core.asset.manifest_extras import Pose
 from facefolds_core.asset.manifest_file import SCHEMA_PATH
+from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering import render_asset
 from tests.asset.test_glb import opened
 from tests.assets import SOURCE, make_asset
 from tests.geometry.test_track import SHIFTS, TURNS
+from tests.hostile.fuzz_assets import seal
+from tests.older import make_older
 from tests.scenes import look_at_origin
 
 TRACK = Track.of(TURNS, SHIFTS)
@@ -34,58 +36,80 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     return read_asset(folder)
 
 
-def test_the_track_comes_back_exactly(asset: Asset) -> None:
+def test_the_track_comes_back_from_its_file(asset: Asset) -> None:
     assert asset.track is not None
-    assert np.array_equal(asset.track.quaternions, TRACK.quaternions)
-    assert np.array_equal(asset.track.translations, TRACK.translations)
+    assert np.array_equal(asset.track.quaternions, TRACK.quaternions.astype(np.float32))
+    assert np.array_equal(asset.track.translations, TRACK.translations.astype(np.float32))
+    assert (asset.folder / "track.bin").stat().st_size == 28 * 3
+    assert validate_asset(asset.folder) == []
+
+
+def test_a_track_in_the_manifest_is_read(asset: Asset, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
+    make_older(folder, 3)
+    value = json.loads((folder / "manifest.json").read_text())
+    assert (value["version"], len(value["track"]), "track_file" in value) == (3, 3, False)
+    assert validate_asset(folder) == []
+    track = read_asset(folder).track
+    assert track is not None and asset.track is not None
+    assert np.array_equal(track.quaternions, asset.track.quaternions)
+    assert np.array_equal(track.translations, asset.track.translations)
 
 
 def test_the_schema_knows_it(asset: Asset) -> None:
     value = json.loads((asset.folder / "manifest.json").read_text())
     validator = jsonschema.Draft202012Validator(json.loads(SCHEMA_PATH.read_text()))
     validator.validate(value)
-    for wrong in (None, [{"quaternion": [1, 0, 0], "translation": [0, 0, 0]}], [{"quaternion": [1, 0, 0, 0]}]):
-        assert not validator.is_valid(value | {"track": wrong})
+    for wrong in (None, "track.bin", {"file": "track.bin", "bytes": 84}, value["track_file"] | {"bytes": 0}):
+        assert not validator.is_valid(value | {"track_file": wrong})
 
 
 def test_a_still_head_has_no_such_key(tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=1, frames=1, resolution=32)
-    assert "track" not in json.loads((tmp_path / "asset" / "manifest.json").read_text())
+    assert not {"track", "track_file"} & json.loads((tmp_path / "asset" / "manifest.json").read_text()).keys()
+
+
+POSES = np.array([[1, 0, 0, 0, 0, 0, 0]] * 3, "<f4")
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("row", "says"),
     [
-        (lambda poses: poses[:2], "2 frames|frames"),
-        (lambda poses: (*poses[:2], Pose(quaternion=(1, 1, 0, 0), translation=(0, 0, 0))), "unit length"),
-        (lambda poses: (*poses[:2], Pose(quaternion=(1, 0, 0, 0), translation=(0, 1e6, 0))), "units away"),
+        (None, "56 bytes are no poses of 28 for 3 frames"),
+        ([1, 1, 0, 0, 0, 0, 0], "unit length"),
+        ([1, 0, 0, 0, 0, 1e6, 0], "units away"),
+        ([1, 0, 0, 0, 0, np.nan, 0], "not finite"),
     ],
 )
-def test_a_wrong_track_is_a_problem(asset: Asset, change: object, says: str) -> None:
-    manifest: Manifest = asset.manifest.model_copy(update={"track": change(asset.manifest.track)})  # type: ignore[operator]
-    path = asset.folder / "manifest.json"
-    assert manifest_problems(path, asset.manifest) == []
-    (found,) = manifest_problems(path, manifest)
-    assert any(word in found for word in says.split("|"))
+def test_a_wrong_track_is_a_problem(asset: Asset, row: list[float] | None, says: str, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
+    poses = POSES[:2] if row is None else np.array([*POSES[:2], row], "<f4")
+    (folder / "track.bin").write_bytes(poses.tobytes())
+    value = json.loads((folder / "manifest.json").read_text())
+    entry = {"file": "track.bin", "bytes": poses.nbytes, "sha256": hashlib.sha256(poses.tobytes()).hexdigest()}
+    seal(folder, value | {"track_file": entry})
+    (found,) = validate_asset(folder)
+    assert says in found
+    with pytest.raises(UserError, match=says):
+        read_asset(folder)
 
 
 def test_a_damaged_track_is_refused(asset: Asset, tmp_path: Path) -> None:
-    path = asset.folder / "manifest.json"
-    text = path.read_text()
-    try:
-        path.write_text(text.replace('"quaternion"', '"quaternoin"', 1))
-        with pytest.raises(UserError):
-            read_asset(asset.folder)
-    finally:
-        path.write_text(text)
+    folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
+    content = (folder / "track.bin").read_bytes()
+    (folder / "track.bin").write_bytes(bytes([content[0] ^ 1]) + content[1:])
+    with pytest.raises(UserError, match="SHA-256") as caught:
+        read_asset(folder)
+    assert caught.value.file == folder / "track.bin"
 
 
 def test_a_picture_shows_the_head_where_it_stood(asset: Asset) -> None:
     """As the camera that moved against it would see a head that stands still."""
     camera = look_at_origin("side", 25, 10, 24)
     still = replace(asset, levels=tuple(replace(level, track=None) for level in asset.levels))
+    assert asset.track is not None
     moved, _ = render_asset(asset, camera, 2)
-    expected, _ = render_asset(still, camera.transformed(TRACK.at(2).inverse()), 2)
+    expected, _ = render_asset(still, camera.transformed(asset.track.at(2).inverse()), 2)
     unmoved, _ = render_asset(still, camera, 2)
     assert np.array_equal(moved, expected)
     assert np.abs(moved - unmoved).max() > 0.1

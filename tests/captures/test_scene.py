@@ -16,6 +16,7 @@ from facefolds_core.facts import fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
+from tests.memory import peak_of
 
 
 def scene(folder: Path) -> Scene:
@@ -81,6 +82,26 @@ def test_indices_of_a_split(tmp_path: Path) -> None:
 def test_masks_and_surface_are_optional(tmp_path: Path) -> None:
     assert scene(tmp_path).open_masks() is None
     assert scene(tmp_path).load_surface() is None
+
+
+def test_a_tracked_mesh_stays_in_its_file(tmp_path: Path) -> None:
+    vertices = np.random.default_rng(0).normal(size=(2, 500_000, 3)).astype(np.float32)
+    np.savez(tmp_path / "surface.npz", vertices=vertices, faces=np.array([[0, 1, 2]], np.int32))
+    found = scene(tmp_path).load_surface()
+    assert found is not None
+    assert np.array_equal(found[0], vertices)
+    assert found[1].tolist() == [[0, 1, 2]]
+    assert peak_of(lambda: scene(tmp_path).load_surface()) < 6e6  # of 12 MB; a frame's mask of what is finite has 1.5
+
+
+def test_a_byte_that_changed_in_a_tracked_mesh_is_noticed(tmp_path: Path) -> None:
+    vertices = np.ones((2, 100, 3), np.float32)
+    np.savez(tmp_path / "surface.npz", vertices=vertices, faces=np.array([[0, 1, 2]], np.int32))
+    content = bytearray((tmp_path / "surface.npz").read_bytes())
+    content[1000] ^= 1
+    (tmp_path / "surface.npz").write_bytes(content)
+    with pytest.raises(UserError, match="tracked mesh of the scene is damaged"):
+        scene(tmp_path).load_surface()
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 cut short", b"no archive"])

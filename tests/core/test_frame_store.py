@@ -9,6 +9,7 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import FrameStore, Image, write_frames
+from tests.memory import peak_of
 
 SHAPE = (5, 4, 3)
 
@@ -64,6 +65,13 @@ def test_a_part_is_numbered_from_0_on(tmp_path: Path) -> None:
     part = FrameStore(tmp_path / "f.arrow").part([3, 1])
     assert part.keys() == [(1, 0), (1, 1)]
     assert np.array_equal(part.image(1, 0), image(3))
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_an_image_more_costs_a_store_hardly_any_memory(packed: bool, tmp_path: Path) -> None:
+    dot = np.zeros((1, 1, 1), np.uint8)
+    write_frames(tmp_path / "f.arrow", (1, 1, 1), [(0, k, dot) for k in range(1000)], packed)
+    assert peak_of(lambda: FrameStore(tmp_path / "f.arrow")) < 200_000  # seen 80 000
 
 
 def smooth(k: int) -> Image:

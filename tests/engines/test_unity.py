@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,10 @@ from PIL import Image
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines._picture import rgb_picture
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.track import rotation
+from facefolds_core.geometry.track import Track, rotation
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.assets import make_asset
+from tests.assets import SOURCE, make_asset
 from tests.engines import unity_shaders
 from tests.engines.unity_checks import PACKAGE, ROOT, SHADERS, STUBS, compiled, core, missing, run, spirv
 from tests.older import make_older
@@ -116,6 +117,18 @@ def test_a_manifest_of_format_2_is_read(check: Path, glossy: Asset, tmp_path: Pa
     assert lines[1].split()[3:] == ["2", "30", "3"]
     names = [line.split()[:2] for line in lines[2:]]
     assert [offset for _, offset in names] == ["0"] * 3 and len({name for name, _ in names}) == 3
+
+
+def test_poses_are_read_from_their_file(check: Path, tmp_path: Path) -> None:
+    track = Track.of([rotation(np.array([np.cos(a), 0, 0, np.sin(a)])) for a in (0.0, 0.1, 0.2)], np.eye(3))
+    make_asset(tmp_path / "asset", layers=1, frames=3, resolution=32, source=replace(SOURCE, track=track))
+    manifest, poses = tmp_path / "asset" / "manifest.json", tmp_path / "asset" / "track.bin"
+    lines = run("mono", check, "poses", manifest, poses).stdout.splitlines()
+    found = np.array([line.split() for line in lines], float)
+    np.testing.assert_allclose(found, np.concatenate([track.quaternions, track.translations], 1), atol=1e-7)
+    poses.write_bytes(poses.read_bytes()[:-4])
+    done = run("mono", check, "poses", manifest, poses)
+    assert done.returncode == 1 and "track.bin has 80 bytes for 3 frames" in done.stdout
 
 
 def test_keys_of_a_later_writer_are_passed_over(check: Path, glossy: Asset, tmp_path: Path) -> None:

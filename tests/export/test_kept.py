@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.export.kept import INDEX, STORE, KeptFrames, digest_of, digests_of_frames
+from facefolds_core.export.kept import INDEX, STORE, KeptFrames, digest_of, digest_of_frame
 from facefolds_core.frame_store import FrameStore, Image, write_frames
 
 LAYERS, FRAMES = 2, 3
@@ -32,9 +32,12 @@ def run(folder: Path, store: FrameStore, common: bytes = b"same") -> tuple[list[
         made.append(frame)
         return 255 - np.stack([store.image(n, frame) for n in range(LAYERS)])
 
-    digests = digests_of_frames(common, [store], range(FRAMES))
-    write_frames(folder / "out.arrow", (8, 8, 4), kept.rows(digests, LAYERS, make, lambda: None), packed=True)
-    kept.keep(folder / "out.arrow", digests)
+    def digest(frame: int) -> str:
+        return digest_of_frame(common, (store.image(n, frame) for n in range(LAYERS)))
+
+    rows = kept.rows(range(FRAMES), LAYERS, digest, make, lambda: None)
+    write_frames(folder / "out.arrow", (8, 8, 4), rows, packed=True)
+    kept.keep(folder / "out.arrow")
     out = FrameStore(folder / "out.arrow")
     return made, [out.image(n, k) for k in range(FRAMES) for n in range(LAYERS)]
 

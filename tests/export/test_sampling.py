@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.errors import UserError
+from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.sampling import grid_normals, sample_grids, texture_rows, write_textures
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, row_strides, texel_uv
+from facefolds_core.model.textures import TexelGrid
 from tests.ellipsoids import Ellipsoids
 
 SPHERES = ((0.35, 0.35, 0.35), (0.30, 0.30, 0.30))
@@ -133,3 +136,37 @@ def test_nan_in_a_texture_is_caught() -> None:
     grids = sample_grids(Ellipsoids(), 16, WINDOW, progress=False)
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 0, frame 0"):
         next(texture_rows(Broken(), grids, progress=False))
+
+
+@dataclass(frozen=True)
+class OfTexels(Ellipsoids):
+    """A model with texels of its own, one frame of which may show something else."""
+
+    num_frames: int = 4
+    changed: int = -1
+
+    def texel_grid(self) -> TexelGrid:  # type: ignore[override]
+        return TexelGrid(WINDOW, (12, 10))
+
+    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
+        rgb, alpha = super().texture(uv, layer, time)
+        return rgb * (0.5 if time == self.changed else 1.0), alpha
+
+
+def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    grids = sample_grids(OfTexels(), 16, WINDOW, progress=False)
+    made, project = list[int](), Projection.__call__
+
+    def counted(self: Projection, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        made.append(1)
+        return project(self, image)
+
+    monkeypatch.setattr(Projection, "__call__", counted)
+    for name, model in (("first", OfTexels()), ("again", OfTexels()), ("changed", OfTexels(changed=2))):
+        write_textures(tmp_path / name, model, grids, tmp_path / "kept", progress=False)
+        assert len(made) == {"first": 8, "again": 0, "changed": 2}[name]  # of 4 frames of 2 layers
+        made.clear()
+    opacity = write_textures(tmp_path / "whole", OfTexels(changed=2), grids, progress=False)
+    assert (tmp_path / "changed").read_bytes() == (tmp_path / "whole").read_bytes()
+    kept = write_textures(tmp_path / "changed", OfTexels(changed=2), grids, tmp_path / "kept", progress=False)
+    assert np.array_equal(kept, opacity)

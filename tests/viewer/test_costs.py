@@ -13,7 +13,7 @@ from tests.viewer.fixtures import add_reflection
 
 Serve = Callable[[dict[str, Path]], str]
 AGREE = 50.0
-"""dB. Seen: 53 and more; the canvas rounds to 8 bits after each layer, and browsers place chroma otherwise."""
+"""dB. Seen: 52.4 and more; the canvas rounds to 8 bits after each layer."""
 
 
 def test_the_page_is_measured_over_a_slow_line(browser: Browser, serve: Serve, rich: Path) -> None:

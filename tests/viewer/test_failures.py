@@ -177,7 +177,7 @@ def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlay
 
 def test_an_asset_of_a_newer_format(new_player: NewPlayer, asset: Path) -> None:
     path = asset / "manifest.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 4, "minVersion": 4}))
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"version": 5, "minVersion": 5}))
     player = new_player({"asset": asset})
     player.open("asset", wait=False)
     assert "too old" in player.message()

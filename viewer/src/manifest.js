@@ -1,8 +1,9 @@
-/** manifest.json, format version 3 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
+/** manifest.json, format version 4 (docs/reference/asset-format.md): read, checked as far as the player relies on it. */
 import { PlayerError } from "./errors.js";
 import { broughtUp } from "./older.js";
+import { POSE_BYTES } from "./track.js";
 
-export const VERSION = 3;
+export const VERSION = 4;
 const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
 
 /**
@@ -21,7 +22,7 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry & {mime: string} | null,
  *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null,
- *   track: import("./track.js").Pose[] | null}} Manifest
+ *   track: import("./track.js").Pose[] | null, trackFile: FileEntry | null}} Manifest `track`: of version 3
  */
 
 /**
@@ -45,7 +46,7 @@ export function parseManifest(text, file) {
     });
   }
   const newer = Number(value.version) > VERSION;
-  if (newer ? !(value.minVersion <= VERSION) : ![1, 2, VERSION].includes(value.version)) {
+  if (newer ? !(value.minVersion <= VERSION) : ![1, 2, 3, VERSION].includes(value.version)) {
     throw new PlayerError(
       `The asset has format version ${value.version}; this player reads versions 1 to ${VERSION}${newer ? " and is too old for it" : ""}`,
       {
@@ -68,7 +69,7 @@ export function parseManifest(text, file) {
     );
   }
   try {
-    return readManifest(value.version < VERSION ? broughtUp(value) : value);
+    return readManifest(value.version < 3 ? broughtUp(value) : value);
   } catch (cause) {
     if (cause instanceof TypeError || cause instanceof RangeError) throw damaged(file, cause.message, cause);
     throw cause;
@@ -97,6 +98,7 @@ function readManifest(value) {
     poster: value.poster ? readPoster(value.poster) : null,
     bounds: value.bounds ? readBounds(value.bounds) : null,
     photos: (value.photos ?? []).map(readPhoto),
+    trackFile: value.track_file ? readTrackFile(value.track_file, levels[0].texture.frames) : null,
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
     view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
   };
@@ -232,6 +234,11 @@ function count(value, place) {
 function rectangle(value, place) {
   check(Array.isArray(value) && value.length === 4 && value.every(Number.isFinite), `${place} is not a rectangle`);
   return value;
+}
+
+function readTrackFile(entry, frames) {
+  check(entry.bytes === POSE_BYTES * frames, `track_file has ${entry.bytes} bytes for ${frames} frames`);
+  return readFile(entry, entry.file, "track_file");
 }
 
 function readTrack(value, frames) {

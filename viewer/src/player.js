@@ -11,7 +11,7 @@ import { parseManifest } from "./manifest.js";
 import { Playback } from "./playback.js";
 import { LayerRenderer } from "./renderer.js";
 import { Sound } from "./sound.js";
-import { matrixOf } from "./track.js";
+import { matrixOf, readPoses } from "./track.js";
 import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
@@ -65,6 +65,8 @@ export class Player extends EventTarget {
     const text = await files.text("manifest.json");
     this.manifest = parseManifest(text, files.address("manifest.json"));
     this.say("progress");
+    const { trackFile } = this.manifest;
+    if (trackFile) this.manifest.track = readPoses(await files.bytes(trackFile), files.address(trackFile.name));
     this.view.setFilmed(this.manifest.view);
     if (this.manifest.bounds) this.#settle(this.manifest.bounds);
     const { frames, fps } = this.manifest.levels.at(-1).texture;

@@ -9,7 +9,7 @@ import { parseManifest } from "../src/manifest.js";
 import { Pace } from "../src/pace.js";
 import { Playback } from "../src/playback.js";
 import { droppedAsset } from "../src/ui/drop.js";
-import { matrixOf } from "../src/track.js";
+import { matrixOf, readPoses } from "../src/track.js";
 import { decode, encode } from "../src/viewstate.js";
 
 /** three's own arithmetic, to hold ours against. */
@@ -121,7 +121,7 @@ test("a still picture needs no clock", () => {
 const file = { bytes: 10, sha256: "0".repeat(64) };
 const manifest = () => ({
   format: "facefolds",
-  version: 3,
+  version: 4,
   minVersion: 3,
   subject: "test",
   levels: [
@@ -157,10 +157,31 @@ test("a manifest is read", () => {
   assert.deepEqual(read.photos, []);
 });
 
-test("a track is read, and moves points as its poses say", () => {
+test("a track's file is read, and moves points as its poses say", () => {
+  const numbers = new Float32Array([1, 0, 0, 0, 0, 0, 0, Math.SQRT1_2, 0, 0, Math.SQRT1_2, 0.1, 0, -0.2]);
+  const track = readPoses(numbers.buffer, "x"); // this machine is little-endian
+  const entry = { file: "track.bin", bytes: 56, sha256: file.sha256 };
+  const named = parseManifest(JSON.stringify({ ...manifest(), track_file: entry }), "x");
+  assert.deepEqual([named.trackFile.name, named.track], ["track.bin", null]);
+  assert.equal(track.length, 2);
+  const [x, y, z] = transformed(matrixOf(track[1]), [1, 0, 0]); // a quarter turn about z
+  for (const [found, expected] of [
+    [x, 0.1],
+    [y, 1],
+    [z, -0.2],
+  ])
+    assert.ok(Math.abs(found - expected) < 1e-6);
+  const short = { ...manifest(), track_file: { ...entry, bytes: 28 } };
+  assert.throws(() => parseManifest(JSON.stringify(short), "x"), /track_file has 28 bytes for 2 frames/);
+  numbers[9] = NaN;
+  assert.throws(() => readPoses(numbers.buffer, "x"), /track is damaged/);
+});
+
+test("a track in a manifest of version 3 is read, and moves points as its poses say", () => {
   const pose = { quaternion: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], translation: [0.1, 0, -0.2] };
-  const value = { ...manifest(), track: [pose, pose] };
-  const { track } = parseManifest(JSON.stringify(value), "x");
+  const value = { ...manifest(), version: 3, track: [pose, pose] };
+  const { track, levels } = parseManifest(JSON.stringify(value), "x");
+  assert.deepEqual(levels, parseManifest(JSON.stringify(manifest()), "x").levels);
   const [x, y, z] = transformed(matrixOf(track[1]), [1, 0, 0]); // a quarter turn about z
   near(x, 0.1);
   near(y, 1);
@@ -228,7 +249,7 @@ test("the connection's pace is that of the seconds in which something came", () 
 });
 
 test("a newer manifest that says so is read without what it added", () => {
-  const newer = { ...manifest(), version: 4, something: "new" };
+  const newer = { ...manifest(), version: 5, something: "new" };
   assert.deepEqual(parseManifest(JSON.stringify(newer), "x"), parseManifest(JSON.stringify(manifest()), "x"));
 });
 
@@ -247,7 +268,7 @@ test("a manifest that is wrong is refused, naming the place", () => {
     [(m) => (m.levels[0].layers[0].offset = -1), /offset/],
     [(m) => (m.extensionsRequired = ["A_b"]), /extension.*A_b/],
     [(m) => (m.levels[0].layers[0].mesh = "../secret"), /names no plain file/],
-    [(m) => (m.version = m.minVersion = 4), /format version 4.*too old/],
+    [(m) => (m.version = m.minVersion = 5), /format version 5.*too old/],
     [(m) => (m.version = 0), /format version 0/],
     [(m) => (m.view = { azimuth: [10, -10], elevation: [0, 0] }), /view\.azimuth/],
     [(m) => (m.format = "gltf"), /not a facefolds asset/],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +27,9 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.patience import patiently
+
+LOG = "log"
+"""Folder in a base's: dvclive's files of its training."""
 
 _REMEDY = "delete the folder: the base is then trained again"
 
@@ -133,6 +137,7 @@ def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Pa
             }
             about = {"splits": json.dumps(found.splits), "rate": repr(found.rate)}
             write_tensors(temporary / "surroundings.safetensors", tensors, about)
+            shutil.copytree(log, temporary / LOG)
 
     patiently(write)
 

@@ -33,10 +33,10 @@ class SegmentCache:
         folder.mkdir(parents=True, exist_ok=True)
         self.frames: dict[str, tuple[Path, int, float]] = {}
         for path in sorted(folder.glob("segment-*.safetensors")):
-            self._read(path)
+            self.read(path)
 
-    def _read(self, path: Path) -> None:
-        """What is damaged is made again."""
+    def read(self, path: Path) -> None:
+        """Know a file that was written; what is damaged is made again."""
         with suppress(SafetensorError, OSError, ValueError, KeyError), safe_open(str(path), "pt") as file:
             for position, (frame, psnr) in enumerate(json.loads(file.metadata()["frames"])):
                 self.frames.setdefault(frame, (path, position, float(psnr)))
@@ -50,6 +50,10 @@ class SegmentCache:
         """Whether the segment is there, whole."""
         path = self.path(frames)
         return path.exists() and all(frame in self.frames for frame in frames)
+
+    def psnr(self, fingerprint: str) -> float:
+        """Of a frame that is there, dB."""
+        return self.frames[fingerprint][2]
 
     def frame(self, fingerprint: str) -> tuple[Tensor, Tensor, float] | None:
         """Colour, alpha and PSNR of a frame that is in any of the files."""
@@ -69,7 +73,7 @@ class SegmentCache:
         # One entry: safetensors writes several in any order, and equal segments are to be equal files.
         about = {"frames": json.dumps([[frame, one[2]] for frame, one in zip(frames, fitted, strict=True)])}
         patiently(lambda: write_tensors(path, tensors, about))
-        self._read(path)
+        self.read(path)
 
     def keep_only(self, paths: Sequence[Path]) -> None:
         """Delete all other segments, and what they were fitted against."""

@@ -54,11 +54,41 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
     steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
     if not at_once:
         steps += segments.steps * (frames if left is None else left)
-    seconds = steps * texels * params.textures.rays_per_texel * segments.ray_nanoseconds * 1e-9
-    seconds *= params.layers / 12 / numba.get_num_threads()
+    seconds = _seconds(params, steps, texels) / numba.get_num_threads()
     base = model_bytes((1, texels), params.layers, keys)
     disk = base if at_once else base + 2 * texels * frames * (3 + params.layers)
     return Forecast(None if at_once else keys, memory, disk, seconds)
+
+
+def processes_for(scene: Scene, params: ExplicitParams, texels: int, segments: int, frames: int) -> int:
+    """How many processes are to fit the segments that are left.
+
+    Args:
+        texels: of the textures.
+        segments, frames: that are left.
+    """
+    asked = params.segments.processes
+    if asked:
+        return min(asked, segments)
+    rays = len(scene.indices("train")) * scene.width * scene.height
+    moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
+    # A still head's rays are the parent's, mapped; background and pictures are each one's own.
+    memory = texels * _frame_bytes(params) + rays * (12 + 6) + moving + params.segments.floor_megabytes * 1e6
+    room = int(params.segments.free_share * psutil.virtual_memory().available / memory)
+    work = _seconds(params, frames * params.segments.steps, texels)
+    return max(1, min(numba.get_num_threads(), segments, room, int(work / params.segments.process_seconds)))
+
+
+def _frame_bytes(params: ExplicitParams) -> int:
+    """A texel while one frame is fitted: the shared values, the frame's with two moments, texture and gradient."""
+    n = params.layers
+    return 4 * (2 * (3 + 4 * n) + 3 * (3 + n) + 2 * 4 * n)
+
+
+def _seconds(params: ExplicitParams, steps: int, texels: int) -> float:
+    """Of one core."""
+    rays = steps * texels * params.textures.rays_per_texel
+    return rays * params.segments.ray_nanoseconds * 1e-9 * params.layers / 12
 
 
 def _ray_bytes(params: ExplicitParams) -> int:

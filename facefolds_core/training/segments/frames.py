@@ -19,7 +19,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.state import LossWeights, state_type
-from facefolds_core.training.explicit.views import Images, MovingRays, Rays, Shown, StillRays, trace_views
+from facefolds_core.training.explicit.views import Images, MovingRays, Rays, Shown, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
 
 
@@ -45,9 +45,12 @@ class FrameFitter:
         base: see there.
         params: of the training.
         device: of the textures.
+        views: crossings of the rays of a still head, if they are known.
     """
 
-    def __init__(self, scene: Scene, base: Base, params: ExplicitParams, device: Device) -> None:
+    def __init__(
+        self, scene: Scene, base: Base, params: ExplicitParams, device: Device, views: Views | None = None
+    ) -> None:
         self.scene, self.base, self.gpu = scene, base, device.gpu
         still = params.background.model_copy(update={"rate": 0.0})
         self.params = params.model_copy(update={"background": still})
@@ -59,7 +62,9 @@ class FrameFitter:
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
-        self.still = None if scene.poses is not None else StillRays(trace_views(scene, base.manifolds, 1, self.gpu))
+        self.still = None
+        if scene.poses is None:
+            self.still = StillRays(views or trace_views(scene, base.manifolds, 1, self.gpu))
 
     def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> FittedFrame:
         """Args:

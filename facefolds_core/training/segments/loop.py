@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import time
 from collections.abc import Sequence
@@ -11,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from dvclive.live import Live
 from tqdm import tqdm
@@ -30,20 +30,13 @@ from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
 from facefolds_core.training.report import TrainingReport, make_report
-from facefolds_core.training.segments.base import (
-    Base,
-    digest_of_fitting,
-    digest_of_training,
-    digests_of_frames,
-    fingerprint_of_base,
-    read_base,
-    train_base,
-    with_its_cameras,
-)
+from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast
-from facefolds_core.training.segments.frames import FrameFitter
-from facefolds_core.training.segments.keys import comparable, farthest_first, likenesses, mixture, named_frames
+from facefolds_core.training.segments.fitting import fit_segment
+from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, processes_for
+from facefolds_core.training.segments.handed import Fitting
+from facefolds_core.training.segments.plan import Segment, TakePlan, plan_take
+from facefolds_core.training.segments.workers import Used, Workers
 from facefolds_core.training.trained import Trained
 
 _REMEDY = "run the same command again: finished segments are kept"
@@ -83,71 +76,54 @@ class _Take:
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
         self.device = choose(params.device)
         self.began = time.perf_counter()
-        training = digest_of_training(params)
-        frames = progress(range(scene.num_frames), desc="fingerprints", unit="frame")
-        digests = digests_of_frames(scene, frames)
-        self.parts = likenesses(scene, params.segments)
-        named, most = params.segments.named, told.key_frames or 1
-        self.keys = named_frames(scene, named) if named else farthest_first(comparable(self.parts), most)
-        self.fingerprint = fingerprint_of_base(scene, training, self.keys, digests)
-        common = self.fingerprint.encode() + digest_of_fitting(params)
-        own = [hashlib.sha256(common + digest).hexdigest()[:16] for digest in digests]
-        length = params.segments.frames
-        self.segments = [own[k : k + length] for k in range(0, len(own), length)]
-        self.rays = self.steps = 0
+        self.plan = plan_take(scene, params, told.key_frames or 1)
+        self.used = Used()
 
     def run(self) -> Trained:
-        base = self._base()
-        scene = with_its_cameras(self.scene, base)
+        base = base_of(self.plan, self.scene, self.params, self.folder, self.log)
         cache = SegmentCache(self.folder)
-        open_segments = [i for i, frames in enumerate(self.segments) if not cache.has(frames)]
-        if open_segments:
-            fitter = FrameFitter(scene, base, self.params, self.device)
-            self._fit(open_segments, fitter, cache)
-        psnr = float(np.mean([cache.frames[frame][2] for frames in self.segments for frame in frames]))
-        paths = [cache.path(frames) for frames in self.segments]
+        self._fit([segment for segment in self.plan.segments if not cache.has(segment.names)], base, cache)
+        segments = [segment.names for segment in self.plan.segments]
+        psnr = float(np.mean([cache.psnr(frame) for frames in segments for frame in frames]))
+        paths = [cache.path(frames) for frames in segments]
         cache.keep_only(paths)
         for other in self.folder.glob("base-*"):
             if other != base.folder:
                 shutil.rmtree(other)
         return self._trained(base, paths, psnr)
 
-    def _base(self) -> Base:
-        folder = self.folder / f"base-{self.fingerprint}"
-        if not folder.exists():
-            train_base(self.scene, self.keys, self.params, folder, self.log)
-        return read_base(folder, self.fingerprint)
-
-    def _fit(self, numbers: Sequence[int], fitter: FrameFitter, cache: SegmentCache) -> None:
-        """Fit the frames of the segments that are not there, and write each segment as soon as it is whole."""
-        rows = comparable(self.parts, self.keys)
-        keys = rows[self.keys]
-        length = self.params.segments.frames
-        there = self.scene.num_frames - sum(len(self.segments[i]) for i in numbers)
+    def _fit(self, left: Sequence[Segment], base: Base, cache: SegmentCache) -> None:
+        """Fit what is not there, and write each segment as soon as it is whole."""
+        frames = sum(len(segment.frames) for segment in left)
+        h, w = base.spec.texels
+        processes = processes_for(self.scene, self.params, h * w, len(left), frames) if left else 1
+        fitting = Fitting(self.scene, self.params, base.folder, base.fingerprint, self.folder)
+        total = len(self.plan.segments)
         with (
             open_log(self.log, resume=True) as live,
-            progress(total=self.scene.num_frames, initial=there, desc="segments", unit="frame") as bar,
+            progress(
+                total=self.scene.num_frames, initial=self.scene.num_frames - frames, desc="segments", unit="frame"
+            ) as bar,
         ):
-            for number in numbers:
-                fitted = []
-                for position, name in enumerate(self.segments[number]):
-                    known = cache.frame(name)
-                    if known is None:
-                        k = number * length + position
-                        one = fitter.fit(k, mixture(rows[k], keys, self.params.segments), bytes.fromhex(name))
-                        known = one.colour, one.alpha, one.psnr
-                        self.rays, self.steps = self.rays + one.rays, self.steps + self.params.segments.steps
-                    fitted.append(known)
-                    bar.update()
-                    bar.set_postfix(segment=f"{number + 1} of {len(self.segments)}", refresh=False)
-                cache.write(self.segments[number], fitted)
-                self._log(live, number, float(np.mean([one[2] for one in fitted])))
+            log = _SegmentLog(live, self.plan.segments, cache)
+            bar.set_postfix(segments=f"{log.there()} of {total}", refresh=False)
 
-    def _log(self, live: Live, number: int, psnr: float) -> None:
-        log_metrics(live, number, {"segment_psnr": psnr})
+            def done(segment: Segment) -> None:
+                cache.read(cache.path(segment.names))
+                bar.set_postfix(segments=f"{log.there()} of {total}", refresh=False)
+
+            if processes > 1 and not self.device.gpu:
+                threads = max(1, numba.get_num_threads() // processes)
+                tqdm.write(f"train: {processes} processes fit segments, threads of each: {threads}")
+                self.used = Workers(fitting, base, processes, threads, bar.update, done).fit(left)
+            elif left:
+                fitter = fitting.fitter()
+                for segment in left:
+                    self.used.rays += fit_segment(segment, fitter, cache, bar.update)
+                    done(segment)
 
     def _trained(self, base: Base, paths: Sequence[Path], psnr: float) -> Trained:
-        lengths = tuple(len(frames) for frames in self.segments)
+        lengths = tuple(len(segment.frames) for segment in self.plan.segments)
         spec = base.spec.model_copy(
             update={
                 "num_frames": self.scene.num_frames,
@@ -162,15 +138,15 @@ class _Take:
         textures.attach(paths, _REMEDY)
         report = make_report(
             time.perf_counter() - self.began,
-            self.steps,
+            int(read_json(base.folder / "training.json", _REMEDY)["iterations"])
+            + self.params.segments.steps * self.scene.num_frames,
             self.device.name,
-            self.device.peak_memory(),
+            self.device.peak_memory() + self.used.memory,
             self.params.preset,
-            self.rays,
+            self.used.rays,
             psnr,
         )
-        before = read_json(base.folder / "training.json", _REMEDY)
-        report = replace(report, iterations=report.iterations + int(before["iterations"]))
+        report = replace(report, processor_seconds=round(report.processor_seconds + self.used.seconds, 2))
         drawn = base.folder / "fit.png"
         picture = drawn.read_bytes() if drawn.exists() else None
         return Trained(
@@ -184,9 +160,36 @@ class _Take:
     def _summary(self, base: Base) -> dict[str, Any]:
         """`fit.json`: the base's, and how the take was dealt into segments."""
         found: dict[str, Any] = read_json(base.folder / "fit.json", _REMEDY)
-        names = [self.scene.frame_ids[k] for k in self.keys]
-        told = fact("in_segments", frames=self.scene.num_frames, segments=len(self.segments), keys=len(names))
+        names = [self.scene.frame_ids[k] for k in self.plan.keys]
+        told = fact("in_segments", frames=self.scene.num_frames, segments=len(self.plan.segments), keys=len(names))
         return {**found, "events": [*found["events"], told.to_json()], "key_frames": names}
+
+
+class _SegmentLog:
+    """A line a segment in the training's log, in their order, whoever is done first."""
+
+    def __init__(self, live: Live, segments: Sequence[Segment], cache: SegmentCache) -> None:
+        self.live, self.segments, self.cache, self.logged = live, segments, cache, 0
+
+    def there(self) -> int:
+        """Log what can be; how many segments are done."""
+        has = [self.cache.has(segment.names) for segment in self.segments]
+        while self.logged < len(has) and has[self.logged]:
+            psnr = float(np.mean([self.cache.psnr(name) for name in self.segments[self.logged].names]))
+            log_metrics(self.live, self.logged, {"segment_psnr": psnr})
+            self.logged += 1
+        return sum(has)
+
+
+def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, log: Path) -> Base:
+    """The base of a take, trained if it is not in `folder`, and the log of its training."""
+    place = folder / f"base-{plan.base}"
+    if not place.exists():
+        tqdm.write(f"train: the base of {len(plan.keys)} key frames first: killed meanwhile, it begins anew")
+        train_base(scene, list(plan.keys), params, place, log)
+    shutil.rmtree(log, ignore_errors=True)
+    shutil.copytree(place / LOG, log)
+    return read_base(place, plan.base)
 
 
 def _write(content: bytes, path: Path) -> None:

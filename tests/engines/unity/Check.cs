@@ -1,5 +1,6 @@
 // Runs the package's plain C# for tests/engines/test_unity.py.
 //   read MANIFEST             what was read, a line each; or the error
+//   poses MANIFEST FILE       those of the track's file, a line each; or the error
 //   pose w x y z              the rotation as Unity's quaternion, and its rows
 //   draw MANIFEST FOLDER      FOLDER/{picture,st,along[,maps]}.f32 -> FOLDER/drawn.f32; [room.f32]: rows of a rotation
 using System;
@@ -17,6 +18,7 @@ static class Check
         try
         {
             if (words[0] == "read") Read(Manifest.Parse(File.ReadAllText(words[1])));
+            if (words[0] == "poses") Poses(Manifest.Parse(File.ReadAllText(words[1])), File.ReadAllBytes(words[2]));
             if (words[0] == "pose") Turn(words.Skip(1).Select(word => double.Parse(word, CultureInfo.InvariantCulture)).ToArray());
             if (words[0] == "draw") Draw(Manifest.Parse(File.ReadAllText(words[1])).LevelOf(""), words[2]);
             return 0;
@@ -43,6 +45,12 @@ static class Check
                 Console.WriteLine(layer.Mesh + " " + Said(layer.Offset, layer.Bytes) + " " + Said(layer.Rect.X, layer.Rect.Y, layer.Rect.Width, layer.Rect.Height)
                     + " " + Said(Drawing.InPicture(layer.Rect, level.Alpha, level.Width, level.Height)));
         }
+    }
+
+    static void Poses(Manifest manifest, byte[] bytes)
+    {
+        manifest.ReadTrack(bytes);
+        foreach (Pose pose in manifest.Track) Console.WriteLine(Said(pose.Quaternion) + " " + Said(pose.Translation));
     }
 
     static void Turn(double[] q)

@@ -90,11 +90,20 @@ namespace Facefolds
             }
             catch (FormatException error) { Fail(address + "manifest.json: " + error.Message); }
             if (wanted == null) yield break;
+            if (manifest.TrackFile != null)
+                yield return Fetched(address + manifest.TrackFile, request => TakePoses(request.downloadHandler.data));
+            if (Error != null) yield break;
             yield return LayersLoaded(address);
             if (Error != null) yield break;
             if (shown.Reflection != null && reflection)
                 yield return Fetched(address + shown.Reflection.File, AddReflection);
             if (Error == null) Begin(address + wanted.File);
+        }
+
+        void TakePoses(byte[] bytes)
+        {
+            try { manifest.ReadTrack(bytes); }
+            catch (FormatException error) { Fail(error.Message); }
         }
 
         IEnumerator LayersLoaded(string address)

@@ -57,11 +57,12 @@ namespace Facefolds
     /// in words for people.</summary>
     public sealed class Manifest
     {
-        public const int Oldest = 2, Newest = 3;
+        public const int Oldest = 2, Newest = 4;
         public string Subject;
         public int Version;
         public List<Level> Levels; // coarsest first
-        public List<Pose> Track; // empty: the head stands still
+        public List<Pose> Track; // empty: the head stands still, or its poses are in TrackFile
+        public string TrackFile; // null: none
 
         public static Manifest Parse(string text)
         {
@@ -81,12 +82,30 @@ namespace Facefolds
                 Version = version,
                 Levels = fields.Objects("levels").Select(OfLevel).ToList(),
                 Track = fields.Has("track") ? fields.Objects("track").Select(OfPose).ToList() : new List<Pose>(),
+                TrackFile = fields.Has("track_file") ? PlainName(fields.Object("track_file").Text("file")) : null,
             };
             if (result.Levels.Count == 0) throw new FormatException("levels is empty");
             int frames = result.Levels.Last().Frames;
             if (result.Track.Count != 0 && result.Track.Count != frames)
                 throw new FormatException("track has " + result.Track.Count + " poses for " + frames + " frames");
             return result;
+        }
+
+        /// <summary>Takes the poses from the bytes of TrackFile: for each frame 7 little-endian numbers of 4 bytes.</summary>
+        public void ReadTrack(byte[] bytes)
+        {
+            int frames = Levels.Last().Frames;
+            if (bytes.Length != 28 * frames)
+                throw new FormatException(TrackFile + " has " + bytes.Length + " bytes for " + frames + " frames");
+            if (!BitConverter.IsLittleEndian)
+                for (int i = 0; i < bytes.Length; i += 4) Array.Reverse(bytes, i, 4);
+            var numbers = new float[7 * frames];
+            Buffer.BlockCopy(bytes, 0, numbers, 0, bytes.Length);
+            Track = Enumerable.Range(0, frames).Select(k => new Pose
+            {
+                Quaternion = Enumerable.Range(7 * k, 4).Select(i => (double)numbers[i]).ToArray(),
+                Translation = Enumerable.Range(7 * k + 4, 3).Select(i => (double)numbers[i]).ToArray(),
+            }).ToList();
         }
 
         /// <summary>The level of that name; the full one, which is the last, for an empty name.</summary>

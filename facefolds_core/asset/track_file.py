@@ -1,0 +1,82 @@
+"""The head's poses as a file beside the manifest: ten minutes of them are half a megabyte, and 4.3 as JSON.
+
+`track.bin` has for each frame 7 little-endian float32: the quaternion w, x, y, z, and the translation. Manifests of
+version 3 have the poses in themselves.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+
+from facefolds_core.asset.manifest import REMEDY, Manifest
+from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.stored import read_slice
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.track import Track
+
+TRACK_NAME = "track.bin"
+NUMBERS = 7
+"""Of a pose."""
+POSE_BYTES = 4 * NUMBERS
+
+FARTHEST = 1e3
+"""Units that a head may be away."""
+
+
+def write_track(folder: Path, track: Track) -> StoredFile:
+    """Write the poses; returns the manifest's entry."""
+    data = np.concatenate([track.quaternions, track.translations], 1).astype("<f4").tobytes()
+    (folder / TRACK_NAME).write_bytes(data)
+    return StoredFile(file=TRACK_NAME, bytes=len(data), sha256=hashlib.sha256(data).hexdigest())
+
+
+def read_track(folder: Path, manifest: Manifest) -> Track | None:
+    """The poses of an asset in `folder`; None where the head stands still.
+
+    Raises:
+        UserError: if the file is not the manifest's, or holds no poses.
+    """
+    entry = manifest.track_file
+    if entry is None:
+        return _in_manifest(manifest)
+    path = folder / entry.file
+    data = read_slice(path, 0, entry.bytes, entry.sha256, REMEDY)
+    problems = track_problems(manifest, data)
+    if problems:
+        raise UserError("damaged track", file=path, found="; ".join(problems), remedy=REMEDY)
+    return _unpacked(data)
+
+
+def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
+    """What is wrong with the poses, in words.
+
+    Args:
+        data: of the track's file; without it what the manifest itself says is looked at.
+    """
+    frames, entry = manifest.full.texture.frames, manifest.track_file
+    if entry is not None and entry.bytes != POSE_BYTES * frames:
+        return [f"{entry.bytes} bytes are no poses of {POSE_BYTES} for {frames} frames"]
+    if entry is not None and manifest.track is not None:
+        return ["poses in the manifest and in a file"]
+    track = _in_manifest(manifest) if entry is None else None if data is None else _unpacked(data)
+    if track is None:
+        return []
+    problems = track.problems(frames)
+    if not problems and np.abs(track.translations).max() > FARTHEST:
+        problems.append(f"the head is more than {FARTHEST:g} units away")
+    return problems
+
+
+def _unpacked(data: bytes) -> Track:
+    numbers = np.frombuffer(data, "<f4").reshape(-1, NUMBERS).astype(float)
+    return Track(numbers[:, :4].copy(), numbers[:, 4:].copy())
+
+
+def _in_manifest(manifest: Manifest) -> Track | None:
+    if manifest.track is None:
+        return None
+    rows = np.array([[*pose.quaternion, *pose.translation] for pose in manifest.track], float).reshape(-1, NUMBERS)
+    return Track(rows[:, :4].copy(), rows[:, 4:].copy())

@@ -1,0 +1,155 @@
+"""Segments fitted in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.errors import UserError
+from facefolds_core.training.segments.base import Base
+from facefolds_core.training.segments.forecast import forecast, processes_for
+from facefolds_core.training.segments.handed import Fitting
+from facefolds_core.training.segments.loop import base_of
+from facefolds_core.training.segments.plan import Segment, plan_take
+from facefolds_core.training.segments.workers import Workers
+from tests.scenes import make_scene
+from tests.training.test_segments import FRAMES, params, train
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
+    """A take, trained in one process."""
+    folder = tmp_path_factory.mktemp("workers")
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    train(scene, folder, processes=1)
+    return scene, folder
+
+
+@pytest.fixture
+def unfitted(serial: tuple[Scene, Path], tmp_path: Path) -> Path:
+    """The take with its base and no segment."""
+    shutil.copytree(serial[1], tmp_path / "take")
+    for path in (tmp_path / "take" / "checkpoints" / "take").glob("segment-*"):
+        path.unlink()
+    return tmp_path / "take"
+
+
+class Fit:
+    """The segments of a take, fitted in two processes."""
+
+    def __init__(self, folder: Path, tell: Callable[[Workers], object] = lambda workers: None) -> None:
+        scene = read_scene(folder / "scene")
+        place = folder / "checkpoints" / "take"
+        self.plan = plan_take(scene, params(), forecast(scene, params()).key_frames or 1)
+        self.base: Base = base_of(self.plan, scene, params(), place, folder / "log")
+        fitting = Fitting(scene, params(), self.base.folder, self.base.fingerprint, place)
+        self.frames, self.done = 0, list[Segment]()
+        self.tell = tell
+        self.workers = Workers(fitting, self.base, 2, 1, self._frames, self.done.append)
+
+    def _frames(self, more: int) -> None:
+        self.frames += more
+        self.tell(self.workers)
+
+    def run(self) -> None:
+        self.workers.fit(self.plan.segments)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Of a model and its log, without times."""
+    found = {
+        str(path.relative_to(folder)): path.read_bytes()
+        for part in ("model", "log")
+        for path in sorted((folder / part).rglob("*"))
+        if path.is_file() and path.name != "training.json"
+    }
+    assert {"model/segments/00002.safetensors", "log/plots/metrics/segment_psnr.tsv"} <= found.keys()
+    return found
+
+
+def without_times(files: dict[str, bytes]) -> dict[str, bytes]:
+    """dvclive notes the moment of each line in front of it."""
+    return {
+        name: b"\n".join(line.split(b"\t", 1)[-1] for line in content.split(b"\n"))
+        if name.endswith(".tsv")
+        else content
+        for name, content in files.items()
+    }
+
+
+def test_processes_make_the_same_files(serial: tuple[Scene, Path], unfitted: Path) -> None:
+    shutil.rmtree(unfitted / "model")
+    train(read_scene(unfitted / "scene"), unfitted, processes=2)
+    assert without_times(files(unfitted)) == without_times(files(serial[1]))
+
+
+def test_a_lost_workers_segment_is_run_again(serial: tuple[Scene, Path], unfitted: Path) -> None:
+    killed: list[int] = []
+
+    def kill(workers: Workers) -> None:
+        if not killed:
+            killed.append(workers.workers[0].process.pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    fit = Fit(unfitted, kill)
+    fit.run()
+    assert killed
+    assert sorted(segment.number for segment in fit.done) == [0, 1, 2]
+    assert fit.frames == FRAMES
+    made = {path.name: path.read_bytes() for path in (unfitted / "checkpoints" / "take").glob("segment-*")}
+    assert made == {path.name: path.read_bytes() for path in (serial[1] / "checkpoints" / "take").glob("segment-*")}
+
+
+def test_a_segment_that_loses_two_workers_is_named(unfitted: Path) -> None:
+    def kill(workers: Workers) -> None:
+        for worker in workers.workers:
+            if worker.segment is not None and worker.segment.number == 0:
+                worker.process.kill()
+
+    fit = Fit(unfitted, kill)
+    with pytest.raises(UserError, match="segment 1"):
+        fit.run()
+
+
+def test_an_error_ends_all_processes(unfitted: Path) -> None:
+    def interrupt(workers: Workers) -> None:
+        raise KeyboardInterrupt
+
+    fit = Fit(unfitted, interrupt)
+    before = set(psutil.Process().children())
+    with pytest.raises(KeyboardInterrupt):
+        fit.run()
+    assert not set(psutil.Process().children()) - before
+
+
+def test_what_a_user_can_mend_comes_back(unfitted: Path) -> None:
+    fit = Fit(unfitted)
+    (fit.base.folder / "surroundings.safetensors").write_bytes(b"")
+    with pytest.raises(UserError, match="surroundings"):
+        fit.run()
+
+
+def test_processes_are_as_many_as_work_and_memory_allow(
+    serial: tuple[Scene, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = serial[0]
+    monkeypatch.setattr("numba.get_num_threads", lambda: 8)
+    long, texels = params(steps=1000), 10**5
+    room = psutil.virtual_memory()._replace(available=10**12)
+    monkeypatch.setattr("psutil.virtual_memory", lambda: room)
+    assert processes_for(scene, long, texels, 20, 240) == 8
+    assert processes_for(scene, long, texels, 3, 36) == 3
+    assert processes_for(scene, params(steps=1), texels, 20, 20) == 1
+    assert processes_for(scene, params(processes=5), 1, 20, 20) == 5
+    room = room._replace(available=2 * 10**9)
+    assert processes_for(scene, long, texels, 20, 240) == 2
+    assert processes_for(scene, long, 10**8, 20, 240) == 1
