@@ -162,7 +162,20 @@ def run(project_root: Path, *arguments: str) -> subprocess.CompletedProcess[str]
 
 def test_a_still(caps: Asset, tmp_path: Path, project_root: Path) -> None:
     out = tmp_path / "still.png"
-    look = ["--azimuth", "20", "--frame", "1", "--size", "80x60", "--samples", "1", "--background", "#336699"]
+    look = [
+        "--azimuth",
+        "20",
+        "--distance",
+        "1",
+        "--frame",
+        "1",
+        "--size",
+        "80x60",
+        "--samples",
+        "1",
+        "--background",
+        "#336699",
+    ]
     done = run(project_root, str(caps.folder), "--out", str(out), *look)
     assert done.returncode == 0, done.stderr
     camera = camera_of(Eye(azimuth=20), 80, 60, 30)
