@@ -32,6 +32,7 @@ from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.files import atomic_folder, file_sha256
@@ -160,12 +161,20 @@ class LevelContent:
         """The layers' textures, N of (h, w, 4)."""
         return [layer.cut(self.textures.image(layer.source, index)) for layer in self.layers]
 
-    def encode(self, path: Path, codec: Codec, params: VideoSettings, crf: int, frames: int | None = None) -> None:
+    def encode(
+        self,
+        path: Path,
+        codec: Codec,
+        params: VideoSettings,
+        crf: int,
+        frames: int | None = None,
+        regions: Sequence[Region] = (),
+    ) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
         pictures = (pack_frame(self.frame(index), layout) for index in range(count))
         size = (layout.width, layout.height)
-        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf))
+        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf), regions)
 
 
 def write_level(
@@ -175,12 +184,14 @@ def write_level(
     params: AssetSettings,
     crfs: Mapping[CodecName, int] | None = None,
     shared: Level | None = None,
+    regions: Sequence[Region] = (),
 ) -> Level:
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
     Args:
         crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
         shared: a level of the same layers whose meshes are this one's, too.
+        regions: of the picture, coded finer or coarser.
 
     Raises:
         UserError: if the textures do not fit into one video, or an encoder refuses them.
@@ -198,7 +209,7 @@ def write_level(
         # Two codecs may share a container: the first has the plain name.
         path = path if not path.exists() else path.with_name(f"{name}_{codec.name}.{codec.container}")
         crf = codec.crf(params.video.crf) if crfs is None else crfs[codec.name]
-        content.encode(path, codec, params.video, crf)
+        content.encode(path, codec, params.video, crf, regions=regions)
         videos.append(_video_entry(path, codec))
     texture = Texture(
         width=layout.width,
