@@ -41,27 +41,7 @@ def content(textures: Waves, frames: int = 1) -> LevelContent:
     return LevelContent(layers, textures, frames, RATE)
 
 
-@pytest.mark.parametrize("layer", range(LAYERS))
-@pytest.mark.parametrize("alpha", [False, True])
-def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool) -> None:
-    """Against pictures by the reference renderer of textures with one square of 16 x 16 texels changed."""
-    full, camera = content(Waves()), cameras()[0]
-    hits = AssetCaster(full_asset := _Shown(full)).cast(camera)
-    step, channels = (8, slice(3, 4)) if alpha else (20, slice(0, 3))
-    low, high = (composite(hits, content(Changed(layer, channels, by)).frame(0))[0] for by in (-step, step))
-    squares = float(((high.astype(float) - low) ** 2).mean(-1).sum()) * (255 / (2 * step)) ** 2
-    # In the picture, the changed square; blocks that it lies across.
-    layout, crop = full.layout, full.layers[layer].crop
-    x, y = layout.rects[layer][0] + 28 - crop[0], layout.rects[layer][1] + 28 - crop[1]
-    y += layout.alpha_rect[1] if alpha else 0
-    params = AttentionParams(cameras=1, frames=1, rays_per_camera=10**6)
-    weights = np.kron(block_weights(full, [camera], params), np.ones((MACROBLOCK, MACROBLOCK)))
-    assert len(full_asset.layers) == LAYERS
-    # A change of many texels at once adds up before it is squared, that of one texel is shared by up to four.
-    assert 0.3 * squares < weights[y : y + 16, x : x + 16].sum() < 3 * squares
-
-
-class _Shown:
+class Shown:
     """What the reference renderer needs of a content."""
 
     def __init__(self, full: LevelContent) -> None:
@@ -70,6 +50,25 @@ class _Shown:
 
     def frame(self, k: int, /) -> list[np.ndarray]:
         return self._full.frame(k)
+
+
+@pytest.mark.parametrize("layer", range(LAYERS))
+@pytest.mark.parametrize("alpha", [False, True])
+def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool) -> None:
+    """Against pictures by the reference renderer of textures with one square of 16 x 16 texels changed."""
+    full, camera = content(Waves()), cameras()[0]
+    hits = AssetCaster(Shown(full)).cast(camera)
+    step, channels = (8, slice(3, 4)) if alpha else (20, slice(0, 3))
+    low, high = (composite(hits, content(Changed(layer, channels, by)).frame(0))[0] for by in (-2 * step, 0))
+    squares = float(((high.astype(float) - low) ** 2).mean(-1).sum()) * (255 / (2 * step)) ** 2
+    # In the picture, the changed square; blocks that it lies across.
+    layout, crop = full.layout, full.layers[layer].crop
+    x, y = layout.rects[layer][0] + 28 - crop[0], layout.rects[layer][1] + 28 - crop[1]
+    y += layout.alpha_rect[1] if alpha else 0
+    params = AttentionParams(cameras=1, frames=1, rays_per_camera=10**6)
+    weights = np.kron(block_weights(full, [camera], params), np.ones((MACROBLOCK, MACROBLOCK)))
+    # Blocks lie across the square's border, and the reference shares a pixel among four texels. Seen: 1.02 to 1.05.
+    assert weights[y : y + 16, x : x + 16].sum() == pytest.approx(squares, rel=0.15)
 
 
 def test_a_fourth_of_the_weight_is_four_steps_and_the_least_counts() -> None:
