@@ -19,16 +19,15 @@ Array = NDArray[Any]
 _scatter = scatter_of(4)
 
 
-ONE = np.uint64(1)
-"""Texels are numbered without a sign: numba then need not ask whether an index counts from the end."""
-
-
 @inlined
 def rgba_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
-    """Channel q of layer n, bilinear, between the texels (i, j), uint64, and (i + 1, j + 1)."""
-    one = np.float32(1.0)
-    top = texture[i, j, n, q] * (one - b) + texture[i, j + ONE, n, q] * b
-    bottom = texture[i + ONE, j, n, q] * (one - b) + texture[i + ONE, j + ONE, n, q] * b
+    """Channel q of layer n, bilinear, between the texels (i, j) and (i + 1, j + 1).
+
+    i, j, n are uint64: numba then need not ask whether an index counts from the end.
+    """
+    one, i1, j1 = np.float32(1.0), i + np.uint64(1), j + np.uint64(1)
+    top = texture[i, j, n, q] * (one - b) + texture[i, j1, n, q] * b
+    bottom = texture[i1, j, n, q] * (one - b) + texture[i1, j1, n, q] * b
     return top * (one - a) + bottom * a
 
 

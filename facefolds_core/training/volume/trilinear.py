@@ -11,13 +11,13 @@ import numpy as np
 
 from facefolds_core.jit import add4, inlined
 
-ONE = np.uint64(1)
-"""Voxels are numbered without a sign: numba then need not ask whether an index counts from the end."""
-
 
 @inlined
 def cell(grid, x, y, z):  # type: ignore[no-untyped-def]
-    """Lower corner (uint64) and fractions (float32) of voxel coordinates (x, y, z), clamped to the grid."""
+    """Lower corner (uint64) and fractions (float32) of voxel coordinates (x, y, z), clamped to the grid.
+
+    Voxels are numbered without a sign: numba then need not ask whether an index counts from the end.
+    """
     i = max(min(int(x), grid.shape[0] - 2), 0)
     j = max(min(int(y), grid.shape[1] - 2), 0)
     k = max(min(int(z), grid.shape[2] - 2), 0)
@@ -39,15 +39,16 @@ def weights(fx, fy, fz):  # type: ignore[no-untyped-def]
 @inlined
 def value(grid, i, j, k, w, q):  # type: ignore[no-untyped-def]
     """Channel q of grid (X, Y, Z, 4) in the cell (i, j, k), at the point of weights w."""
+    i1, j1, k1 = i + np.uint64(1), j + np.uint64(1), k + np.uint64(1)
     return (
         w[0] * grid[i, j, k, q]
-        + w[1] * grid[i, j, k + ONE, q]
-        + w[2] * grid[i, j + ONE, k, q]
-        + w[3] * grid[i, j + ONE, k + ONE, q]
-        + w[4] * grid[i + ONE, j, k, q]
-        + w[5] * grid[i + ONE, j, k + ONE, q]
-        + w[6] * grid[i + ONE, j + ONE, k, q]
-        + w[7] * grid[i + ONE, j + ONE, k + ONE, q]
+        + w[1] * grid[i, j, k1, q]
+        + w[2] * grid[i, j1, k, q]
+        + w[3] * grid[i, j1, k1, q]
+        + w[4] * grid[i1, j, k, q]
+        + w[5] * grid[i1, j, k1, q]
+        + w[6] * grid[i1, j1, k, q]
+        + w[7] * grid[i1, j1, k1, q]
     )
 
 
@@ -67,16 +68,14 @@ def sample(grid, x, y, z):  # type: ignore[no-untyped-def]
 @inlined
 def put(gradient: Any, touched: Any, i: Any, j: Any, k: Any, w: Any, g: Any) -> None:
     """Add g, of raw density and rgb, to the voxels of the cell (i, j, k) by the weights w; say so in touched (X, Y)."""
-    touched[i, j] = True
-    touched[i, j + ONE] = True
-    touched[i + ONE, j] = True
-    touched[i + ONE, j + ONE] = True
+    i1, j1, k1 = i + np.uint64(1), j + np.uint64(1), k + np.uint64(1)
+    touched[i, j], touched[i, j1], touched[i1, j], touched[i1, j1] = True, True, True, True
     g0, g1, g2, g3 = g
     add4(gradient, (i, j, k), w[0] * g0, w[0] * g1, w[0] * g2, w[0] * g3)
-    add4(gradient, (i, j, k + ONE), w[1] * g0, w[1] * g1, w[1] * g2, w[1] * g3)
-    add4(gradient, (i, j + ONE, k), w[2] * g0, w[2] * g1, w[2] * g2, w[2] * g3)
-    add4(gradient, (i, j + ONE, k + ONE), w[3] * g0, w[3] * g1, w[3] * g2, w[3] * g3)
-    add4(gradient, (i + ONE, j, k), w[4] * g0, w[4] * g1, w[4] * g2, w[4] * g3)
-    add4(gradient, (i + ONE, j, k + ONE), w[5] * g0, w[5] * g1, w[5] * g2, w[5] * g3)
-    add4(gradient, (i + ONE, j + ONE, k), w[6] * g0, w[6] * g1, w[6] * g2, w[6] * g3)
-    add4(gradient, (i + ONE, j + ONE, k + ONE), w[7] * g0, w[7] * g1, w[7] * g2, w[7] * g3)
+    add4(gradient, (i, j, k1), w[1] * g0, w[1] * g1, w[1] * g2, w[1] * g3)
+    add4(gradient, (i, j1, k), w[2] * g0, w[2] * g1, w[2] * g2, w[2] * g3)
+    add4(gradient, (i, j1, k1), w[3] * g0, w[3] * g1, w[3] * g2, w[3] * g3)
+    add4(gradient, (i1, j, k), w[4] * g0, w[4] * g1, w[4] * g2, w[4] * g3)
+    add4(gradient, (i1, j, k1), w[5] * g0, w[5] * g1, w[5] * g2, w[5] * g3)
+    add4(gradient, (i1, j1, k), w[6] * g0, w[6] * g1, w[6] * g2, w[6] * g3)
+    add4(gradient, (i1, j1, k1), w[7] * g0, w[7] * g1, w[7] * g2, w[7] * g3)
