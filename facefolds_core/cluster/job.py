@@ -128,28 +128,32 @@ def do(job: Job, run: str) -> Outcome:
         files: dict[str, str] = {}
         if job.part and not status:
             tell("Running stage 'train'")
-            status, said = shell.python(
-                "facefolds_core.training.segments.part", "--subject", job.subject, "--part", job.part
-            )
+            status, said, files = _make_part(shell, place, job, pull)
             log += said
-            if not status:
-                made = made_by(place, job.part)
-                status, said = shell.dvc(*keep(place, root, made, pull))
-                files, log = read_pointers(place, made), log + said
         metrics = root / "data" / job.subject / "metrics.json"
         return Outcome(
             job,
             error=_last_lines(log) if status else "",
             seconds=time.perf_counter() - start,
             host=socket.gethostname(),
-            ran=tuple(stage for stage in RUNNING.findall(log) if stage != "configure")
-            or ((job.part,) if job.part else ()),
+            ran=(*(stage for stage in RUNNING.findall(log) if stage != "configure"), *filter(None, [job.part])),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,
             lock="" if status else (root / LOCK).read_text(encoding="utf-8"),
-            files={} if status else files,
+            files=files,
             plan=json.loads((place / PLAN).read_text(encoding="utf-8")) if job.part == BASE and not status else None,
         )
+
+
+def _make_part(shell: _Shell, place: Path, job: Job, push: bool) -> tuple[int, str, dict[str, str]]:
+    """Exit status, what was said, and `Outcome.files`."""
+    module = "facefolds_core.training.segments.part"
+    status, log = shell.python(module, "--subject", job.subject, "--part", job.part)
+    if status:
+        return status, log, {}
+    made = made_by(place, job.part)
+    status, said = shell.dvc(*keep(place, shell.root, made, push))
+    return status, log + said, {} if status else read_pointers(place, made)
 
 
 def _environment(worker: Any, job: Job) -> dict[str, str]:

@@ -67,6 +67,8 @@ class Parts:
     def _segments(self, name: str, outcome: Outcome) -> list[Job]:
         """Those that are not known, or, where there is none, the subject."""
         plan = outcome.plan or {"segments": []}
+        # What the base's job recorded of the scene is there for the others.
+        self.whole[name] = replace(self.whole[name], lock=outcome.lock or self.whole[name].lock)
         segments = plan["segments"]
         needed = {PLAN, plan["folder"]} if segments else set[str]()
         files = {file: text for file, text in self.known[name].items() if file in needed}
