@@ -88,7 +88,7 @@ class _Take:
         paths = [cache.path(frames) for frames in segments]
         cache.keep_only(paths)
         for other in self.folder.glob("base-*"):
-            if other != base.folder:
+            if other != base.folder and other.is_dir():  # no pointer of DVC's
                 shutil.rmtree(other)
         return self._trained(base, paths, psnr)
 
