@@ -2,9 +2,9 @@
 
 python -m bench.takes FOLDER [--frames 60,240,960]
 
-The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own. Memory is anonymous
-memory, of the process and its children (two fit segments) together, at most: pages of mapped files can be taken back at any time, and are
-not counted.
+The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own; two more fit
+segments. Memory is anonymous memory, of the process and its children together, at most: pages of mapped files can be
+taken back at any time, and are not counted.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -30,9 +31,10 @@ def result(root: Path) -> dict[str, bytes]:
 def fitting(worker: subprocess.Popen[bytes]) -> bool:
     """Whether a segment has been under way there for some seconds."""
     for process in psutil.Process(worker.pid).children(recursive=True):
-        words = process.cmdline()
-        if "--part" in words and words[-1] != "base" and sum(process.cpu_times()[:2]) > 6:
-            return True
+        with suppress(psutil.Error):  # it has ended
+            words = process.cmdline()
+            if "--part" in words and words[-1] != "base" and sum(process.cpu_times()[:2]) > 6:
+                return True
     return False
 
 
