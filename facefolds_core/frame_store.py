@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
+from threading import local
 
 import numpy as np
 import pyarrow as pa
@@ -107,6 +108,13 @@ class Places:
         return Places(keys, self.offsets[taken], self.sizes[taken], self.after[taken])
 
 
+class _Last(local):
+    """The image of each index that was unpacked last, on each thread: threads read at different places."""
+
+    def __init__(self) -> None:
+        self.images: dict[int, tuple[int, Image]] = {}
+
+
 class FrameStore:
     """Read-only, memory-mapped view of a file of `write_frames`.
 
@@ -136,7 +144,7 @@ class FrameStore:
                 raise (no_memory(path) if error.errno == errno.ENOMEM else disk_error(error, path)) from None
             raise UserError("damaged frame store", file=path, found=str(error), remedy=remake(path)) from None
         self.height, self.width, self.channels = shape
-        self._last: dict[int, tuple[int, Image]] = {}
+        self._last = _Last()
 
     def __contains__(self, key: tuple[int, int]) -> bool:
         return self._places.find(*key) >= 0
@@ -178,7 +186,7 @@ class FrameStore:
     def _unpacked(self, index: int, frame: int) -> Image:
         """An image, by way of those that it is a difference from; the last one of each index is kept."""
         shape, places = (self.height, self.width, self.channels), self._places
-        last, image = self._last.get(index, (-1, None))
+        last, image = self._last.images.get(index, (-1, None))
         chain: list[int] = []
         at = frame
         while at >= 0 and at != last:
@@ -199,7 +207,7 @@ class FrameStore:
             ) from None
         assert image is not None
         image.flags.writeable = False
-        self._last[index] = (frame, image)
+        self._last.images[index] = (frame, image)
         return image
 
 

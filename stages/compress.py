@@ -30,7 +30,7 @@ def compress(folders: SubjectFolders) -> str:
         coarser={r: read_meshes(folders.meshes / f"level_{r}.npz") for r in resolutions},
         reflection=read_reflection_maps(grids),
     )
-    manifest = package(folders.asset, export, scene, params)
+    manifest = package(folders.asset, export, scene, params, folders.checkpoints / "encoded")
     level = manifest.full
     glb_frame = params.glb.frame * (level.texture.frames // scene.num_frames)
     write_glb(folders.glb, read_level(folders.asset, level), scene.subject, glb_frame, params.glb.draco)

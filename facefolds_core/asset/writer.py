@@ -31,6 +31,7 @@ from facefolds_core.asset.manifest import (
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
+from facefolds_core.asset.parts import Filmed, Parts, encode_parts
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
@@ -130,6 +131,9 @@ class LevelContent:
         fps: frames a second; 0 for a static scene.
         unit: the layout can be scaled down by it and its divisors; one of the crops' numbers.
         placed: the layout, where it is not to be chosen.
+        parts: where encoded parts of its videos are kept; None encodes all anew, in one go.
+        part_frames: frames that are encoded by themselves, each a group of pictures; 0: all of them at once.
+        originals: what the textures are made of, where they are resampled.
     """
 
     layers: Sequence[CroppedLayer]
@@ -138,6 +142,9 @@ class LevelContent:
     fps: float
     unit: int = 1
     placed: AtlasLayout | None = None
+    parts: Parts | None = None
+    part_frames: int = 0
+    originals: Textures | None = None
 
     @cached_property
     def layout(self) -> AtlasLayout:
@@ -163,9 +170,27 @@ class LevelContent:
     def encode(self, path: Path, codec: Codec, params: VideoSettings, crf: int, frames: int | None = None) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
-        pictures = (pack_frame(self.frame(index), layout) for index in range(count))
-        size = (layout.width, layout.height)
-        encode_video(path, pictures, size, self.rate, codec, codec.options(params, crf))
+        size, options = (layout.width, layout.height), codec.options(params, crf)
+        if self.parts is None:
+            pictures = (pack_frame(self.frame(index), layout) for index in range(count))
+            encode_video(path, pictures, size, self.rate, codec, options)
+            return
+        step = self.part_frames if self.part_frames and frames is None else count
+        borders = [*range(0, count, step), count]
+        encode_parts(path, self._filmed(), borders, codec, options, self.parts)
+
+    def _filmed(self) -> Filmed:
+        layout, textures = self.layout, self.originals or self.textures
+        used = [layer.source for layer in self.layers]
+        side = self.textures.image(used[0], 0).shape[0]
+        made = repr(([layer.crop for layer in self.layers], used, layout.rects, layout.unit, side))
+        return Filmed(
+            picture=lambda k: pack_frame(self.frame(k), layout),
+            sources=lambda k: (textures.image(layer, k) for layer in used),
+            size=(layout.width, layout.height),
+            rate=self.rate,
+            made=made,
+        )
 
 
 def write_level(

@@ -8,11 +8,14 @@ pixels. For each channel of each texel, over the frames,
 is made least. y are the codes (of 255) as they were baked; W says how much the texel shows: the mean over the training
 cameras of the sum over the pixels of (dC/dx)^2, so that the first term is an error summed over the pixels of a picture.
 What shows follows its frames; what does not stays constant, and what lies between moves in few steps.
+
+A long take is held in overlapping windows. At once, a frame that is trained again would change a texel or two of all
+others, and every video segment would have to be encoded again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -50,23 +53,60 @@ def texel_weights(
     return weights
 
 
+def parts(count: int, window: int) -> list[tuple[range, range]]:
+    """How a take of `count` frames is held: each frame in one part, and the frames around it that are held with it.
+
+    A take of at most `window` frames is one part. Else a part is half a window, with a quarter before and after: what
+    changes in a frame changes what is held of the frames near it, not of all.
+    """
+    if count <= window:
+        return [(range(count), range(count))]
+    step, margin = max(1, window // 2), window // 4
+    own = [range(first, min(first + step, count)) for first in range(0, count, step)]
+    return [(part, range(max(0, part.start - margin), min(count, part.stop + margin))) for part in own]
+
+
 def held_rows(
     textures: FrameStore,
     weights: NDArray[np.float32],
     price: float,
     folder: Path,
     memory: int,
+    window: int = _USUAL.hold_window,
     progress: bool = True,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-    """All textures, held, layer by layer.
+    """All textures, held: part by part, and in each layer by layer.
 
     Args:
-        folder: where all frames of one layer lie meanwhile, if `memory` (bytes) cannot hold them.
+        folder: where all frames of one layer and window lie meanwhile, if `memory` (bytes) cannot hold them.
+        window: frames that are held together.
 
     Yields:
         (layer, frame, (S, S, 4) uint8).
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
+    made = parts(len(frames), window)
+    with progress_bar(total=len(made) * len(layers), desc="hold", unit="layer", disable=not progress) as bar:
+        for own, around in made:
+            for layer in layers:
+                shown = [frames[k] for k in around]
+                held = _held_layer(textures, layer, shown, weights[layer], price, folder, memory)
+                for position, image in enumerate(held, around.start):
+                    if position in own:
+                        yield layer, frames[position], image
+                bar.update()
+
+
+def _held_layer(
+    textures: FrameStore,
+    layer: int,
+    frames: Sequence[int],
+    weights: NDArray[np.float32],
+    price: float,
+    folder: Path,
+    memory: int,
+) -> Iterator[NDArray[np.uint8]]:
+    """Some frames of a layer, held together."""
     shape = (len(frames), textures.height, textures.width, 4)
     rows = max(1, min(textures.height, memory // (len(frames) * textures.width * 4)))
     with TemporaryDirectory(dir=folder, prefix=".hold-") as scratch:
@@ -75,12 +115,10 @@ def held_rows(
             if rows == textures.height
             else np.memmap(Path(scratch) / "layer", np.uint8, "w+", shape=shape)
         )
-        for layer in progress_bar(layers, desc="hold", unit="layer", disable=not progress):
-            for position, frame in enumerate(frames):
-                images[position] = textures.image(layer, frame)
-            for top in range(0, textures.height, rows):
-                block = np.ascontiguousarray(images[:, top : top + rows])
-                hold(block, np.ascontiguousarray(weights[layer, top : top + rows]), price)
-                images[:, top : top + rows] = block
-            for frame, image in zip(frames, images, strict=True):
-                yield layer, frame, image
+        for position, frame in enumerate(frames):
+            images[position] = textures.image(layer, frame)
+        for top in range(0, textures.height, rows):
+            block = np.ascontiguousarray(images[:, top : top + rows])
+            hold(block, np.ascontiguousarray(weights[top : top + rows]), price)
+            images[:, top : top + rows] = block
+        yield from images

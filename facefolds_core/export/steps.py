@@ -132,7 +132,7 @@ def bake(
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
         weights = texel_weights(rays, baked, len(cameras), params)
-        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20)
+        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20, params.hold_window)
         write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
         baked.path.unlink()
     return len(rays)

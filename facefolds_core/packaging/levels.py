@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +15,34 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import CompressParams, LevelParams
 
-MOST_KEPT = 1024
-"""Textures: of some hundred frames, so that a long take does not fill the memory."""
+MOST_KEPT = 768
+"""Textures: of 64 frames of 12 layers, so that a long take takes no more memory than a short one."""
 
 
 class Resampled:
-    """Textures at another size, by least squares (export/textures.py); what was asked for last is kept."""
+    """Textures at another size, by least squares (export/textures.py); what was asked for last is kept.
 
-    def __init__(self, textures: Textures, size: int) -> None:
-        self._textures, self._size = textures, size
+    Args:
+        most: so many are kept.
+    """
+
+    def __init__(self, textures: Textures, size: int, most: int = MOST_KEPT) -> None:
+        self._textures, self._size, self._most = textures, size, most
         self._kept: dict[tuple[int, int], NDArray[np.uint8]] = {}
+        self._lock = Lock()
 
     def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
         """(size, size, 4)."""
-        key = layer, frame
-        if key not in self._kept:
-            if len(self._kept) >= MOST_KEPT:
+        found = self._kept.get((layer, frame))
+        if found is not None:
+            return found
+        found = resample(self._textures.image(layer, frame), self._size)
+        with self._lock:
+            while self._kept and len(self._kept) >= self._most:
                 del self._kept[next(iter(self._kept))]
-            self._kept[key] = resample(self._textures.image(layer, frame), self._size)
-        return self._kept[key]
+            if self._most:
+                self._kept[layer, frame] = found
+        return found
 
 
 def coarse_content(
@@ -47,7 +57,7 @@ def coarse_content(
     size = min(level.texture_resolution, 3 * full.textures.image(0, 0).shape[0] // 4)
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
-    return LevelContent(layers, textures, full.frames, full.fps)
+    return LevelContent(layers, textures, full.frames, full.fps, parts=full.parts, originals=full.textures)
 
 
 def level_params(params: CompressParams, level: LevelParams) -> CompressParams:

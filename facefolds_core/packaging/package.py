@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import Level, Manifest
 from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
+from facefolds_core.asset.parts import Parts
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.writer import (
@@ -42,6 +45,7 @@ from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.views import spread, training_cameras
 from facefolds_core.params import CompressParams, LevelParams
+from facefolds_core.source_code import digest_of_packages
 
 
 @dataclass(frozen=True)
@@ -78,8 +82,11 @@ class Export:
         return cls(meshes, windows, FrameStore(textures), (x, y, z), coarser, grids.reflection)
 
 
-def package(folder: Path, export: Export, scene: Scene, params: CompressParams) -> Manifest:
+def package(folder: Path, export: Export, scene: Scene, params: CompressParams, kept: Path | None = None) -> Manifest:
     """Write the folder of an asset, whole or not at all; an older one is replaced.
+
+    Args:
+        kept: folder of what an earlier run encoded, from which is taken over what would be the same; or None.
 
     Raises:
         UserError: if the export cannot be an asset.
@@ -92,13 +99,14 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
     cameras = training_cameras(scene)
     with (
         atomic_folder(folder) as temporary,
+        kept_parts(kept, temporary, params) as parts,
         at_frame_rate(export.textures, factor, temporary, params.between) as textures,
     ):
         rate = source.fps * factor
         streamed = is_streamed(params.stream, frames * factor, rate)
         unit = stream_unit(params.levels, textures.image(0, 0).shape[0]) if streamed else 1
         layers = crop_layers(export.meshes, export.windows, textures, frames * factor, unit)
-        full = LevelContent(layers, textures, frames * factor, rate, unit)
+        full = LevelContent(layers, textures, frames * factor, rate, unit, parts=parts)
         meter = make_meter(full, cameras, params)
         levels = []
         if streamed:
@@ -119,6 +127,16 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
             made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
             manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
         return write_manifest(manifest, temporary / MANIFEST_NAME)
+
+
+@contextmanager
+def kept_parts(kept: Path | None, scratch: Path, params: CompressParams) -> Iterator[Parts]:
+    """Encoded parts in `kept`, of which those that this run needs stay; or in a folder of `scratch` that goes."""
+    common = digest_of_packages("asset", "packaging", "export").encode()
+    with TemporaryDirectory(dir=scratch, prefix=".parts-") if kept is None else nullcontext(kept) as folder:
+        parts = Parts(Path(folder), common, params.stream.megabytes << 20)
+        yield parts
+        parts.tidy()
 
 
 def _check_order(levels: Sequence[LevelParams]) -> None:

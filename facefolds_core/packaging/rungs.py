@@ -48,6 +48,7 @@ def write_rungs(
     """Write the levels of a stream, coarsest first, the full one last; their key frames are `segment_seconds` apart."""
     interval = max(1, round(params.stream.segment_seconds * full.rate))
     params = params.model_copy(update={"video": params.video.model_copy(update={"keyframe_interval": interval})})
+    full = replace(full, part_frames=interval)
     finest = coded_level(folder, FULL, full, params, meter, cameras)
     resolution = full.textures.image(full.layers[0].source, 0).shape[0]
     levels = []
@@ -60,10 +61,11 @@ def write_rungs(
 
 def _smaller(full: LevelContent, factor: int, resolution: int) -> LevelContent:
     """The same layers in pictures with a `factor`-th of the pixels a side."""
-    textures = full.textures if factor == 1 else Resampled(full.textures, resolution // factor)
+    textures = full.textures if factor == 1 else Resampled(full.textures, resolution // factor, most=0)
     layers = []
     for layer in full.layers:
         x, y, width, height = layer.crop
         crop = x // factor, y // factor, width // factor, height // factor
         layers.append(replace(layer, crop=crop))
-    return replace(full, layers=layers, textures=textures, unit=full.unit // factor, placed=full.layout.scaled(factor))
+    placed, unit = full.layout.scaled(factor), full.unit // factor
+    return replace(full, layers=layers, textures=textures, unit=unit, placed=placed, originals=full.textures)

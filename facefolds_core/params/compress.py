@@ -118,6 +118,9 @@ class StreamParams(Section):
     segment_seconds: Annotated[float, Field(ge=0.1, le=60)] = 2.0
     """Of a segment, rounded to whole frames: short ones switch and seek faster, long ones are smaller."""
 
+    megabytes: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
+    """Memory for encoders: segments are encoded side by side, as many as it holds."""
+
 
 class BetweenParams(Section):
     """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""

@@ -140,8 +140,12 @@ class BakeParams(Section):
     """How dear a change of a texel from one frame to the next is, against the error that keeping still makes in
     training views (export/hold.py); larger values make smaller videos. 0 lets all texels tremble."""
 
+    hold_window: Annotated[int, Field(ge=4, le=1_000_000)] = 96
+    """Frames that are held together, at most: longer takes are held in overlapping windows, so that a frame that
+    changes changes only those near it. Of each, the inner half counts."""
+
     hold_megabytes: Count = 32
-    """Memory for all frames of one layer while they are held; longer takes go through a file, block by block."""
+    """Memory for a window's frames of one layer while they are held; larger ones go through a file, block by block."""
 
     hold_frames: Count = 6
     """Frames, evenly spread, in which it is looked how much a texel shows; the greatest counts."""

@@ -51,7 +51,13 @@ def filmed(folder: Path) -> Scene:
     return scene
 
 
-def packaged(folder: Path, scene: Scene, section: dict[str, Any], reflection: ReflectionMaps | None = None) -> None:
+def packaged(
+    folder: Path,
+    scene: Scene,
+    section: dict[str, Any],
+    reflection: ReflectionMaps | None = None,
+    kept: Path | None = None,
+) -> None:
     """Package the caps with the section `compress`."""
     store = folder.with_name("textures.arrow")
     textures = write_store(store, np.stack([cap_textures(LAYERS, frame, R) for frame in range(FRAMES)]))
@@ -61,4 +67,4 @@ def packaged(folder: Path, scene: Scene, section: dict[str, Any], reflection: Re
 
     levels = {level["mesh_resolution"] for level in section.get("levels", ())}
     export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels}, reflection)
-    package(folder, export, scene, CompressParams.model_validate(section))
+    package(folder, export, scene, CompressParams.model_validate(section), kept)

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from facefolds_core.export.bake_kernel import render
-from facefolds_core.export.hold import held_rows, texel_weights
+from facefolds_core.export.hold import held_rows, parts, texel_weights
 from facefolds_core.export.hold_kernel import add_weights, steady
 from facefolds_core.frame_store import FrameStore, write_frames
 
@@ -81,3 +81,40 @@ def test_what_shows_moves_and_what_does_not_stays(memory: int, tmp_path: Path) -
     assert (found[0] == textures[0]).mean() > 0.99
     assert (found[1] == found[1, :1]).all()
     assert np.abs(found[1, 0] - textures[1].mean(0)).max() <= 0.5
+
+
+@pytest.mark.parametrize(("count", "window"), [(1, 96), (96, 96), (97, 96), (500, 96), (11, 4), (7, 6)])
+def test_each_frame_is_held_once_among_those_around_it(count: int, window: int) -> None:
+    found = parts(count, window)
+    assert [k for own, _ in found for k in own] == list(range(count))
+    assert all(len(around) <= window for _, around in found)
+    margin = window // 4
+    for own, around in found if count > window else []:
+        assert around.start == max(0, own.start - margin)
+        assert around.stop == min(count, own.stop + margin)
+
+
+def held(images: np.ndarray, folder: Path, window: int) -> np.ndarray:
+    """One layer of images (K, 8, 8, 4)."""
+    write_frames(folder / "t.arrow", (8, 8, 4), ((0, k, one) for k, one in enumerate(images)))
+    weights, store = np.full((1, 8, 8, 2), 0.2, np.float32), FrameStore(folder / "t.arrow")
+    rows = held_rows(store, weights, 1.0, folder, 1 << 20, window, progress=False)
+    return np.stack([image for _, _, image in rows])
+
+
+def test_a_frame_that_changes_changes_only_those_near_it(tmp_path: Path) -> None:
+    images = np.random.default_rng(3).integers(100, 104, (64, 8, 8, 4)).astype(np.uint8)
+    other = images.copy()
+    other[40] += 50
+    for window, touched in ((64, range(64)), (16, range(32, 48))):
+        changed = (held(images, tmp_path, window) != held(other, tmp_path, window)).any((1, 2, 3))
+        assert set(np.flatnonzero(changed)) <= set(touched)
+    whole = (held(images, tmp_path, 64) != held(other, tmp_path, 64)).any((1, 2, 3))
+    assert whole.sum() > 16  # at once it would reach farther
+
+
+def test_what_keeps_still_hardly_moves_where_windows_meet(tmp_path: Path) -> None:
+    images = np.random.default_rng(4).integers(98, 107, (64, 8, 8, 4)).astype(np.uint8)
+    steps = np.abs(np.diff(held(images, tmp_path, 32).astype(int), axis=0))
+    assert np.abs(np.diff(images.astype(int), axis=0)).mean() > 2
+    assert steps[15::16].mean() < 0.5  # of codes; seen 0.3

@@ -9,7 +9,15 @@ from __future__ import annotations
 from facefolds_core.asset.codecs import Codec, Stream, VideoSettings
 from facefolds_core.errors import UserError
 
-VP9_FIXED = {"b": "0", "deadline": "good", "cpu-used": "3", "row-mt": "0", "auto-alt-ref": "1", "lag-in-frames": "16"}
+VP9_FIXED = {
+    "b": "0",
+    "deadline": "good",
+    "cpu-used": "3",
+    "row-mt": "0",
+    "auto-alt-ref": "1",
+    "lag-in-frames": "16",
+    "sharpness": "7",  # a weak loop filter: ST-LPIPS .047 instead of .056 at equal bytes on mugsy, and 0.1 dB more
+}
 
 # Level, then the greatest: luma samples a second, samples a picture, kilobits a second, pixels a side
 # (webmproject.org/vp9/levels).
