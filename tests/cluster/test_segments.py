@@ -12,10 +12,11 @@ from pathlib import Path
 import psutil
 import pytest
 
+from facefolds_core.processes import THREADS as VARIABLES
 from tests.cluster.takes import make_take
 from tests.cluster.test_run import dask_cluster, environment, files_of
 
-THREADS = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+THREADS = dict.fromkeys(VARIABLES, "1")
 PATIENCE = 600.0
 """Seconds for each half."""
 
