@@ -33,4 +33,10 @@ def _level_and_mime(stream: Stream) -> tuple[str, str]:
     return f"{profile[2] / 10:g}", f'video/mp4; codecs="avc1.{profile.hex()}"'
 
 
-CODEC = Codec("h264", "libx264", "h264", "mp4", 51, _options, _level_and_mime)
+def _of_part(options: dict[str, str]) -> dict[str, str]:
+    """The first picture gets 1.5 times the bits. x264 gives key frames more than the pictures before them, but knows
+    none at the start; and what keeps still is copied from there: 8 % less bytes at equal PSNR than in one go."""
+    return options if "qp" in options else {**options, "x264-params": options["x264-params"] + ":zones=0,0,b=1.5"}
+
+
+CODEC = Codec("h264", "libx264", "h264", "mp4", 51, _options, _level_and_mime, of_part=_of_part, regions=True)
