@@ -2,10 +2,11 @@
 
 python -m bench.takes FOLDER [--frames 60,240,960]
 
-The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own. Memory is anonymous
-memory, of the process and its children together, at most: pages of mapped files can be taken back at any time, and are
-not counted. The shortest take is made once before, so that nothing is compiled while it is measured. At the end one
-frame in the middle of the longest take is changed, and its stages run once more: what did not change is taken over.
+The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own; two more fit
+segments. Memory is anonymous memory, of the process and its children together, at most: pages of mapped files can be
+taken back at any time, and are not counted. The shortest take is made once before, so that nothing is compiled while it
+is measured. At the end one frame in the middle of the longest take is changed, and its stages run once more: what did
+not change is taken over.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ WATCH = 0.1
 PARAMS: dict[str, Any] = {
     "capture": {"cameras": 6, "height": 64, "width": 48},
     "normalize": {},
-    "train": {"preset": "fast", "segments": {"key_frames": 16}},
+    "train": {"preset": "fast", "segments": {"key_frames": 16, "processes": 2}},
     "sample": {"resolution": 128},
     "reconstruct": {},
     "decimate": {"resolution": 24},

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.codecs import Codec
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
 from facefolds_core.files import atomic_file
 
@@ -74,6 +75,7 @@ class Filmed:
         size: (width, height).
         rate: frames a second.
         made: all else that the pictures depend on, in words.
+        regions: coded finer or coarser, in all of them.
     """
 
     picture: Callable[[int], Picture]
@@ -81,11 +83,21 @@ class Filmed:
     size: tuple[int, int]
     rate: Fraction
     made: str
+    regions: tuple[Region, ...] = ()
 
     def digest(self, parts: Parts, frames: range, codec: Codec, options: dict[str, str]) -> str:
         """Of what a part's file depends on."""
         libraries = sorted(av.library_versions.items())
-        said = (self.made, self.size, self.rate, codec.name, codec.encoder, sorted(options.items()), libraries)
+        said = (
+            self.made,
+            self.regions,
+            self.size,
+            self.rate,
+            codec.name,
+            codec.encoder,
+            sorted(options.items()),
+            libraries,
+        )
         found = hashlib.blake2b(parts.common + repr(said).encode(), digest_size=16)
         for k in frames:
             for array in self.sources(k):
@@ -111,7 +123,8 @@ def encode_parts(
         found = parts.path(filmed.digest(parts, frames, codec, options), codec)
         if not found.exists():
             with atomic_file(found) as temporary:
-                encode_video(temporary, map(filmed.picture, frames), filmed.size, filmed.rate, codec, options)
+                pictures = map(filmed.picture, frames)
+                encode_video(temporary, pictures, filmed.size, filmed.rate, codec, options, filmed.regions)
         return found
 
     with ThreadPoolExecutor(parts.encoders(filmed.size)) as pool:

@@ -33,6 +33,7 @@ from facefolds_core.asset.colour import (
 )
 from facefolds_core.asset.containers import container_of, kind_of
 from facefolds_core.asset.packing import GUTTER, MAX_PIXELS, AtlasLayout, cut, fill_cell
+from facefolds_core.asset.regions import Marker, Region
 from facefolds_core.errors import UserError
 from facefolds_core.scheduling import kept_scheduling
 
@@ -112,16 +113,18 @@ def encode_video(
     fps: Fraction,
     codec: Codec,
     options: dict[str, str],
+    regions: Sequence[Region] = (),
 ) -> int:
     """Encode planar pictures of `size` (width, height); returns how many.
 
     Args:
         options: of the encoder, `codec.options(...)`.
+        regions: coded finer or coarser, by encoders that know regions.
 
     Raises:
         UserError: if the encoder refuses.
     """
-    count = 0
+    count, mark = 0, Marker(size, fps, regions) if regions else None
     os.environ.setdefault("SVT_LOG", "1")  # SVT-AV1 writes to stderr by itself; 1: errors only
     muxer = {"fflags": "bitexact"} | ({"movflags": "faststart"} if codec.container == "mp4" else {})
     try:
@@ -134,7 +137,7 @@ def encode_video(
                 frame = av.VideoFrame.from_ndarray(picture, format="yuv420p")
                 frame.colorspace, frame.color_range = Colorspace.ITU709, ColorRange.MPEG
                 frame.pts, frame.time_base = count, 1 / fps
-                container.mux(stream.encode(frame))
+                container.mux(stream.encode(frame if mark is None else mark(frame)))
                 count += 1
             container.mux(stream.encode(None))
     except FFmpegError as error:

@@ -33,6 +33,7 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.parts import Filmed, Parts, encode_parts
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.files import atomic_folder, file_sha256
@@ -167,20 +168,29 @@ class LevelContent:
         """The layers' textures, N of (h, w, 4)."""
         return [layer.cut(self.textures.image(layer.source, index)) for layer in self.layers]
 
-    def encode(self, path: Path, codec: Codec, params: VideoSettings, crf: int, frames: int | None = None) -> None:
+    def encode(
+        self,
+        path: Path,
+        codec: Codec,
+        params: VideoSettings,
+        crf: int,
+        frames: int | None = None,
+        regions: Sequence[Region] = (),
+    ) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
+        regions = regions if codec.regions else ()
         size, options = (layout.width, layout.height), codec.options(params, crf)
         if self.parts is None:
             pictures = (pack_frame(self.frame(index), layout) for index in range(count))
-            encode_video(path, pictures, size, self.rate, codec, options)
+            encode_video(path, pictures, size, self.rate, codec, options, regions)
             return
         step = self.part_frames if self.part_frames and frames is None else count
         borders = [*range(0, count, step), count]
         options = codec.of_part(options) if self.part_frames else options
-        encode_parts(path, self._filmed(), borders, codec, options, self.parts)
+        encode_parts(path, self._filmed(regions), borders, codec, options, self.parts)
 
-    def _filmed(self) -> Filmed:
+    def _filmed(self, regions: Sequence[Region]) -> Filmed:
         layout, textures = self.layout, self.originals or self.textures
         used = [layer.source for layer in self.layers]
         side = self.textures.image(used[0], 0).shape[0]
@@ -191,6 +201,7 @@ class LevelContent:
             size=(layout.width, layout.height),
             rate=self.rate,
             made=made,
+            regions=tuple(regions),
         )
 
 
@@ -201,12 +212,14 @@ def write_level(
     params: AssetSettings,
     crfs: Mapping[CodecName, int] | None = None,
     shared: Level | None = None,
+    regions: Sequence[Region] = (),
 ) -> Level:
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
     Args:
         crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
         shared: a level of the same layers whose meshes are this one's, too.
+        regions: of the picture, coded finer or coarser.
 
     Raises:
         UserError: if the textures do not fit into one video, or an encoder refuses them.
@@ -224,7 +237,7 @@ def write_level(
         # Two codecs may share a container: the first has the plain name.
         path = path if not path.exists() else path.with_name(f"{name}_{codec.name}.{codec.container}")
         crf = codec.crf(params.video.crf) if crfs is None else crfs[codec.name]
-        content.encode(path, codec, params.video, crf)
+        content.encode(path, codec, params.video, crf, regions=regions)
         videos.append(_video_entry(path, codec))
     texture = Texture(
         width=layout.width,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from fractions import Fraction
 from pathlib import Path
@@ -23,7 +23,7 @@ from facefolds_core.cli.cameras import enlarged, named_camera
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file
 from facefolds_core.params import VideoCodec
-from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
+from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 
@@ -123,6 +123,12 @@ def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
     return np.asarray(np.rint(np.clip(means, 0, 1) * 255), np.uint8)
 
 
+def far_enough(asset: Asset, eyes: Sequence[Eye], width: int, height: int, field_of_view: float) -> float:
+    """1, as the capture's cameras, or the distance from which the whole asset is in the picture from all `eyes`."""
+    box = asset.manifest.bounds
+    return 1.0 if box is None else max(1.0, distance_to_fit(box.min, box.max, eyes, width, height, field_of_view))
+
+
 def command(
     asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
     out: Annotated[Path, typer.Option(help="File to write: .png for a still, .mp4 for a film.")],
@@ -134,7 +140,12 @@ def command(
     frame: Annotated[int, typer.Option(help="Frame of the sequence; a film begins with it.")] = 0,
     azimuth: Annotated[float, typer.Option(help="Degrees from the front, positive to the subject's left.")] = 0.0,
     elevation: Annotated[float, typer.Option(help="Degrees upwards.")] = 0.0,
-    distance: Annotated[float, typer.Option(help="From the subject; the capture's cameras are about 1 away.")] = 1.0,
+    distance: Annotated[
+        float | None,
+        typer.Option(
+            help="From the subject; the capture's cameras are about 1 away. Left out: 1, or what it takes to show all."
+        ),
+    ] = None,
     field_of_view: Annotated[float, typer.Option(help="Degrees, of the shorter side.", min=1, max=150)] = 30.0,
     background: Annotated[str, typer.Option(help="Colour behind the subject, #rrggbb.")] = "#16181d",
     seconds: Annotated[float, typer.Option(help="Length of a film; the sequence repeats as needed.", min=0.1)] = 8.0,
@@ -156,7 +167,8 @@ def command(
             raise UserError(
                 "too large a picture", place="--size", expected=expected, found=size, remedy="a smaller one"
             )
-        check_limits(azimuth=azimuth, elevation=elevation, distance=distance, field_of_view=field_of_view)
+        check_limits(azimuth=azimuth, elevation=elevation, field_of_view=field_of_view)
+        check_limits(distance=1.0 if distance is None else distance)
         check_limits(seconds=seconds, sweep=sweep)
         if out.suffix.lower() != SUFFIXES[kind]:
             remedy = f"name a file that ends in {SUFFIXES[kind]}, or choose another --kind"
@@ -173,7 +185,9 @@ def command(
             width, height = given.width, given.height
             if kind is not Kind.STILL:
                 raise UserError("a film of one camera", place="--camera", remedy="leave out --kind, or --camera")
-        start = Eye(azimuth, elevation, distance)
+        sides = [Eye(azimuth + turn, elevation) for turn in ((-sweep, 0, sweep) if kind is Kind.TURNTABLE else (0,))]
+        away = far_enough(read, sides, width, height, field_of_view) if distance is None else distance
+        start = Eye(azimuth, elevation, away)
         with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
 
             def picture(eye: Eye, index: int) -> NDArray[np.uint8]:

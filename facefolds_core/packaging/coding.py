@@ -9,9 +9,11 @@ from tempfile import TemporaryDirectory
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.manifest import Level, Quality
 from facefolds_core.asset.reader import read_level
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.packaging.attention import regions_of
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
 from facefolds_core.packaging.views import ViewMeter, spread
@@ -40,16 +42,18 @@ def coded_level(
     """Write a level and measure it: against the full one before coding, by `meter`.
 
     Args:
-        cameras: that see it, for the bits of the meshes.
+        cameras: that see it, for the bits of the meshes and of the video.
         shared: a level whose meshes are this one's, too.
     """
     params = params.model_copy(update={"mesh": resolved(params.mesh, content.layers, cameras)})
-    video = params.video
-    crfs = None
+    video, crfs = params.video, None
+    regions = [] if video.lossless else regions_of(content, cameras, params.attention)
     if meter is not None and video.target_psnr is not None and not video.lossless:
         search, target = params.search, video.target_psnr
-        crfs = {codec: _crf(folder, content, CODECS[codec], video, meter, target, search) for codec in video.codec}
-    level = write_level(folder, name, content, params, crfs, shared)
+        crfs = {
+            codec: _crf(folder, content, regions, CODECS[codec], video, meter, target, search) for codec in video.codec
+        }
+    level = write_level(folder, name, content, params, crfs, shared, regions)
     if meter is None:
         return level
     shown = read_level(folder, level)
@@ -61,6 +65,7 @@ def coded_level(
 def _crf(
     folder: Path,
     content: LevelContent,
+    regions: Sequence[Region],
     codec: Codec,
     video: VideoCodec,
     meter: ViewMeter,
@@ -72,7 +77,7 @@ def _crf(
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:
-            content.encode(path, codec, video, crf, min(content.frames, search.frames))
+            content.encode(path, codec, video, crf, min(content.frames, search.frames), regions)
             pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
             wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
             return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)

@@ -7,6 +7,7 @@ below takes a number that somebody might tune from anywhere but a section (tests
 from facefolds_core.params.base import Section, merged, nested, value_at
 from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams, RegistrationParams
 from facefolds_core.params.compress import (
+    AttentionParams,
     BetweenParams,
     CodecName,
     CompressParams,
@@ -61,6 +62,7 @@ __all__ = [
     "PRESETS",
     "SECTIONS",
     "STAGE_SECTIONS",
+    "AttentionParams",
     "AutoWindowParams",
     "BackgroundParams",
     "BakeParams",

@@ -109,6 +109,28 @@ class MeterParams(Section):
     """Of those that hit anything, drawn once."""
 
 
+class AttentionParams(Section):
+    """Bits where they show: what hardly shows in training views is coded coarsely (packaging/attention.py). H.264 only:
+    the other encoders know no regions."""
+
+    strength: Annotated[float, Field(ge=0, le=6)] = 2.0
+    """Steps of the quantiser (six double it) for each halving of what an error does to the pictures; 0 codes all of the
+    atlas alike (the paper's setting), 3 is where errors would cost the same everywhere."""
+
+    least: Annotated[float, Field(gt=0, le=1)] = 0.01
+    """What shows less than this share of what shows most is treated as if it showed as much: someone may look from
+    where no camera stood."""
+
+    cameras: Count = 24
+    """Training cameras that are looked through, evenly spread."""
+
+    frames: Count = 3
+    """Evenly spread; the one counts in which a place shows most."""
+
+    rays_per_camera: Count = 16_000
+    """Of those that hit anything, drawn once."""
+
+
 class StreamParams(Section):
     """Long takes as streams: videos that players fetch in segments, at the quality that the connection allows."""
 
@@ -203,6 +225,9 @@ class CompressParams(Section):
 
     meter: MeterParams = MeterParams()
     """What quality is measured on."""
+
+    attention: AttentionParams = AttentionParams()
+    """Where the videos' bits go."""
 
     between: BetweenParams = BetweenParams()
     """For `frame_rate_factor`."""

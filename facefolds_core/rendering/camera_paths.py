@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from facefolds_core.geometry.cameras import Camera
+
+Point = tuple[float, float, float]
 
 STEEPEST = 89.0
 """Degrees of elevation: straight up has no upright."""
@@ -48,6 +51,25 @@ def camera_of(eye: Eye, width: int, height: int, field_of_view: float) -> Camera
     focal = min(width, height) / (2 * math.tan(math.radians(field_of_view) / 2))
     K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     return Camera("rendered", K, np.concatenate([rotation, -(rotation @ centre)[:, None]], 1), width, height)
+
+
+def distance_to_fit(
+    low: Point, high: Point, eyes: Sequence[Eye], width: int, height: int, field_of_view: float
+) -> float:
+    """The least distance from which a box is in the picture from all `eyes`, whose own distance does not count.
+
+    Args:
+        low, high: corners of the box, units.
+        width, height, field_of_view: as of `camera_of`.
+    """
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    half = math.tan(math.radians(field_of_view) / 2) / min(width, height) * np.array([width, height])
+    least = 0.0
+    for eye in eyes:
+        seen = camera_of(replace(eye, distance=0.0), width, height, field_of_view)
+        at = corners @ seen.rotation.T + seen.w2c[:, 3]  # z: behind the target, seen from the camera
+        least = max(least, float((np.abs(at[:, :2]) / half - at[:, 2:]).max()))
+    return least
 
 
 def turntable(start: Eye, count: int, sweep: float) -> list[Eye]:

@@ -16,7 +16,7 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.cli.render import parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.rendering.camera_paths import Eye, camera_of, fly_through, turntable
+from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.reflection import reflected_colours
@@ -110,6 +110,17 @@ def test_azimuth_is_towards_the_left_of_the_subject() -> None:
     assert camera_of(Eye(azimuth=90), 10, 10, 30).centre == pytest.approx([0, 1, 0])
 
 
+def test_from_the_distance_to_fit_a_box_just_fills_the_picture() -> None:
+    """Half a picture of 30 degrees spans tan 15 of the distance to the box's nearest side, 0.2 before the target."""
+    low, high = (-0.1, -0.1, -0.3), (0.2, 0.1, 0.3)
+    found = distance_to_fit(low, high, [Eye()], 200, 100, 30)
+    assert found == pytest.approx(0.2 + 0.3 / np.tan(np.radians(15)))
+    aside = [Eye(azimuth=90), Eye(azimuth=-90)]
+    assert distance_to_fit(low, high, [Eye(), *aside], 200, 100, 30) == pytest.approx(found)
+    flat = (-0.5, -0.1, -0.1), (0.5, 0.1, 0.1)
+    assert distance_to_fit(*flat, aside, 100, 100, 30) == pytest.approx(0.1 + 0.5 / np.tan(np.radians(15)))
+
+
 @pytest.mark.parametrize("path", [lambda start, n: turntable(start, n, 50), fly_through])
 def test_films_are_closed_and_stay_in_front(path: object) -> None:
     start = Eye(azimuth=5, elevation=3, distance=1.5)
@@ -151,7 +162,20 @@ def run(project_root: Path, *arguments: str) -> subprocess.CompletedProcess[str]
 
 def test_a_still(caps: Asset, tmp_path: Path, project_root: Path) -> None:
     out = tmp_path / "still.png"
-    look = ["--azimuth", "20", "--frame", "1", "--size", "80x60", "--samples", "1", "--background", "#336699"]
+    look = [
+        "--azimuth",
+        "20",
+        "--distance",
+        "1",
+        "--frame",
+        "1",
+        "--size",
+        "80x60",
+        "--samples",
+        "1",
+        "--background",
+        "#336699",
+    ]
     done = run(project_root, str(caps.folder), "--out", str(out), *look)
     assert done.returncode == 0, done.stderr
     camera = camera_of(Eye(azimuth=20), 80, 60, 30)

@@ -65,6 +65,7 @@ class Codec:
         options: FFmpeg's options for settings and a crf on the encoder's own scale.
         level_and_mime: a stream's level, such as "5.1", and its MIME type with codec string (RFC 6381 and the codecs'
             own rules).
+        regions: whether the encoder knows regions (asset/regions.py).
         crf_scale, crf_offset: crf of this encoder = scale * (crf of x264) + offset, for about equal quality.
         of_part: the options for a part of a video, whose first picture has none before it to go by.
     """
@@ -78,6 +79,7 @@ class Codec:
     level_and_mime: Callable[[Stream], tuple[str, str]]
     crf_scale: float = 1.0
     crf_offset: float = 0.0
+    regions: bool = False
     of_part: Callable[[dict[str, str]], dict[str, str]] = dict
 
     def crf(self, x264_crf: int) -> int:

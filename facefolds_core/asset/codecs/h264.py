@@ -39,4 +39,4 @@ def _of_part(options: dict[str, str]) -> dict[str, str]:
     return options if "qp" in options else {**options, "x264-params": options["x264-params"] + ":zones=0,0,b=1.5"}
 
 
-CODEC = Codec("h264", "libx264", "h264", "mp4", 51, _options, _level_and_mime, of_part=_of_part)
+CODEC = Codec("h264", "libx264", "h264", "mp4", 51, _options, _level_and_mime, of_part=_of_part, regions=True)
