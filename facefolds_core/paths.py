@@ -46,7 +46,7 @@ class SubjectFolders:
 
     @property
     def checkpoints(self) -> Path:
-        """train and bake: not an output of any stage, so that a later run takes over what it would make again."""
+        """train and later stages: no output of any, so that a later run takes over what it would make again."""
         return self.root / "checkpoints"
 
     @property

@@ -9,6 +9,9 @@ import time
 
 import psutil
 
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables of the environment that say how many threads a process may have."""
+
 LOOK = 0.25
 """Seconds between two looks at the parent's process."""
 

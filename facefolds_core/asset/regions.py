@@ -57,8 +57,18 @@ class Marker:
         last.link_to(sink)
         graph.configure()
         self._graph, self._source, self._sink = graph, source, sink
+        self._marked: Any = None
 
     def __call__(self, frame: av.VideoFrame) -> Any:
-        """The same picture with the regions on it."""
-        self._source.push(frame)
-        return self._sink.pull()
+        """The same picture with the regions on it, valid until the next: one frame, marked once, takes all pictures.
+
+        Thousands of regions cost a second a frame, so it is marked once; and x264 copies what it is given.
+        """
+        if self._marked is None:
+            self._source.push(frame)
+            self._marked = self._sink.pull()
+            return self._marked
+        for plane, picture in zip(self._marked.planes, frame.planes, strict=True):
+            plane.update(picture)
+        self._marked.pts, self._marked.time_base = frame.pts, frame.time_base
+        return self._marked

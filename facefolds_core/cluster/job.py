@@ -14,21 +14,24 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import dask.system
 from distributed import get_worker
 
+from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.lockfile import LOCK
+from facefolds_core.cluster.pointers import keep, made_by, put_pointers, read_pointers, take_folder
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
+from facefolds_core.processes import THREADS
+from facefolds_core.training.segments.names import BASE, PLAN
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,9 @@ class Job:
         params: the text of params.yaml, where it is another one than the project's.
         links: paths relative to the project, and where they really are: captures outside it.
         lock: what the project's dvc.lock says of the subject.
+        part: of the subject's training, made after the target: "base", or the number of a segment; "" for none.
+        files: what other parts left, which is put there first: names, and what `dvc add` says of them.
+        at_once: so many jobs share a machine's cores at most; 0 for as many as the worker takes.
     """
 
     name: str
@@ -50,6 +56,9 @@ class Job:
     params: str | None
     links: tuple[tuple[str, str], ...]
     lock: str = ""
+    part: str = ""
+    files: tuple[tuple[str, str], ...] = ()
+    at_once: int = 0
 
 
 @dataclass(frozen=True)
@@ -62,6 +71,8 @@ class Outcome:
         metrics: metrics.json; {} where there is none.
         log: all that DVC and the stages said.
         lock: the job's own dvc.lock; "" if it failed.
+        files: what a part left: as of `Job`.
+        plan: of a base: what segments there are.
     """
 
     job: Job
@@ -72,6 +83,8 @@ class Outcome:
     metrics: Mapping[str, Any] | None = None
     log: str = ""
     lock: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    plan: Mapping[str, Any] | None = None
 
     @property
     def state(self) -> str:
@@ -95,7 +108,7 @@ def do(job: Job, run: str) -> Outcome:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix=f"{job.name[:40]}-", dir=worker.local_directory) as temporary:
         try:
-            root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock)
+            root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock, bool(job.part))
         except UserError as error:
             return Outcome(job, str(error), host=socket.gethostname())
 
@@ -103,50 +116,98 @@ def do(job: Job, run: str) -> Outcome:
             if found := RUNNING.match(line):
                 worker.log_event(run, {"job": job.name, "stage": found[1], "host": socket.gethostname()})
 
-        threads = str(max(1, dask.system.CPU_COUNT // worker.state.nthreads))
-        environment = {**dict.fromkeys(THREADS, threads), **os.environ, "PYTHONUNBUFFERED": "1"}
-        environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
-        status, log = _dvc(run, root, environment, ["repro", *(["--pull"] if pull else []), job.target], tell)
+        shell = _Shell(run, root, _environment(worker, job), tell)
+        place = take_folder(root, job.subject)
+        pointers = put_pointers(place, root, job.files)
+        fetch = [["pull" if pull else "checkout", "--allow-missing", *pointers]] if pointers else []
+        status, log = shell.dvc(*fetch, ["repro", *(["--pull"] if pull else []), job.target])
         if pull:  # of a job that failed, too: what its first stages made
-            pushed, said = _dvc(run, root, environment, ["push", "--run-cache", "--with-deps", job.target])
+            pushed, said = shell.dvc(["push", "--run-cache", "--with-deps", job.target])
             if pushed and not status:
                 status, log = pushed, log + said
+        files: dict[str, str] = {}
+        if job.part and not status:
+            tell("Running stage 'train'")
+            status, said, files = _make_part(shell, place, job, pull)
+            log += said
         metrics = root / "data" / job.subject / "metrics.json"
         return Outcome(
             job,
             error=_last_lines(log) if status else "",
             seconds=time.perf_counter() - start,
             host=socket.gethostname(),
-            ran=tuple(stage for stage in RUNNING.findall(log) if stage != "configure"),
+            ran=(*(stage for stage in RUNNING.findall(log) if stage != "configure"), *filter(None, [job.part])),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,
             lock="" if status else (root / LOCK).read_text(encoding="utf-8"),
+            files=files,
+            plan=json.loads((place / PLAN).read_text(encoding="utf-8")) if job.part == BASE and not status else None,
         )
 
 
-def _dvc(run: str, root: Path, environment: dict[str, str], command: list[str], tell: Any = None) -> tuple[int, str]:
-    """Exit status of a DVC command and what it said; each line goes to `tell` at once."""
-    lines = []
-    with subprocess.Popen(
-        [sys.executable, "-m", "facefolds_core.cluster.dvc", *command],
-        cwd=root,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=True,  # so that its stages can be ended with it
-    ) as process:
-        _at_work.setdefault(run, []).append(process)
-        assert process.stdout is not None
-        for line in process.stdout:
-            lines.append(line)
-            if tell is not None:
-                tell(line)
-        status = process.wait()
-        _at_work[run].remove(process)
-    return status, "".join(lines)
+def _make_part(shell: _Shell, place: Path, job: Job, push: bool) -> tuple[int, str, dict[str, str]]:
+    """Exit status, what was said, and `Outcome.files`."""
+    module = "facefolds_core.training.segments.part"
+    status, log = shell.python(module, "--subject", job.subject, "--part", job.part)
+    if status:
+        return status, log, {}
+    made = made_by(place, job.part)
+    status, said = shell.dvc(*keep(place, shell.root, made, push))
+    return status, log + said, {} if status else read_pointers(place, made)
+
+
+def _environment(worker: Any, job: Job) -> dict[str, str]:
+    """Of the job's processes: its share of the threads, the programs of this environment."""
+    at_once = min(worker.state.nthreads, job.at_once or worker.state.nthreads)
+    threads = str(max(1, dask.system.CPU_COUNT // at_once))
+    environment = {**dict.fromkeys(THREADS, threads), **os.environ, "PYTHONUNBUFFERED": "1"}
+    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
+    return environment
+
+
+@dataclass(frozen=True)
+class _Shell:
+    """Commands in a job's folder.
+
+    Attributes:
+        run: that they are part of, with which they are ended.
+        root: the job's folder.
+        environment: of the processes.
+        tell: hears each line that DVC says, at once.
+    """
+
+    run: str
+    root: Path
+    environment: Mapping[str, str]
+    tell: Callable[[str], None]
+
+    def dvc(self, *commands: Sequence[str]) -> tuple[int, str]:
+        """Exit status of the last of some DVC commands, and what they said."""
+        words = [word for command in commands for word in (THEN, *command)][1:]
+        return self.python("facefolds_core.cluster.dvc", *words)
+
+    def python(self, module: str, *words: str) -> tuple[int, str]:
+        """Exit status of a module's command and what it said."""
+        lines = []
+        with subprocess.Popen(
+            [sys.executable, "-m", module, *words],
+            cwd=self.root,
+            env=dict(self.environment),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,  # so that its stages can be ended with it
+        ) as process:
+            _at_work.setdefault(self.run, []).append(process)
+            assert process.stdout is not None
+            for line in process.stdout:
+                lines.append(line)
+                self.tell(line)
+            status = process.wait()
+            _at_work[self.run].remove(process)
+        return status, "".join(lines)
 
 
 def end_all(run: str) -> None:

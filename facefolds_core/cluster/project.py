@@ -59,7 +59,9 @@ class Project(WorkerPlugin):
         assert self.scratch is not None
         return self.scratch / f"code-{self.name}"
 
-    def unfold(self, place: Path, links: Mapping[str, str], params: str | None, lock: str) -> tuple[Path, bool]:
+    def unfold(
+        self, place: Path, links: Mapping[str, str], params: str | None, lock: str, linked: bool = False
+    ) -> tuple[Path, bool]:
         """Make a project's folder for one job.
 
         Args:
@@ -67,6 +69,7 @@ class Project(WorkerPlugin):
             links: see `Job`.
             params: the text of params.yaml; None for the project's.
             lock: that of dvc.lock.
+            linked: what comes from the cache is not copied, even where DVC would: a segment needs a small part of it.
 
         Returns:
             its path, and whether results travel through a remote.
@@ -102,15 +105,17 @@ class Project(WorkerPlugin):
             path.symlink_to(target)
         cache = self.cache if shared else self.code.with_name("cache")
         drop_empty_runs(cache)
-        self._settle(root, place, cache)
+        self._settle(root, place, cache, linked)
         return root, not shared
 
-    def _settle(self, root: Path, place: Path, cache: Path) -> None:
+    def _settle(self, root: Path, place: Path, cache: Path, linked: bool) -> None:
         """DVC's settings for one job: no git, its own bookkeeping, and whole paths where the project's are relative."""
         path = root / ".dvc" / "config.local"
         settings = ConfigObj(str(path), encoding="utf-8", list_values=False)
         settings.setdefault("core", {}).update({"no_scm": "true", "site_cache_dir": str(place / "site")})
         settings.setdefault("cache", {})["dir"] = str(cache)
+        if linked:
+            settings["cache"].setdefault("type", "reflink,hardlink,symlink,copy")
         for name, values in self.remotes.items():
             settings.setdefault(f'remote "{name}"', {}).update(values)
         settings.write()

@@ -122,7 +122,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "cluster/run_cache.py": ALL,
         "stages/common.py": ALL,
         "training/patience.py": ALL,
-        "training/segments/workers.py": {"GRACE"},
+        "training/segments/workers.py": ("GRACE",),
         "served_files.py": ALL,
         "serving.py": ALL,
     },

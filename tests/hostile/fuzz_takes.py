@@ -28,7 +28,7 @@ PARAMS: dict[str, Any] = {
         "iterations": 60,
         "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
         "textures": {"steps_per_frame": 8},
-        "segments": {"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60},
+        "segments": {"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60, "processes": 2},
     },
     **{stage: {} for stage in ("sample", "reconstruct", "decimate", "texture", "bake", "compress", "evaluate")},
 }

@@ -103,14 +103,15 @@ def test_regions_are_the_steps_without_overlap() -> None:
 
 def test_h264_codes_a_region_as_it_is_told(tmp_path: Path) -> None:
     """Noise of the same kind left and right: the side that is marked as finer has the smaller error."""
-    texture = np.random.default_rng(0).integers(60, 190, (128, 256, 4)).astype(np.uint8)
+    textures = np.random.default_rng(0).integers(60, 190, (4, 128, 256, 4)).astype(np.uint8)
     layout, codec = AtlasLayout.pack([(256, 128)]), CODECS["h264"]
     size = (layout.width, layout.height)
     regions = [Region(0, 0, 128, layout.height, -8), Region(128, 0, layout.width - 128, layout.height, 8)]
     path = tmp_path / "regions.mp4"
     options = codec.options(VideoCodec(preset="medium"), 26)
-    encode_video(path, [pack_frame([texture], layout)] * 2, size, Fraction(30), codec, options, regions)
-    for picture in decode_video(path, size, 30.0):
+    pictures = (pack_frame([texture], layout) for texture in textures)
+    assert encode_video(path, pictures, size, Fraction(30), codec, options, regions) == 4
+    for texture, picture in zip(textures, decode_video(path, size, 30.0), strict=True):
         error = np.abs(unpack_picture(picture, layout)[0][..., 3].astype(int) - texture[..., 3])
         assert error[:, :112].mean() < 0.5 * error[:, 144:].mean()
 

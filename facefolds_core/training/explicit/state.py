@@ -4,6 +4,8 @@ On a GPU: `state_gpu.py`."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -257,15 +259,21 @@ def _with_moments(values: Tensor) -> Tensor:
     return torch.cat([values[None], values.new_zeros(2, *values.shape)])
 
 
+@contextmanager
+def on_one_thread() -> Iterator[None]:
+    """torch rounds the ends of what a thread gets differently: on one thread the result is that of any number."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
 def _resample(values: Tensor, old: tuple[int, int], new: tuple[int, int]) -> Tensor:
     """[B, M, ...] on one grid -> the same on another, bilinear between texel centres."""
     rest = values.shape[2:]
     image = values.reshape(len(values), *old, -1).permute(0, 3, 1, 2)
-    # torch rounds the ends of what a thread gets differently: on one thread the result is that of any number of cores.
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
+    with on_one_thread():
         image = torch.nn.functional.interpolate(image, size=new, mode="bilinear", align_corners=False)
-    finally:
-        torch.set_num_threads(threads)
     return image.permute(0, 2, 3, 1).reshape(len(values), -1, *rest).contiguous()

@@ -24,7 +24,7 @@ from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
-from facefolds_core.training.explicit.state import LossWeights, TextureState, state_type
+from facefolds_core.training.explicit.state import LossWeights, TextureState, on_one_thread, state_type
 from facefolds_core.training.explicit.views import Images, Rays, rays_of
 from facefolds_core.training.log import log_metrics
 from facefolds_core.training.volume.fit import Volume
@@ -116,9 +116,9 @@ class Trainer:
         alpha = torch.stack([self.state.activated(k)[..., 3].clone() for k in range(self.scene.num_frames)]).mean(0)
         seen = self.state.layers[2, ..., 3] > 0
         alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
-        nodes = torch.nn.functional.interpolate(
-            alpha, size=tuple(self.middle.shape), mode="bilinear", align_corners=False
-        )
+        size = self.middle.shape[0], self.middle.shape[1]
+        with on_one_thread():
+            nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
         radii = self.manifolds().radii().detach().double().numpy()
         moved = (
             self.middle

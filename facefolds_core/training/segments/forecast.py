@@ -70,13 +70,19 @@ def processes_for(scene: Scene, params: ExplicitParams, texels: int, segments: i
     asked = params.segments.processes
     if asked:
         return min(asked, segments)
-    rays = len(scene.indices("train")) * scene.width * scene.height
-    moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
-    # A still head's rays are the parent's, mapped; background and pictures are each one's own.
-    memory = texels * _frame_bytes(params) + rays * (12 + 6) + moving + params.segments.floor_megabytes * 1e6
-    room = int(params.segments.free_share * psutil.virtual_memory().available / memory)
+    available = params.segments.free_share * psutil.virtual_memory().available
+    room = int(available / process_bytes(scene, params, texels))
     work = _seconds(params, frames * params.segments.steps, texels)
     return max(1, min(numba.get_num_threads(), segments, room, int(work / params.segments.process_seconds)))
+
+
+def process_bytes(scene: Scene, params: ExplicitParams, texels: int) -> float:
+    """Memory of one of the processes that fit segments; a still head's rays are the parent's, mapped."""
+    rays = len(scene.indices("train")) * scene.width * scene.height
+    moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
+    background_and_pictures = rays * (12 + 6)
+    own = params.segments.floor_megabytes * 1e6
+    return texels * _frame_bytes(params) + background_and_pictures + moving + own
 
 
 def _frame_bytes(params: ExplicitParams) -> int:

@@ -33,7 +33,7 @@ from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
 from facefolds_core.training.segments.fitting import fit_segment
-from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, processes_for
+from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
 from facefolds_core.training.segments.handed import Fitting
 from facefolds_core.training.segments.plan import Segment, TakePlan, plan_take
 from facefolds_core.training.segments.workers import Used, Workers
@@ -88,7 +88,7 @@ class _Take:
         paths = [cache.path(frames) for frames in segments]
         cache.keep_only(paths)
         for other in self.folder.glob("base-*"):
-            if other != base.folder:
+            if other != base.folder and other.is_dir():  # no pointer of DVC's
                 shutil.rmtree(other)
         return self._trained(base, paths, psnr)
 
@@ -114,7 +114,10 @@ class _Take:
 
             if processes > 1 and not self.device.gpu:
                 threads = max(1, numba.get_num_threads() // processes)
-                tqdm.write(f"train: {processes} processes fit segments, threads of each: {threads}")
+                memory = processes * process_bytes(self.scene, self.params, h * w) / 1e9
+                tqdm.write(
+                    f"train: {processes} processes fit segments, threads of each: {threads}; {memory:.1f} GB at most"
+                )
                 self.used = Workers(fitting, base, processes, threads, bar.update, done).fit(left)
             elif left:
                 fitter = fitting.fitter()

@@ -16,12 +16,11 @@ from pathlib import Path
 from tqdm import tqdm
 
 from facefolds_core.errors import UserError
+from facefolds_core.processes import THREADS
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.handed import Fitting, handed
 from facefolds_core.training.segments.messages import Failed, FrameDone, SegmentDone
 from facefolds_core.training.segments.plan import Segment
-
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 ROOT = Path(__file__).parents[3]
 """Where this package is imported from."""
