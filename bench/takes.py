@@ -28,6 +28,7 @@ from bench.tables import markdown
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_json
 from facefolds_core.params import STAGE_SECTIONS, merged
+from facefolds_core.pictures import open_picture
 
 WATCH = 0.1
 """Seconds between two looks at a stage's memory."""
@@ -110,7 +111,7 @@ def change_frame(project: Project) -> str:
     names = sorted({path.stem for path in pictures})
     name = names[len(names) // 2]
     for path in (path for path in pictures if path.stem == name):
-        Image.fromarray(np.roll(np.asarray(Image.open(path)), 1, 1)).save(path)
+        Image.fromarray(np.roll(np.asarray(open_picture(path)), 1, 1)).save(path)
     return name
 
 

@@ -32,6 +32,10 @@ from facefolds_core.processes import THREADS
 from facefolds_core.training.segments.names import BASE, PLAN
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
+LOST_RECORD = re.compile(r"^ERROR: .*\bruns\b.*\.tmp'", re.MULTILINE)
+"""What DVC ends with where another one took its half-written record of a run for a damaged one, and removed it: two
+jobs with a stage in common that run it at once (dvc/stage/cache.py, 3.x: `_load` takes the newest file of a folder)."""
+ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def do(job: Job, run: str) -> Outcome:
         place = take_folder(root, job.subject)
         pointers = put_pointers(place, root, job.files)
         fetch = [["pull" if pull else "checkout", "--allow-missing", *pointers]] if pointers else []
-        status, log = shell.dvc(*fetch, ["repro", *(["--pull"] if pull else []), job.target])
+        status, log = repro(shell.dvc, *fetch, ["repro", *(["--pull"] if pull else []), job.target])
         if pull:  # of a job that failed, too: what its first stages made
             pushed, said = shell.dvc(["push", "--run-cache", "--with-deps", job.target])
             if pushed and not status:
@@ -136,13 +140,28 @@ def do(job: Job, run: str) -> Outcome:
             error=_last_lines(log) if status else "",
             seconds=time.perf_counter() - start,
             host=socket.gethostname(),
-            ran=(*(stage for stage in RUNNING.findall(log) if stage != "configure"), *filter(None, [job.part])),
+            ran=(
+                *(stage for stage in dict.fromkeys(RUNNING.findall(log)) if stage != "configure"),
+                *filter(None, [job.part]),
+            ),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,
             lock="" if status else (root / LOCK).read_text(encoding="utf-8"),
             files=files,
             plan=json.loads((place / PLAN).read_text(encoding="utf-8")) if job.part == BASE and not status else None,
         )
+
+
+def repro(dvc: Callable[..., tuple[int, str]], *commands: Sequence[str]) -> tuple[int, str]:
+    """Exit status of DVC commands and all that was said; again where a record was lost to another job's DVC."""
+    status, log = dvc(*commands)
+    said = log
+    for _ in range(ATTEMPTS - 1):
+        if not status or not LOST_RECORD.search(said):
+            break
+        status, said = dvc(*commands)
+        log += said
+    return status, log
 
 
 def _make_part(shell: _Shell, place: Path, job: Job, push: bool) -> tuple[int, str, dict[str, str]]:

@@ -118,6 +118,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "errors.py": ALL,
         "locks.py": ALL,
         "processes.py": ALL,
+        "cluster/job.py": ("ATTEMPTS",),
         "cluster/jobs.py": ("LOOK",),
         "cluster/run_cache.py": ALL,
         "stages/common.py": ALL,
