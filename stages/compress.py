@@ -9,7 +9,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.export.steps import TEXTURES
-from facefolds_core.export.stores import read_centre, read_meshes, read_reflection_maps, read_windows
+from facefolds_core.export.stores import read_chart, read_meshes, read_reflection_maps, read_windows
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.packaging.package import Export, package
@@ -26,7 +26,7 @@ def compress(folders: SubjectFolders) -> str:
         meshes=read_meshes(folders.meshes / "meshes.npz"),
         windows=read_windows(grids),
         textures=FrameStore(folders.textures / TEXTURES),
-        centre=read_centre(grids),
+        centre=read_chart(grids).centre,
         coarser={r: read_meshes(folders.meshes / f"level_{r}.npz") for r in resolutions},
         reflection=read_reflection_maps(grids),
     )

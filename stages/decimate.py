@@ -19,7 +19,7 @@ def decimate(folders: SubjectFolders) -> str:
     grids = read_grids(folders.samples / "grids.npz")
     meshes = steps.decimate(surfaces, grids, params)
     levels = steps.decimate_levels(surfaces, grids, params, read_level_resolutions(folders.config))
-    order = layer_order(meshes, grids.centre)
+    order = layer_order(meshes, grids.chart)
     with atomic_folder(folders.meshes) as temporary:
         write_meshes(temporary / "meshes.npz", meshes)
         for resolution, coarser in levels.items():

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInf
 Count = Annotated[int, Field(ge=1)]
 RateTerm = Annotated[int, Field(ge=1, le=1_000_000_000)]
 Offset = Annotated[int, Field(ge=0)]
-UV = Annotated[float, Field(ge=-1, le=1)]
+UV = Annotated[float, Field(ge=-2, le=2)]
 Scale = Annotated[float, Field(gt=0, le=1000)]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=200)]
 Name = Annotated[str, Field(pattern=r"^[a-z0-9_-]+$")]

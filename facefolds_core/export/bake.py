@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.export.bake_kernel import accumulate, render, true_positions, update
-from facefolds_core.export.sheets import directions, sheet_faces, sheet_mesh
+from facefolds_core.export.sheets import sheet_faces, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
 from facefolds_core.frame_store import FrameStore
@@ -76,12 +76,12 @@ def transmittance(codes: Codes, textures: Float) -> Float:
 
 def showing_meshes(sheets: Sheets) -> list[TexturedMesh]:
     """The sheets' faces with a corner that is not transparent in all frames."""
-    faces, towards = sheet_faces(sheets), directions(sheets)
+    faces, uv = sheet_faces(sheets), vertex_uv(sheets)
     meshes = []
     for layer in range(sheets.num_layers):
         shows = (sheets.opacity[layer] > 0).reshape(-1)[faces].any(1)
         known = sheets.valid[layer].reshape(-1)[faces].all(1)
-        meshes.append(sheet_mesh(sheets, layer, faces[shows & known], towards))
+        meshes.append(sheet_mesh(sheets, layer, faces[shows & known], uv))
     return meshes
 
 
@@ -100,8 +100,9 @@ def reprojection(mesh: TexturedMesh, sheets: Sheets, size: int) -> Float:
     """(size, size, 2) columns and rows: where in the layer's texture what belongs to each texel of the mesh's lies."""
     row, column = np.mgrid[:size, :size].astype(np.float32)
     positions = np.stack([column, row], -1)
-    offsets = mesh.vertices.astype(np.float64) - sheets.centre
-    true_positions(offsets, mesh.faces, mesh.st.astype(np.float64), sheets.window, positions)
+    offsets = mesh.vertices.astype(np.float64) - np.array(sheets.chart.centre)
+    st, belt = mesh.st.astype(np.float64), sheets.chart.numbers
+    true_positions(offsets, mesh.faces, st, sheets.window, belt, positions)
     return positions
 
 

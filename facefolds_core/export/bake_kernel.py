@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from facefolds_core.geometry.chart_kernel import chart_position
 from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
@@ -157,14 +158,14 @@ def update(values, sums, damping, shown):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def true_positions(vertices, faces, st, window, out):  # type: ignore[no-untyped-def]
+def true_positions(vertices, faces, st, window, belt, out):  # type: ignore[no-untyped-def]
     """Where each texel of a mesh's texture lies in the layer: out (H, W, 2) float32 columns and rows, in texels.
 
-    A texel (row, column) sits in a triangle in the plane of (s, t), and so at a point of the mesh; the direction of
-    that point from c, in texture coordinates, is what belongs there. Texels outside all triangles stay as they are in
-    out.
+    A texel (row, column) sits in a triangle in the plane of (s, t), and so at a point of the mesh; (u, v) of that
+    point, in texture coordinates, is what belongs there. Texels outside all triangles stay as they are in out.
 
-    vertices (V, 3) relative to c, faces (F, 3), st (V, 2), window (u0, u1, v0, v1).
+    vertices (V, 3) relative to c, faces (F, 3), st (V, 2), window (u0, u1, v0, v1), belt (4,) of
+    `Chart.numbers`.
     """
     height, width = out.shape[0], out.shape[1]
     for f in range(faces.shape[0]):
@@ -187,7 +188,6 @@ def true_positions(vertices, faces, st, window, out):  # type: ignore[no-untyped
                 x = a * vertices[i, 0] + b * vertices[j, 0] + c * vertices[k, 0]
                 y = a * vertices[i, 1] + b * vertices[j, 1] + c * vertices[k, 1]
                 z = a * vertices[i, 2] + b * vertices[j, 2] + c * vertices[k, 2]
-                u = 2.0 / math.pi * math.asin(min(max(z / math.sqrt(x * x + y * y + z * z), -1.0), 1.0))
-                v = 2.0 / math.pi * math.atan2(y, x)
+                u, v, _ = chart_position(x, y, z, belt)
                 out[row, column, 0] = (v - window[2]) / (window[3] - window[2]) * width - 0.5
                 out[row, column, 1] = (window[1] - u) / (window[1] - window[0]) * height - 0.5

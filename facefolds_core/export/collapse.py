@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter
 
 from facefolds_core.export.collapse_kernel import build_quadrics, collapse, covers
 from facefolds_core.export.refit import refit_radii
-from facefolds_core.export.sheets import Array, directions, sheet_faces, sheet_mesh
+from facefolds_core.export.sheets import Array, sheet_faces, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams
@@ -39,21 +39,23 @@ def decimated_ladder(
     sheets: Sheets, counts: Sequence[int], params: DecimateParams = _USUAL
 ) -> dict[int, list[TexturedMesh]]:
     """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
-    st, towards, faces = sheets.st.reshape(-1, 2), directions(sheets), sheet_faces(sheets)
+    st, uv, faces = sheets.st.reshape(-1, 2), vertex_uv(sheets), sheet_faces(sheets)
     by = params.collapse
     groups = np.array_split(np.arange(sheets.num_layers), min(by.measured_layers, sheets.num_layers))
     shows = contribution(sheets.opacity, by.min_visibility)
     weights = np.stack([shows[group].sum(0).reshape(-1) for group in groups], -1)
-    points = np.stack([_positions(sheets, int(group[len(group) // 2]), towards) for group in groups], 1)
+    points = np.stack([_positions(sheets, int(group[len(group) // 2]), uv) for group in groups], 1)
     quadrics = build_quadrics(points, faces, weights[faces].max(1) + by.empty_weight)
     cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
     targets = sorted(set(counts), reverse=True)
     borders = _borders(len(sheets.st))
-    left = collapse(st, towards, borders, points, faces, quadrics, np.array(targets), by.min_area * cell)
+    left = collapse(
+        st, sheets.chart.unrolled(uv), borders, points, faces, quadrics, np.array(targets), by.min_area * cell
+    )
     opaque = maximum_filter(sheets.opacity > 0, (1, 2 * by.margin + 1, 2 * by.margin + 1))
     near = np.ascontiguousarray(opaque.transpose(1, 2, 0))
     return {
-        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], towards, params)
+        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], uv, params)
         for target, corners in zip(targets, left, strict=True)
     }
 
@@ -63,16 +65,16 @@ def _meshes(
     shows: Array,
     near: NDArray[np.bool_],
     faces: NDArray[np.int64],
-    towards: Array,
+    uv: Array,
     params: DecimateParams,
 ) -> list[TexturedMesh]:
     """The layers over a triangulation, radii fitted, what holds nothing left out."""
-    fitted = refit_radii(sheets, shows, faces, towards, params.refit)
+    fitted = refit_radii(sheets, shows, faces, uv, params.refit)
     kept = covers(faces, len(sheets.st), near)
     meshes = []
     for layer in range(sheets.num_layers):
         own = kept[:, layer] if kept[:, layer].any() else np.ones(len(faces), bool)
-        meshes.append(sheet_mesh(fitted, layer, faces[own], towards))
+        meshes.append(sheet_mesh(fitted, layer, faces[own], uv))
     return meshes
 
 
@@ -82,12 +84,13 @@ def contribution(opacity: NDArray[np.uint8], least: float) -> Array:
     return np.asarray(alpha * np.maximum(transmittance_before(alpha, 0), least))
 
 
-def _positions(sheets: Sheets, layer: int, towards: Array) -> Array:
+def _positions(sheets: Sheets, layer: int, uv: Array) -> Array:
     """(n n, 5): a layer's points relative to c, and texture coordinates as lengths on a sphere of its median radius."""
     radii = sheets.radii[layer].reshape(-1).astype(np.float64)
     u0, u1, v0, v1 = sheets.window
     scale = np.median(radii) * math.pi / 2 * np.array([v1 - v0, u1 - u0])
-    return np.concatenate([radii[:, None] * towards, sheets.st.reshape(-1, 2) * scale], -1)
+    points = sheets.chart.points(uv, radii) - np.array(sheets.chart.centre)
+    return np.concatenate([points, sheets.st.reshape(-1, 2) * scale], -1)
 
 
 def _borders(n: int) -> NDArray[np.uint8]:

@@ -22,8 +22,9 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from facefolds_core.errors import UserError
 from facefolds_core.export.poisson import compact, largest_component
 from facefolds_core.export.stores import Grids
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
-from facefolds_core.geometry.sphere_uv import Window, points_to_uv, texel_uv, uv_to_st
+from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_st
 from facefolds_core.params import DecimateParams
 from facefolds_core.progress import progress as progress_bar
 
@@ -40,7 +41,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Order:
-    """Neighbouring layers compared along rays from c through the vertices of both.
+    """Neighbouring layers compared along the chart's rays through the vertices of both.
 
     Attributes:
         compared: vertices whose ray meets the other layer.
@@ -54,7 +55,7 @@ class Order:
 
 
 def decimate_layers(
-    surfaces: Sequence[Surface], grids: Grids, centre: Array, params: DecimateParams, progress: bool = True
+    surfaces: Sequence[Surface], grids: Grids, params: DecimateParams, progress: bool = True
 ) -> list[TexturedMesh]:
     """Decimate all layers and give them texture coordinates.
 
@@ -70,7 +71,7 @@ def decimate_layers(
         )
     meshes = []
     for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
-        coarse = decimate(surface, params.resolution**2, centre, params.aggressiveness)
+        coarse = decimate(surface, params.resolution**2, grids.chart, params.aggressiveness)
         if len(coarse.faces) == 0:
             raise UserError(
                 "decimation left nothing of a layer",
@@ -79,17 +80,17 @@ def decimate_layers(
                 found=f"{len(surface.faces)} triangles before, none after",
                 remedy="raise decimate.resolution",
             )
-        st = layer_st(coarse.vertices, grids, i, centre, params.uv)
+        st = layer_st(coarse.vertices, grids, i, params.uv)
         meshes.append(TexturedMesh(coarse.vertices, coarse.faces, st))
     return meshes
 
 
 def decimate(
-    surface: Surface, max_vertices: int, centre: Array, aggressiveness: Sequence[float] = _USUAL.aggressiveness
+    surface: Surface, max_vertices: int, chart: Chart, aggressiveness: Sequence[float] = _USUAL.aggressiveness
 ) -> Surface:
     """Collapse edges until at most `max_vertices` vertices are left; drop faces that turned over or lost their area.
 
-    Layers are level sets that rays towards `centre` meet first, so every face looks away from it.
+    Layers are level sets that the chart's rays meet once, so every face looks along them.
     """
     vertices, faces = surface.vertices.astype(np.float64), surface.faces.astype(np.intp)
     # Euler: an open sheet has F = 2 V - 2 - B triangles, B its border vertices, a few times sqrt(V) after decimation.
@@ -99,7 +100,7 @@ def decimate(
             found, index = fast_simplification.simplify(
                 surface.vertices, surface.faces, target_count=target, agg=attempt
             )
-            kept = index[upright_faces(found, index, centre)].astype(np.intp)
+            kept = index[upright_faces(found, index, chart)].astype(np.intp)
             vertices, faces = compact(found.astype(np.float64), largest_component(kept, len(found)))
             target -= max(1, 2 * (len(vertices) - max_vertices))
     if len(vertices) > max_vertices:
@@ -107,23 +108,23 @@ def decimate(
     return Surface(vertices.astype(np.float32), faces.astype(np.int32))
 
 
-def upright_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32], centre: Array) -> NDArray[np.bool_]:
-    """(F,) bool: faces that have an area and look away from `centre`."""
+def upright_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32], chart: Chart) -> NDArray[np.bool_]:
+    """(F,) bool: faces that have an area and look along the chart's rays, outwards."""
     corners = vertices[faces].astype(np.float64)
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(a, b)
     longest = np.max([(edge**2).sum(-1) for edge in (a, b, b - a)], axis=0)
-    outward = (normal * (corners.mean(1) - centre)).sum(-1) > 0
+    outward = (normal * chart.outward(corners.mean(1))).sum(-1) > 0
     return np.asarray(outward & (np.linalg.norm(normal, axis=-1) > FLAT * longest))
 
 
 def layer_st(
-    vertices: NDArray[np.float32], grids: Grids, layer: int, centre: Array, uv: Literal["nearest", "exact"]
+    vertices: NDArray[np.float32], grids: Grids, layer: int, uv: Literal["nearest", "exact"]
 ) -> NDArray[np.float32]:
     """(V, 2) float32 layer-local texture coordinates of a layer's vertices."""
     window = grids.window(layer)
     if uv == "exact":
-        return exact_st(vertices, window, centre)
+        return exact_st(vertices, window, grids.chart)
     return nearest_st(vertices, grids.points[layer], grids.valid[layer])
 
 
@@ -142,29 +143,27 @@ def nearest_st(
     return np.asarray(st[nearest], np.float32)
 
 
-def exact_st(vertices: NDArray[np.float32], window: Window, centre: Array) -> NDArray[np.float32]:
-    """Texture coordinates by their definition, the direction from c; beyond the window they stop at its edge."""
-    uv, _ = points_to_uv(vertices.astype(np.float64), centre)
+def exact_st(vertices: NDArray[np.float32], window: Window, chart: Chart) -> NDArray[np.float32]:
+    """Texture coordinates by their definition, the chart's; beyond the window they stop at its edge."""
+    uv, _ = chart.uv(vertices.astype(np.float64))
     return np.asarray(uv_to_st(uv, window).clip(0, 1), np.float32)
 
 
-def layer_order(meshes: Sequence[Surface], centre: Array) -> Order:
+def layer_order(meshes: Sequence[Surface], chart: Chart) -> Order:
     """Count the vertices of each layer that lie on the wrong side of a neighbouring layer."""
     compared, crossed, deepest = 0, 0, 0.0
     for outer, inner in pairwise(meshes):
-        for beyond in (_heights(inner, outer, centre), -_heights(outer, inner, centre)):
+        for beyond in (_heights(inner, outer, chart), -_heights(outer, inner, chart)):
             compared += len(beyond)
             crossed += int((beyond > CROSSING_TOLERANCE).sum())
             deepest = max(deepest, float(beyond.max(initial=0.0)))
     return Order(compared, crossed, deepest)
 
 
-def _heights(mesh: Surface, other: Surface, centre: Array) -> Array:
-    """By how much the vertices of `mesh` lie farther from c than `other`, of those whose ray meets it."""
-    offset = mesh.vertices.astype(np.float64) - centre
-    radius = np.linalg.norm(offset, axis=-1)
+def _heights(mesh: Surface, other: Surface, chart: Chart) -> Array:
+    """By how much the vertices of `mesh` lie farther out than `other`, of those whose ray meets it."""
+    uv, radius = chart.uv(mesh.vertices.astype(np.float64))
+    origins = chart.origins(uv)
     caster = RayMeshIntersector(Trimesh(other.vertices, other.faces, process=False))
-    _, ray, points = caster.intersects_id(
-        np.tile(centre, (len(offset), 1)), offset / radius[:, None], multiple_hits=False, return_locations=True
-    )
-    return np.asarray(radius[ray] - np.linalg.norm(points - centre, axis=-1))
+    _, ray, points = caster.intersects_id(origins, chart.directions(uv), multiple_hits=False, return_locations=True)
+    return np.asarray(radius[ray] - np.linalg.norm(points - origins[ray], axis=-1))

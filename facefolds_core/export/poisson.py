@@ -112,7 +112,7 @@ def gather_samples(grids: Grids, layer: int, resolution: int | None) -> Samples:
     r = grids.resolution
     step = 1 if resolution is None else max(1, round(r / resolution))
     first = (r - 1) % step // 2
-    strides = row_strides(r, window) * step
+    strides = row_strides(r, window, grids.chart.lowest) * step
     columns = np.arange(r)
     keep = ((columns[None] - (first + (r - 1 - first) % strides // 2)[:, None]) % strides[:, None]) == 0
     keep &= ((columns - first) % step == 0)[:, None]

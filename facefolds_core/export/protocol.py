@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 
@@ -56,6 +57,16 @@ class LayeredModel(Protocol):
     @property
     def centre(self) -> Tensor:
         """[3], c."""
+        ...
+
+    @property
+    def chart(self) -> Chart:
+        """Where (u, v) and radii lie."""
+        ...
+
+    @property
+    def window(self) -> Window:
+        """(u0, u1, v0, v1) beyond which there are no surfaces."""
         ...
 
     def crossings(self, origins: Tensor, directions: Tensor) -> CrossingsLike: ...

@@ -1,9 +1,11 @@
 """Radii at the vertices of a decimated triangulation, fitted to all samples.
 
 Along a direction d = sum_k a_k d_k in a triangle's cone the mesh lies at 1/t = sum_k a_k / rho_k (see `sheets`): linear
-in the inverse radii. So each layer's are the solution of a sparse linear least-squares problem. A sample's residual is
-weighted by how much it shows and by the cosine between the surface's normal and d, which turns a distance along d into
-one from the surface: a steep place may be off along d without being off.
+in the inverse radii. So each layer's are the solution of a sparse linear least-squares problem. Below a chart's belt,
+where rays slide down an axis, it is the radius itself that is linear, with the shares b_k of (u, v): there 1 / rho_k is
+taken to first order around the samples' radii. A sample's residual is weighted by how much it shows and by the cosine
+between the surface's normal and d, which turns a distance along d into one from the surface: a steep place may be off
+along d without being off.
 """
 
 from __future__ import annotations
@@ -22,41 +24,75 @@ from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.params import RefitParams
 
 
-def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], towards: Array, params: RefitParams) -> Sheets:
+def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Array, params: RefitParams) -> Sheets:
     """The same sheets with new radii at the vertices that `faces` use, nested as before.
 
     Args:
         shows: (N, n, n) weights of the samples.
         faces: (F, 3) over the grid's vertices.
-        towards: (n n, 3) unit directions of the grid's vertices.
+        uv: (n n, 2) of the grid's vertices.
     """
     face = locate(faces, len(sheets.st)).reshape(-1)
     inside = face >= 0
     used, index = np.unique(faces, return_inverse=True)
     corners = faces[face[inside]]
-    shares = np.linalg.solve(towards[corners].transpose(0, 2, 1), towards[inside][..., None])[..., 0]
+    shares, below = _shares(sheets, uv, corners, inside)
     rows = np.arange(0, 3 * len(corners) + 1, 3)
     columns = index.reshape(-1, 3)[face[inside]].reshape(-1)
-    matrix = csr_matrix((shares.reshape(-1), columns, rows), shape=(len(corners), len(used)))
     fitted = np.empty((sheets.num_layers, len(used)))
     for layer, radii in enumerate(sheets.radii.reshape(sheets.num_layers, -1).astype(np.float64)):
         cosines = radial_cosines(sheets, layer).reshape(-1)
         weight = shows[layer].reshape(-1) + params.empty_weight
         weights = (weight * np.maximum(cosines, params.min_cosine) ** 2)[inside]
+        values, wanted = _linear(shares, below, radii[corners], radii[inside])
+        matrix = csr_matrix((values.reshape(-1), columns, rows), shape=(len(corners), len(used)))
         normal = matrix.T @ diags(weights) @ matrix
         stay = diags(params.stay * normal.diagonal() + 1e-6)
-        right = matrix.T @ (weights / radii[inside]) + stay @ (1 / radii[used])
+        right = matrix.T @ (weights * wanted) + stay @ (1 / radii[used])
         fitted[layer] = 1 / spsolve((normal + stay).tocsc(), right)
     result = sheets.radii.reshape(sheets.num_layers, -1).copy()
     result[:, used] = np.minimum.accumulate(fitted, 0)
     return Sheets(**{**vars(sheets), "radii": result.reshape(sheets.radii.shape)})
 
 
+def _shares(sheets: Sheets, uv: Array, corners: NDArray[np.int64], inside: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Of samples in triangles with `corners` (S, 3): their shares (S, 3), and (S,) bool whether they are of (u, v)."""
+    chart = sheets.chart
+    below = np.asarray(chart.below(uv)[inside] | chart.below(uv)[corners].any(1))
+    directions = np.asarray(chart.directions(uv))
+    flat = np.concatenate([uv, np.ones((len(uv), 1))], 1)
+    shares = np.empty(corners.shape)
+    for which, vectors in ((~below, directions), (below, flat)):
+        own, aims = vectors[corners[which]].transpose(0, 2, 1), vectors[inside][which][..., None]
+        shares[which] = np.linalg.solve(own, aims)[..., 0]
+    return shares, below
+
+
+def _linear(shares: Array, below: Array, around: Array, radii: Array) -> tuple[Array, Array]:
+    """Factors (S, 3) of the corners' inverse radii and right sides (S,), in units of inverse radii.
+
+    Args:
+        shares, below: of `_shares`.
+        around: (S, 3) radii of the samples at the corners.
+        radii: (S,) of the samples.
+    """
+    values = np.where(below[:, None], shares * (around / radii[:, None]) ** 2, shares)
+    wanted = np.where(below, 2 * (shares * around).sum(1) / radii - 1, 1) / radii
+    return values, wanted
+
+
 def radial_cosines(sheets: Sheets, layer: int) -> Array:
-    """(n, n) cosines between a layer's normals and directions from c: 1 / sqrt(1 + |grad ln rho|^2) on the sphere."""
+    """(n, n) cosines between a layer's normals and its rays: 1 / sqrt(1 + |grad ln rho|^2) on the sphere.
+
+    Below a belt a step in u is as long everywhere, and the rays' own slant is left out.
+    """
     u0, u1, v0, v1 = (float(x) for x in sheets.window)
     uv = st_to_uv(sheets.st, (u0, u1, v0, v1)) * (math.pi / 2)
-    logarithm = np.log(sheets.radii[layer].astype(np.float64))
+    radii, belt = sheets.radii[layer].astype(np.float64), sheets.chart.belt
+    logarithm = np.log(radii)
     down = np.gradient(logarithm, uv[:, 0, 0], axis=0)
-    right = np.gradient(logarithm, uv[0, :, 1], axis=1) / np.maximum(np.cos(uv[..., 0]), 1e-6)
+    lowest = -math.pi / 2 if belt is None else -belt.elevation
+    right = np.gradient(logarithm, uv[0, :, 1], axis=1) / np.maximum(np.cos(np.maximum(uv[..., 0], lowest)), 1e-6)
+    if belt is not None:
+        down = np.where(uv[..., 0] < lowest, down * radii / belt.girth, down)
     return np.asarray(1 / np.sqrt(1 + down**2 + right**2))

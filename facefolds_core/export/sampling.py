@@ -19,6 +19,7 @@ from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.source_code import digest_of_packages
@@ -57,10 +58,9 @@ def sample_grids(model: LayeredModel, resolution: int, window: Window, progress:
             flat_valid[:, start:stop] = hit.cpu().numpy()
             bar.update(len(uv[start:stop]))
     _check_points(points, valid)
-    c = centre.cpu().numpy().astype(np.float64)
-    normals = np.stack([grid_normals(p, v, c, window) for p, v in zip(points, valid, strict=True)])
+    normals = np.stack([grid_normals(p, v, model.chart, window) for p, v in zip(points, valid, strict=True)])
     windows = np.tile(np.array(window, np.float64), (model.num_layers, 1))
-    return Grids(points, normals.astype(np.float32), valid, valid.astype(np.uint8) * 255, windows, c)
+    return Grids(points, normals.astype(np.float32), valid, valid.astype(np.uint8) * 255, windows, model.chart)
 
 
 def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None:
@@ -84,27 +84,27 @@ def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None
             )
 
 
-def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], centre: Array, window: Window) -> Array:
+def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], chart: Chart, window: Window) -> Array:
     """Unit outward normals from neighbouring samples.
 
     The normal is the cross product of two chords, from the previous to the next sample down the column and along the
     row; where one of the two does not exist (border, invalid neighbour) the sample itself stands for it. Near the poles
     a row's samples crowd together, so its chords span more columns, about as long as a column's. A sample without
-    usable neighbours gets the direction from `centre`.
+    usable neighbours gets the direction of its ray.
 
     Args:
         points: (R, R, 3).
         valid: (R, R).
-        centre: (3,), c; outward means away from it.
+        chart: outward means along its rays.
         window: (u0, u1, v0, v1).
 
     Returns:
-        (R, R, 3) float64; also where `valid` is false (the direction from `centre`, or +x).
+        (R, R, 3) float64; also where `valid` is false (the direction of its ray).
     """
     r = len(points)
     p = points.astype(np.float64)
     rows, columns = np.meshgrid(np.arange(r), np.arange(r), indexing="ij")
-    stride = np.minimum(row_strides(r, window), max(r // 8, 1))[:, None]
+    stride = np.minimum(row_strides(r, window, chart.lowest), max(r // 8, 1))[:, None]
 
     def neighbour(i: NDArray[np.intp], j: NDArray[np.intp]) -> Array:
         i, j = i.clip(0, r - 1), j.clip(0, r - 1)
@@ -114,9 +114,7 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], centre: 
     right = neighbour(rows, columns + stride) - neighbour(rows, columns - stride)
     normal = np.cross(down, right)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    outward = p - centre
-    outward[~valid] = (1.0, 0.0, 0.0)
-    outward /= np.maximum(np.linalg.norm(outward, axis=-1, keepdims=True), 1e-12)
+    outward = chart.directions(texel_uv(r, r, window))
     # Parallel or missing chords: the product's length is rounding error next to the chords'.
     scale = np.linalg.norm(down, axis=-1, keepdims=True) * np.linalg.norm(right, axis=-1, keepdims=True)
     usable = valid[..., None] & (length > 1e-3 * scale) & (scale > 0)

@@ -1,12 +1,13 @@
 """Nested sheets: all layers as radii on one grid of directions from c, and as meshes that share one triangulation.
 
-A layer is star-shaped around c: over a direction it has one radius. So a mesh of a layer is a triangulation of the
-window of directions with a radius at each vertex, and one triangulation serves all layers.
+Over each (u, v) of a chart a layer has one radius. So a mesh of a layer is a triangulation of the window with a radius
+at each vertex, and one triangulation serves all layers.
 
 *Nested by construction.* Let d = sum_k a_k d_k, a_k >= 0, be a direction inside the cone of a triangle with vertices
 rho_k d_k. It meets the triangle's plane at the distance t with t d = sum_k b_k rho_k d_k, sum b_k = 1, that is
 1/t = sum_k a_k / rho_k. This grows when any rho_k falls: if no vertex of a layer lies farther out than that of the
-layer around it, then no point of it does.
+layer around it, then no point of it does. (Below a belt rays have different origins, and this holds for points of equal
+shares b only: a layer's point is the outer layer's, moved by sum_k b_k (rho_k - rho'_k) d_k, against the rays.)
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from scipy.ndimage import distance_transform_edt
 
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_directions, uv_to_st
+from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_st
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Gridded:
     along = slice((grids.resolution - 1) % step // 2, None, step)
     thin = (slice(None), along, along)
     valid = grids.valid[thin]
-    radii = np.linalg.norm(grids.points[thin].astype(np.float64) - grids.centre, axis=-1)
+    _, radii = grids.chart.uv(grids.points[thin].astype(np.float64))
     for layer, known in enumerate(valid):
         nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
         radii[layer] = radii[layer][tuple(nearest)]
@@ -67,14 +68,14 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Gridded:
     )
     window = grids.window(0)
     st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
-    sheets = Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.centre)
+    sheets = Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
     return Gridded(sheets, int((beyond > 0).sum()), float(beyond.max(initial=0.0)))
 
 
-def directions(sheets: Sheets) -> Array:
-    """(n n, 3) unit directions of the grid's vertices."""
+def vertex_uv(sheets: Sheets) -> Array:
+    """(n n, 2) (u, v) of the grid's vertices."""
     u0, u1, v0, v1 = (float(x) for x in sheets.window)
-    return np.asarray(uv_to_directions(st_to_uv(sheets.st.reshape(-1, 2), (u0, u1, v0, v1))))
+    return np.asarray(st_to_uv(sheets.st.reshape(-1, 2), (u0, u1, v0, v1)))
 
 
 def sheet_faces(sheets: Sheets) -> NDArray[np.int64]:
@@ -88,24 +89,24 @@ def sheet_faces(sheets: Sheets) -> NDArray[np.int64]:
     return np.stack([first, second], 2).reshape(-1, 3)
 
 
-def sheet_mesh(sheets: Sheets, layer: int, faces: NDArray[np.int64], towards: Array) -> TexturedMesh:
+def sheet_mesh(sheets: Sheets, layer: int, faces: NDArray[np.int64], uv: Array) -> TexturedMesh:
     """Mesh of one layer from faces over the grid's vertices; vertices that no face uses are dropped.
 
     Args:
         faces: (F, 3).
-        towards: of `directions`.
+        uv: of `vertex_uv`.
     """
     used, index = np.unique(faces, return_inverse=True)
     radii = sheets.radii[layer].reshape(-1)[used].astype(np.float64)
-    vertices = sheets.centre + radii[:, None] * towards[used]
+    vertices = sheets.chart.points(uv[used], radii)
     st = sheets.st.reshape(-1, 2)[used].astype(np.float32)
     return TexturedMesh(vertices.astype(np.float32), index.reshape(-1, 3).astype(np.int32), st)
 
 
 def full_meshes(sheets: Sheets) -> list[TexturedMesh]:
     """All layers at the grid's resolution; no face where a sample is not valid."""
-    faces, towards = sheet_faces(sheets), directions(sheets)
+    faces, uv = sheet_faces(sheets), vertex_uv(sheets)
     return [
-        sheet_mesh(sheets, layer, faces[known.reshape(-1)[faces].all(1)], towards)
+        sheet_mesh(sheets, layer, faces[known.reshape(-1)[faces].all(1)], uv)
         for layer, known in enumerate(sheets.valid)
     ]

@@ -29,7 +29,6 @@ from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW
 from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams
 from facefolds_core.progress import progress
 from facefolds_core.source_code import digest_of_packages
@@ -65,7 +64,7 @@ def sample_model(
     from facefolds_core.export.sampling import sample_grids, write_textures
     from facefolds_core.export.window import visible_window
 
-    window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else FULL_WINDOW
+    window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else model.window
     grids = sample_grids(model, params.resolution, window)
     opacity = write_textures(folder / TEXTURES, model, grids, kept)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
@@ -85,7 +84,7 @@ def decimate(surfaces: Surfaces, grids: Grids, params: DecimateParams) -> list[T
     """Every layer with at most R^m x R^m vertices, and texture coordinates."""
     if isinstance(surfaces, Sheets):
         return decimate_sheets(surfaces, params.resolution**2, params)
-    return decimate_layers(surfaces, grids, grids.centre, params)
+    return decimate_layers(surfaces, grids, params)
 
 
 def decimate_levels(

@@ -1,7 +1,8 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
 - `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, opacity (N, R, R) uint8,
-  windows (N, 4) float64, centre (3,) float64; of a model with a reflection its arrays, as `reflection_gloss`, ...;
+  windows (N, 4) float64, centre (3,) float64, belt (0,) or (2,) float64 of the chart; of a model with a reflection its
+  arrays, as `reflection_gloss`, ...;
 - `surfaces/surfaces.npz`: of `poisson` vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer; of
   `grid` the arrays of `Sheets`;
 - `meshes/meshes.npz`: such pairs and st_00 (V, 2) float32, layer-local texture coordinates.
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
@@ -38,7 +40,7 @@ class Grids:
         valid: (N, R, R) bool: the layer has a point in this direction.
         opacity: (N, R, R) uint8: no frame's alpha is larger, as a code of 8 bits; 0 where not valid.
         windows: (N, 4) float64, (u0, u1, v0, v1) of each layer's grid.
-        centre: (3,) float64, the model's c.
+        chart: the model's.
         reflection: what the model adds by the direction, or None.
     """
 
@@ -47,7 +49,7 @@ class Grids:
     valid: NDArray[np.bool_]
     opacity: NDArray[np.uint8]
     windows: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    chart: Chart
     reflection: ReflectionMaps | None = None
 
     @property
@@ -69,12 +71,12 @@ class Sheets:
 
     Attributes:
         st: (n, n, 2) float64, texture coordinates of the grid's vertices: rows down, columns right.
-        radii: (N, n, n) float32, distance from c, outermost layer first; defined everywhere.
+        radii: (N, n, n) float32, of the chart, outermost layer first; defined everywhere.
         valid: (N, n, n) bool: the layer has a point there.
         opacity: (N, n, n) uint8, as in `Grids`.
         falling: (n - 1, n - 1) bool: the cell's diagonal goes from its top left to its bottom right corner.
         window: (4,) float64, (u0, u1, v0, v1) of the texture coordinates.
-        centre: (3,) float64, c.
+        chart: of the radii.
     """
 
     st: NDArray[np.float64]
@@ -83,7 +85,7 @@ class Sheets:
     opacity: NDArray[np.uint8]
     falling: NDArray[np.bool_]
     window: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    chart: Chart
 
     @property
     def num_layers(self) -> int:
@@ -91,7 +93,9 @@ class Sheets:
 
 
 def write_grids(path: Path, grids: Grids) -> None:
-    arrays = {field.name: getattr(grids, field.name) for field in fields(grids) if field.name != "reflection"}
+    apart = ("reflection", "chart")
+    arrays = {field.name: getattr(grids, field.name) for field in fields(grids) if field.name not in apart}
+    arrays |= _chart_arrays(grids.chart)
     if grids.reflection is not None:
         arrays |= {f"reflection_{name}": np.asarray(value) for name, value in vars(grids.reflection).items()}
     _write(path, arrays)
@@ -107,7 +111,7 @@ def read_grids(path: Path) -> Grids:
         valid=_take(arrays, path, "valid", (n, r, r), np.bool_),
         opacity=_take(arrays, path, "opacity", (n, r, r), np.uint8),
         windows=_take(arrays, path, "windows", (n, 4), np.float64),
-        centre=_take(arrays, path, "centre", (3,), np.float64),
+        chart=_take_chart(arrays, path),
     )
     _check_windows(grids.windows, path)
     return replace(grids, reflection=read_reflection_maps(path))
@@ -140,16 +144,31 @@ def read_windows(path: Path) -> list[Window]:
     return [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in windows]
 
 
-def read_centre(path: Path) -> tuple[float, float, float]:
-    """Only the sphere centre c in a file of `write_grids`; raises as `read_grids` does."""
-    x, y, z = (float(value) for value in _take(_read(path, {"centre"}), path, "centre", (3,), np.float64))
-    return x, y, z
+def read_chart(path: Path) -> Chart:
+    """Only the chart in a file of `write_grids`; raises as `read_grids` does."""
+    return _take_chart(_read(path, {"centre", "belt"}), path)
+
+
+def _chart_arrays(chart: Chart) -> dict[str, NDArray[Any]]:
+    belt = () if chart.belt is None else (chart.belt.elevation, chart.belt.girth)
+    return {"centre": np.array(chart.centre, np.float64), "belt": np.array(belt, np.float64)}
+
+
+def _take_chart(arrays: dict[str, NDArray[Any]], path: Path) -> Chart:
+    x, y, z = (float(value) for value in _take(arrays, path, "centre", (3,), np.float64))
+    numbers = _take(arrays, path, "belt", (len(arrays.get("belt", ())),), np.float64)
+    if len(numbers) == 0:
+        return Chart((x, y, z))
+    elevation, girth = (float(value) for value in numbers) if len(numbers) == 2 else (-1.0, 0.0)
+    if not (0 <= elevation < np.pi / 2 and girth > 0):
+        raise _damaged(path, "belt", "nothing, or an elevation from 0 to below pi / 2 and a girth", numbers.tolist())
+    return Chart((x, y, z), Belt(elevation, girth))
 
 
 def _check_windows(windows: NDArray[np.float64], path: Path) -> None:
     u0, u1, v0, v1 = windows.T
-    if not ((u0 < u1).all() and (v0 < v1).all() and (np.abs(windows) <= 1).all()):
-        expected = "(u0, u1, v0, v1) with -1 <= u0 < u1 <= 1 and likewise v"
+    if not ((u0 < u1).all() and (v0 < v1).all() and (np.abs(windows) <= 2).all()):
+        expected = "(u0, u1, v0, v1) with -2 <= u0 < u1 <= 2 and likewise v"
         raise _damaged(path, "windows", expected, windows.tolist())
 
 
@@ -167,7 +186,8 @@ def read_surfaces(path: Path) -> list[Surface]:
 
 
 def write_sheets(path: Path, sheets: Sheets) -> None:
-    _write(path, {field.name: getattr(sheets, field.name) for field in fields(sheets)})
+    arrays = {field.name: getattr(sheets, field.name) for field in fields(sheets) if field.name != "chart"}
+    _write(path, arrays | _chart_arrays(sheets.chart))
 
 
 def holds_sheets(path: Path) -> bool:
@@ -186,7 +206,7 @@ def read_sheets(path: Path) -> Sheets:
         opacity=_take(arrays, path, "opacity", (layers, n, n), np.uint8),
         falling=_take(arrays, path, "falling", (n - 1, n - 1), np.bool_),
         window=_take(arrays, path, "window", (4,), np.float64),
-        centre=_take(arrays, path, "centre", (3,), np.float64),
+        chart=_take_chart(arrays, path),
     )
     _check_windows(sheets.window[None], path)
     if not ((sheets.radii > 0).all() and (np.diff(sheets.radii, axis=0) <= 0).all()):

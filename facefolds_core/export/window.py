@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import AutoWindowParams
 
 _USUAL = AutoWindowParams()
@@ -32,7 +32,7 @@ def visible_window(model: LayeredModel, cameras: Sequence[Camera], params: AutoW
         cameras: the training cameras.
 
     Returns:
-        the window, cut to the hemisphere; the whole hemisphere if the model is transparent everywhere.
+        the window, cut to the model's; the model's if it is transparent everywhere.
     """
     frames = sorted({round(f) for f in np.linspace(0, model.num_frames - 1, params.frames)})
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
@@ -43,8 +43,9 @@ def visible_window(model: LayeredModel, cameras: Sequence[Camera], params: AutoW
             low, high = np.minimum(low, seen.min(0)), np.maximum(high, seen.max(0))
             margin = max(margin, params.margin * step)
     if not np.isfinite(low).all():
-        return FULL_WINDOW
-    (u0, v0), (u1, v1) = np.maximum(low - margin, -1.0), np.minimum(high + margin, 1.0)
+        return model.window
+    least, most = np.array(model.window).reshape(2, 2).T
+    (u0, v0), (u1, v1) = np.maximum(low - margin, least), np.minimum(high + margin, most)
     return float(u0), float(u1), float(v0), float(v1)
 
 
@@ -64,10 +65,9 @@ def _seen_uv(
     seen = hit & (weights > max_change / model.num_layers)
     if not seen.any():
         return np.zeros((0, 2)), 0.0
-    centre = model.centre.detach().cpu().numpy()
     footprint = stride / min(camera.K[0, 0], camera.K[1, 1])
     distance = np.linalg.norm(points[seen] - camera.centre, axis=-1)
-    radius = np.linalg.norm(points[seen] - centre, axis=-1)
+    _, radius = model.chart.uv(points[seen])
     return uv[seen], float(np.median(footprint * distance / radius) * 2 / math.pi)
 
 
@@ -82,7 +82,7 @@ def _crossings(
     o, d = torch.as_tensor(np.array(origins)).to(centre), torch.as_tensor(directions).to(centre)
     with torch.no_grad():
         crossings = model.crossings(o, d)
-        uv, _ = points_to_uv(crossings.points, centre)
+        uv, _ = model.chart.uv(crossings.points)
         weights = torch.stack([model.render(o, d, float(f), view_effects=False).weights for f in frames]).amax(0)
     return (
         uv.double().cpu().numpy(),

@@ -80,7 +80,12 @@ def texel_uv(height: int, width: int, window: Window = FULL_WINDOW) -> np.ndarra
     return np.asarray(st_to_uv(np.stack([s, t], -1), window))
 
 
-def row_strides(resolution: int, window: Window) -> NDArray[np.intp]:
-    """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation)."""
-    u = texel_uv(resolution, resolution, window)[:, 0, 0]
-    return np.maximum(np.rint(1 / np.maximum(np.cos(u * np.pi / 2), 1e-9)), 1).clip(max=resolution).astype(np.intp)
+def row_strides(resolution: int, window: Window, lowest: float = -math.inf) -> NDArray[np.intp]:
+    """(R,) how many columns of each row span the same angle as one column does at the equator: 1 / cos(elevation).
+
+    Args:
+        lowest: no row's u counts as less: below a chart's belt elevations stay as they are.
+    """
+    u = np.maximum(texel_uv(resolution, resolution, window)[:, 0, 0], lowest)
+    strides = np.rint(1 / np.maximum(np.cos(u * np.pi / 2), 1e-9))
+    return np.asarray(np.clip(strides, 1, resolution), np.intp)

@@ -51,7 +51,7 @@ class Crossings:
 
 
 def search_interval(
-    origins: Tensor, directions: Tensor, centre: Tensor, radius: float
+    origins: Tensor, directions: Tensor, centre: Tensor, radius: float, front: bool = True
 ) -> tuple[Tensor, Tensor, Tensor]:
     """The stretch of each ray inside the half ball |x - c| < radius, x > c_x, ahead of its origin.
 
@@ -61,6 +61,7 @@ def search_interval(
     Args:
         origins, directions: [R, 3], directions of unit length.
         centre: [3].
+        front: the half with x > c_x alone; False for the whole ball.
 
     Returns:
         near [R], far [R] and valid [R] bool; near = far = 0 where the ray misses the half ball.
@@ -70,6 +71,10 @@ def search_interval(
     discriminant = along**2 - ((offset**2).sum(-1) - radius**2)
     half_chord = discriminant.clamp(min=0).sqrt()
     near, far = -along - half_chord, -along + half_chord
+    if not front:
+        near = near.clamp(min=0)
+        valid = (discriminant > 0) & (far > near)
+        return torch.where(valid, near, 0.0), torch.where(valid, far, 0.0), valid
     x, dx = offset[:, 0], directions[:, 0]
     plane = -x / torch.where(dx == 0, torch.ones_like(dx), dx)
     near = torch.where(dx > 0, torch.maximum(near, plane), near).clamp(min=0)

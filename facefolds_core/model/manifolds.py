@@ -9,7 +9,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import silu
 
-from facefolds_core.geometry.sphere_uv import uv_to_directions
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, uv_to_directions
 from facefolds_core.model.intersection import Crossings, first_crossings
 from facefolds_core.model.layers import LinearStack
 
@@ -29,6 +30,16 @@ class Manifolds(Protocol):
         ...
 
     @property
+    def chart(self) -> Chart:
+        """Where (u, v) and radii lie."""
+        ...
+
+    @property
+    def window(self) -> Window:
+        """(u0, u1, v0, v1) beyond which there are no surfaces."""
+        ...
+
+    @property
     def radius(self) -> float:
         """Radius of the ball around c that encloses all layers."""
         ...
@@ -38,7 +49,7 @@ class Manifolds(Protocol):
         ...
 
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
-        """Directions (u, v) [M, 2] -> distance of each layer from c [M, N], and whether it has a point there [M, N]."""
+        """Directions (u, v) [M, 2] -> radius of each layer [M, N], and whether it has a point there [M, N]."""
         ...
 
     def regularisation(self) -> Tensor:
@@ -79,6 +90,8 @@ class MlpManifolds(nn.Module):
         output_scale: float = 1.0,
     ) -> None:
         super().__init__()
+        x, y, z = centre
+        self.chart, self.window = Chart((x, y, z)), FULL_WINDOW
         self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
         self.register_buffer("levels", torch.tensor(levels, dtype=torch.float32))
         self.radius = radius

@@ -1,4 +1,6 @@
-"""Explicit surfaces: N nested radius maps over a window of (u, v). Layer i is {x : |x - c| = rho_i(u(x), v(x))}."""
+"""Explicit surfaces: N nested radius maps over a window of (u, v). Layer i is {x : r(x) = rho_i(u(x), v(x))}.
+
+(u, v) and r are those of a chart (`geometry/chart.py`); without a belt r = |x - c|."""
 
 from __future__ import annotations
 
@@ -8,12 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from facefolds_core.geometry.sphere_uv import Window, points_to_uv
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.intersection import Crossings, search_interval
 from facefolds_core.model.radial_kernel import ceiling, crossing_distances
 
 MIN_SLOPE = 0.1
-"""|d(|x - c| - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
+"""|d(r - rho) / d distance| is bounded below by this in gradients, as in `intersection`."""
 
 STEP = 0.005
 """Distance between samples of the search, units: a twentieth of a nose."""
@@ -31,7 +34,7 @@ class RadialManifolds(nn.Module):
     would see the exported mesh.
 
     Args:
-        centre: c.
+        chart: where (u, v) and radii lie.
         window: (u0, u1, v0, v1).
         middle: [rows, columns] radii, units.
         halfwidth: [rows, columns], positive, units.
@@ -40,11 +43,10 @@ class RadialManifolds(nn.Module):
 
     centre: Tensor
 
-    def __init__(
-        self, centre: tuple[float, ...], window: Window, middle: Tensor, halfwidth: Tensor, num_layers: int
-    ) -> None:
+    def __init__(self, chart: Chart, window: Window, middle: Tensor, halfwidth: Tensor, num_layers: int) -> None:
         super().__init__()
-        self.register_buffer("centre", torch.tensor(centre, dtype=torch.float32))
+        self.chart = chart
+        self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
         self.window = window
         self.num_layers = num_layers
         self.middle = nn.Parameter(middle.clone())
@@ -52,7 +54,15 @@ class RadialManifolds(nn.Module):
 
     @property
     def radius(self) -> float:
-        return float((self.middle + self.halfwidth).detach().max()) + MARGIN
+        """Of a ball around c that holds all layers, units."""
+        outermost = (self.middle + self.halfwidth).detach()
+        if self.chart.belt is None:
+            return float(outermost.max()) + MARGIN
+        u0, u1, v0, v1 = self.window
+        rows, columns = outermost.shape
+        u, v = torch.linspace(u1, u0, rows), torch.linspace(v0, v1, columns)
+        points = self.chart.points(torch.stack(torch.meshgrid(u, v, indexing="ij"), -1).to(outermost), outermost)
+        return float((points - self.centre).norm(dim=-1).max()) + MARGIN
 
     def radii(self) -> Tensor:
         """[rows, columns, N], outermost first."""
@@ -79,16 +89,16 @@ class RadialManifolds(nn.Module):
     def tracer(self, gpu: bool = False) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """`compiled_distances` with the surfaces as they are now, prepared for many calls; on a GPU if asked for."""
         rho = self.radii().detach().cpu().numpy()
-        window = np.array(self.window)
-        top = ceiling(rho, window)
+        window, belt = np.array(self.window), self.chart.numbers
+        top = ceiling(rho, window, belt)
         if gpu:
             from facefolds_core.model.radial_gpu import Tracer
 
-            return Tracer(rho, window, top, self.radius, STEP)
+            return Tracer(rho, window, belt, top, self.radius, STEP)
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
-            found: np.ndarray = crossing_distances(offsets, directions, rho, window, top, self.radius, STEP)
+            found: np.ndarray = crossing_distances(offsets, directions, rho, window, belt, top, self.radius, STEP)
             return found
 
         return distances
@@ -113,7 +123,7 @@ class RadialManifolds(nn.Module):
     def reference_crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
         """The same in torch, differentiable in `middle` and `halfwidth`.
 
-        At the crossing found, d distance / d rho = 1 / (d(|x - c| - rho) / d distance), the slope without gradient and
+        At the crossing found, d distance / d rho = 1 / (d(r - rho) / d distance), the slope without gradient and
         bounded away from 0.
         """
         rho = self.radii()
@@ -134,7 +144,8 @@ class RadialManifolds(nn.Module):
 
     def _search(self, rho: Tensor, origins: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
         """First sign change between samples `STEP` apart at most, then 25 bisections. [R, N] distance and hit."""
-        near, far, valid = search_interval(origins, directions, self.centre, self.radius)
+        front = self.window[2] >= -1 and self.window[3] <= 1
+        near, far, valid = search_interval(origins, directions, self.centre, self.radius, front)
         samples = max(2, int(float((far - near).max()) / STEP) + 2)
         fraction = torch.linspace(0, 1, samples, dtype=near.dtype, device=near.device)
         s = near[:, None] + (far - near)[:, None] * fraction
@@ -152,11 +163,11 @@ class RadialManifolds(nn.Module):
         return torch.where(hit, 0.5 * (a + b), 0.0), hit
 
     def _heights(self, rho: Tensor, points: Tensor, all_layers: bool = False) -> tuple[Tensor, Tensor]:
-        """|x - c| - rho_i at points [R, S, 3], and whether they lie inside the window [R, S].
+        """r - rho_i at points [R, S, 3], and whether they lie inside the window [R, S].
 
         With all_layers: [R, S, N]. Without: S = N, point (r, i) is compared with layer i, [R, N].
         """
-        uv, r = points_to_uv(points, self.centre)
+        uv, r = self.chart.uv(points)
         y, x, inside = self._position(uv)
         rows, columns = self.middle.shape
         i = y.floor().clamp(0, rows - 2).long()

@@ -19,20 +19,22 @@ LAYERS = 1
 
 
 @entry
-def crossing_distances(offsets, directions, rho, window, ceiling, bound, step, result):
+def crossing_distances(offsets, directions, rho, window, belt, ceiling, bound, step, result):
     ray = cuda.grid(1)
     if ray < result.shape[0]:
         one = cuda.local.array(LAYERS, np.float64)
         other = cuda.local.array(LAYERS, np.float64)
-        cross(ray, offsets, directions, rho, window, ceiling, bound, step, result, one, other)
+        cross(ray, offsets, directions, rho, window, belt, ceiling, bound, step, result, one, other)
 
 
 class Tracer:
     """`radial_kernel.crossing_distances` with surfaces that stay on the GPU; its arguments are that function's."""
 
-    def __init__(self, rho: gpu.Array, window: gpu.Array, ceiling: gpu.Array, bound: float, step: float) -> None:
+    def __init__(
+        self, rho: gpu.Array, window: gpu.Array, belt: gpu.Array, ceiling: gpu.Array, bound: float, step: float
+    ) -> None:
         self._layers = int(rho.shape[2])
-        self._surfaces: tuple[Any, ...] = (*(gpu.to_gpu(array) for array in (rho, window, ceiling)), bound, step)
+        self._surfaces: tuple[Any, ...] = (*(gpu.to_gpu(array) for array in (rho, window, belt, ceiling)), bound, step)
 
     def __call__(self, offsets: gpu.Array, directions: gpu.Array) -> gpu.Array:
         """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""

@@ -11,6 +11,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from facefolds_core.geometry.chart_kernel import chart_position
 from facefolds_core.hit_codes import SCALE
 from facefolds_core.jit import compiled, inlined, kernel
 
@@ -20,10 +21,8 @@ _TO_UV = 2.0 / math.pi
 
 
 @inlined
-def _grid_position(x, y, z, r, window, rows, columns):  # type: ignore[no-untyped-def]
-    """Row and column (continuous, node 0 at the window's top left corner) of direction (x, y, z) / r."""
-    u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
-    v = _TO_UV * math.atan2(y, x)
+def _grid_position(u, v, window, rows, columns):  # type: ignore[no-untyped-def]
+    """Row and column (continuous, node 0 at the window's top left corner) of (u, v)."""
     row = (window[1] - u) / (window[1] - window[0]) * (rows - 1)
     column = (v - window[2]) / (window[3] - window[2]) * (columns - 1)
     return row, column
@@ -44,25 +43,27 @@ def _look_up(rho, row, column, layer):  # type: ignore[no-untyped-def]
 SKIP = 0.03
 """Length of a stride through empty space, units."""
 
-CEILING_CELLS = 64
-"""Cells a side of `ceiling`, over the whole hemisphere."""
+CEILING_CELLS = 128
+"""A side of `ceiling`, over u and v in [-2, 2]."""
 
 
-def ceiling(rho: Array, window: Array) -> Array:
+def ceiling(rho: Array, window: Array, belt: Array) -> Array:
     """(CEILING_CELLS, CEILING_CELLS) float32: a bound on the radii that a stride of SKIP from there can come near.
 
-    Cell (i, j) covers u in [-1, 1] from the top and v in [-1, 1] from the left. Its value is the largest outermost
-    radius at any grid node within the cell or within the angle under which SKIP is seen from c at the smallest radius;
-    0 where the window is farther away than that.
+    Cell (i, j) covers u from the top and v from the left. Its value is the largest outermost radius at any grid node
+    within the cell or within the angle under which SKIP is seen from the rays' origin at the smallest radius; 0 where
+    the window is farther away than that.
     """
     rows, columns = rho.shape[:2]
-    reach = _TO_UV * math.asin(min(1.0, SKIP / (float(rho.min()) - SKIP))) + 2.0 / CEILING_CELLS
+    stride = SKIP * belt[2]
+    reach = max(math.asin(min(1.0, stride / (float(rho.min()) - stride))), stride * belt[3] if belt[2] > 1 else 0.0)
+    reach = _TO_UV * reach + 4.0 / CEILING_CELLS
     top = np.zeros((CEILING_CELLS, CEILING_CELLS), np.float32)
     u = np.linspace(window[1], window[0], rows)
     v = np.linspace(window[2], window[3], columns)
     # Meridians converge: the same angle spans more of v towards the poles.
     shrink = math.cos(math.pi / 2 * min(0.95, max(abs(window[0]), abs(window[1])) + reach))
-    edges = np.linspace(-1, 1, CEILING_CELLS + 1)
+    edges = np.linspace(-2, 2, CEILING_CELLS + 1)
     for i in range(CEILING_CELLS):
         high, low = -edges[i], -edges[i + 1]
         r = np.flatnonzero((u >= low - reach) & (u <= high + reach))
@@ -82,20 +83,21 @@ def crossing_distances(
     directions: Array,  # (R, 3) unit, float64
     rho: Array,  # (rows, columns, N) radii, outermost first, float32
     window: Array,  # (4,) u0, u1, v0, v1
+    belt: Array,  # (4,) of `Chart.numbers`
     ceiling: Array,  # of `ceiling`
     bound: float,
     step: float,
 ) -> Array:
     """(R, N) float32: distance of the nearest crossing with each layer; 0 where there is none.
 
-    Marches with `step` between samples through the front half of the ball |x - c| < `bound`, and in strides of SKIP
-    far above all layers. A crossing lies between neighbouring samples inside the window at which |x - c| - rho changes
-    sign; it is refined by regula falsi.
+    Marches with `step` between samples through the ball |x - c| < `bound` (its front half, where the window has no
+    more), and in strides of SKIP far above all layers. A crossing lies between neighbouring samples inside the window
+    at which the radius minus rho changes sign; it is refined by regula falsi.
     """
     result = np.zeros((offsets.shape[0], rho.shape[2]), np.float32)
     for ray in prange(offsets.shape[0]):
         one, other = np.empty(rho.shape[2], np.float64), np.empty(rho.shape[2], np.float64)
-        cross(ray, offsets, directions, rho, window, ceiling, bound, step, result, one, other)
+        cross(ray, offsets, directions, rho, window, belt, ceiling, bound, step, result, one, other)
     return result
 
 
@@ -106,6 +108,7 @@ def cross(
     directions: Any,
     rho: Any,
     window: Any,
+    belt: Any,
     ceiling: Any,
     bound: Any,
     step: Any,
@@ -124,10 +127,11 @@ def cross(
         return
     half = math.sqrt(disc)
     near, far = max(-along - half, 0.0), -along + half
-    if dx > 0.0:
-        near = max(near, -ox / dx)
-    elif dx < 0.0:
-        far = min(far, -ox / dx)
+    if window[2] >= -1.0 and window[3] <= 1.0:  # nothing behind c
+        if dx > 0.0:
+            near = max(near, -ox / dx)
+        elif dx < 0.0:
+            far = min(far, -ox / dx)
     if far <= near:
         return
     found = 0
@@ -138,19 +142,16 @@ def cross(
     s = near
     while True:
         x, y, z = ox + s * dx, oy + s * dy, oz + s * dz
-        r = math.sqrt(x * x + y * y + z * z)
-        u = _TO_UV * math.asin(min(1.0, max(-1.0, z / r)))
-        v = _TO_UV * math.atan2(y, x)
-        ci = min(max(int((1.0 - u) * 0.5 * cells), 0), cells - 1)
-        cj = min(max(int((v + 1.0) * 0.5 * cells), 0), cells - 1)
-        if r - SKIP > ceiling[ci, cj]:
+        u, v, r = chart_position(x, y, z, belt)
+        ci = min(max(int((2.0 - u) * 0.25 * cells), 0), cells - 1)
+        cj = min(max(int((v + 2.0) * 0.25 * cells), 0), cells - 1)
+        if r - SKIP * belt[2] > ceiling[ci, cj]:
             last = -1.0
             if s >= far:
                 break
             s = min(s + SKIP, far)
             continue
-        row = (window[1] - u) / (window[1] - window[0]) * (rows - 1)
-        column = (v - window[2]) / (window[3] - window[2]) * (columns - 1)
+        row, column = _grid_position(u, v, window, rows, columns)
         if row < 0.0 or column < 0.0 or row > rows - 1 or column > columns - 1:
             last = -1.0
         else:
@@ -167,8 +168,8 @@ def cross(
                 # Grid position along the bracket: a parabola through its ends and its middle.
                 t = 0.5 * (last + s)
                 mx, my, mz = ox + t * dx, oy + t * dy, oz + t * dz
-                mr = math.sqrt(mx * mx + my * my + mz * mz)
-                mid_row, mid_column = _grid_position(mx, my, mz, mr, window, rows, columns)
+                mid_u, mid_v, _ = chart_position(mx, my, mz, belt)
+                mid_row, mid_column = _grid_position(mid_u, mid_v, window, rows, columns)
                 bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
                 bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
                 for n in range(layers):
@@ -181,7 +182,8 @@ def cross(
                             x, y, z = ox + d * dx, oy + d * dy, oz + d * dz
                             at_row = row_before + f * (row - row_before + bend_row * (f - 1.0))
                             at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
-                            gm = math.sqrt(x * x + y * y + z * z) - _look_up(rho, at_row, at_column, n)
+                            _, _, at_radius = chart_position(x, y, z, belt)
+                            gm = at_radius - _look_up(rho, at_row, at_column, n)
                             if abs(gm) < 1e-6:
                                 break
                             if (gm >= 0.0) == (ga >= 0.0):
@@ -209,16 +211,17 @@ def texture_positions(
     directions: Array,  # (R, 3) float64
     distance: Array,  # (R, N) float32, 0 where missed
     window: Array,  # (4,)
+    belt: Array,  # (4,)
 ) -> Array:
     """(R, N, 2) uint16: s and t of the crossings over the window, as `hit_codes` has them."""
     codes = np.zeros((distance.shape[0], distance.shape[1], 2), np.uint16)
     for ray in prange(distance.shape[0]):
-        encode(ray, offsets, directions, distance, window, codes)
+        encode(ray, offsets, directions, distance, window, belt, codes)
     return codes
 
 
 @compiled
-def encode(ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, codes: Any) -> None:
+def encode(ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, belt: Any, codes: Any) -> None:
     """`texture_positions` of one ray, into codes, which are 0."""
     for n in range(distance.shape[1]):
         d = distance[ray, n]
@@ -227,7 +230,7 @@ def encode(ray: Any, offsets: Any, directions: Any, distance: Any, window: Any, 
         x = offsets[ray, 0] + d * directions[ray, 0]
         y = offsets[ray, 1] + d * directions[ray, 1]
         z = offsets[ray, 2] + d * directions[ray, 2]
-        r = math.sqrt(x * x + y * y + z * z)
-        row, column = _grid_position(x, y, z, r, window, 2, 2)
+        u, v, _ = chart_position(x, y, z, belt)
+        row, column = _grid_position(u, v, window, 2, 2)
         codes[ray, n, 0] = int(1.5 + SCALE * min(max(column, 0.0), 1.0))
         codes[ray, n, 1] = int(1.5 + SCALE * min(max(row, 0.0), 1.0))

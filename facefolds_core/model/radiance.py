@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.reflections import ReflectionMaps
-from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.intersection import Crossings
 from facefolds_core.model.manifolds import Manifolds
@@ -77,6 +78,16 @@ class RadianceManifolds(nn.Module):
         """[3], c."""
         return self.manifolds.centre
 
+    @property
+    def chart(self) -> Chart:
+        """Where (u, v) and radii lie."""
+        return self.manifolds.chart
+
+    @property
+    def window(self) -> Window:
+        """(u0, u1, v0, v1) beyond which there are no surfaces."""
+        return self.manifolds.window
+
     def reflection_maps(self) -> ReflectionMaps | None:
         """The reflection that all layers and frames share, where the textures have one."""
         return self.textures.reflection_maps()
@@ -95,7 +106,7 @@ class RadianceManifolds(nn.Module):
         """
         crossings = self.manifolds.crossings(origins, directions)
         ray, layer = crossings.hit.nonzero(as_tuple=True)
-        uv, _ = points_to_uv(crossings.points[ray, layer], self.centre)
+        uv, _ = self.chart.uv(crossings.points[ray, layer])
         shaded = self.textures.shade(uv, layer, time[ray], directions[ray] if view_effects else None)
         colour = shaded.rgb if shaded.added is None else shaded.rgb + shaded.added
         alpha = torch.zeros_like(crossings.distance).index_put((ray, layer), shaded.alpha)
@@ -144,8 +155,7 @@ class RadianceManifolds(nn.Module):
         """
         parts = [self.manifolds.radii_at(at) for at in uv.split(RAYS_AT_ONCE)]
         radii, valid = (torch.cat(tensors) for tensors in zip(*parts, strict=True))
-        outward = uv_to_directions(uv)
-        return self.centre + radii.T[..., None] * outward, valid.T
+        return self.chart.points(uv, radii.T), valid.T
 
     @torch.no_grad()
     def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:

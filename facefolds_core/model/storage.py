@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.radial import RadialManifolds
@@ -82,6 +83,7 @@ class ExplicitSpec(BaseModel):
 
     Attributes:
         centre: c, units.
+        belt: of the chart; absent where there is none.
         window: (u0, u1, v0, v1).
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
@@ -97,6 +99,7 @@ class ExplicitSpec(BaseModel):
     version: Literal[1] = 1
     kind: Literal["explicit"] = "explicit"
     centre: tuple[float, float, float]
+    belt: Annotated[Belt | None, Field(exclude_if=lambda belt: belt is None)] = None
     window: tuple[float, float, float, float]
     nodes: tuple[Count, Count]
     texels: tuple[Count, Count]
@@ -139,7 +142,7 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
         textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
     else:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
-    manifolds = RadialManifolds(spec.centre, spec.window, blank, blank, spec.num_layers)
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, spec.num_layers)
     return RadianceManifolds(manifolds, textures)
 
 

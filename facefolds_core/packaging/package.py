@@ -78,8 +78,7 @@ class Export:
     ) -> Export:
         """From what the steps of the export give; `textures` is the frame store of `bake`."""
         windows = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in grids.windows]
-        x, y, z = (float(value) for value in grids.centre)
-        return cls(meshes, windows, FrameStore(textures), (x, y, z), coarser, grids.reflection)
+        return cls(meshes, windows, FrameStore(textures), grids.chart.centre, coarser, grids.reflection)
 
 
 def package(folder: Path, export: Export, scene: Scene, params: CompressParams, kept: Path | None = None) -> Manifest:

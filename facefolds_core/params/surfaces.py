@@ -18,6 +18,10 @@ class StartParams(Section):
     )
     """Candidates for the sphere centre c: (x, 0, 0) with these x, units. The paper's is -0.25."""
 
+    belts: Annotated[Many[Annotated[float, Field(ge=0, le=80)]], Field(max_length=100)] = (10.0,)
+    """Degrees below level from which on the rays of the UV map fall no further, but start lower down on the neck's axis
+    instead: candidates, tried with each centre beside the plain sphere. They hold a collar under hair."""
+
     centre_tie: Share = 0.02
     """Of the centres that lose a share of the visible surface within this of the least, the one farthest back wins:
     directions fan out less."""
@@ -26,7 +30,13 @@ class StartParams(Section):
     """A side of the coarse radius map over the hemisphere by which centres are compared."""
 
     window_limit: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """No window reaches beyond |u|, |v| of this: at the poles and behind c a radius map has no meaning."""
+    """No window reaches beyond |u| of this: at the poles a radius map has no meaning."""
+
+    column_limit: Annotated[float, Field(gt=0, le=1.9)] = 1.5
+    """With a belt no window reaches below u of minus this."""
+
+    azimuth_limit: Annotated[float, Field(gt=0, le=1.9)] = 1.5
+    """No window reaches beyond |v| of this; 1 is straight sideways from c."""
 
     window_margin: Share = 0.04
     """The window reaches this far in u and v beyond what holds the subject: the volume is coarse."""

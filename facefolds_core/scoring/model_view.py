@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.sphere_uv import points_to_uv
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.compositing import compositing_weights
 
@@ -36,7 +35,7 @@ class ModelView:
         self._size = (camera.height, camera.width)
         self._hit = crossings.hit
         self._ray, self._layer = crossings.hit.nonzero(as_tuple=True)
-        self._uv = points_to_uv(crossings.points[self._ray, self._layer], model.centre)[0]
+        self._uv = model.chart.uv(crossings.points[self._ray, self._layer])[0]
         self._directions = rays[1]
 
     @torch.no_grad()

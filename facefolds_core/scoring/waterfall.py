@@ -22,7 +22,7 @@ from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, 
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
+from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
@@ -125,7 +125,7 @@ def _sources(scene: Scene, model: RadianceManifolds, folders: SubjectFolders) ->
         fine = full_meshes(read_sheets(surfaces))
     else:
         fine = [
-            TexturedMesh(s.vertices, s.faces, exact_st(s.vertices, window, grids.centre))
+            TexturedMesh(s.vertices, s.faces, exact_st(s.vertices, window, grids.chart))
             for s in read_surfaces(surfaces)
         ]
     coarse = read_meshes(folders.meshes / "meshes.npz")
@@ -173,10 +173,9 @@ def _frame(store: FrameStore) -> Frame:
 
 def exact_hits(model: RadianceManifolds, camera: Camera, window: Window) -> Hits:
     """Where a camera's rays meet the model's own surfaces, inside a window of the textures."""
-    centre = model.centre
-    origins, directions = (torch.tensor(np.reshape(part, (-1, 3))).to(centre) for part in camera.rays())
+    origins, directions = (torch.tensor(np.reshape(part, (-1, 3))).to(model.centre) for part in camera.rays())
     crossings = model.crossings(origins, directions)
-    st = uv_to_st(points_to_uv(crossings.points, centre)[0], window).cpu().numpy()
+    st = uv_to_st(model.chart.uv(crossings.points)[0], window).cpu().numpy()
     hit = crossings.hit.cpu().numpy() & (st >= 0).all(-1) & (st <= 1).all(-1)
     shape = (camera.height, camera.width, model.num_layers)
     return Hits(hit.reshape(shape), np.where(hit[..., None], st, 0).astype(np.float32).reshape(*shape, 2))

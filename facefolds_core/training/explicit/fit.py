@@ -12,16 +12,18 @@ from scipy import ndimage
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import (
     Profile,
-    choose_centre,
+    choose_chart,
     profile,
     visible_points,
-    window_directions,
+    whole_window,
+    window_uv,
 )
 from facefolds_core.training.volume.sight import seen_share
 
@@ -33,7 +35,7 @@ class Fit:
     """What was chosen, and why. Maps are (rows, columns) at the nodes of the radius maps.
 
     Attributes:
-        centre: (3,) c, units.
+        chart: of (u, v) and radii.
         window: (u0, u1, v0, v1).
         middle: starting radii of the middle of the layers, units.
         halfwidth: half the space between the outermost and the innermost layer, units.
@@ -42,11 +44,11 @@ class Fit:
         texels: (H, W) of the finest textures.
         reasons: one a choice, and the notes.
         notes: what a user should know at once.
-        losses: x of the candidates for the centre -> share of the visible surface that each loses.
+        losses: of the candidates for the chart, the share of the visible surface that each loses.
         volume_psnr: of the volume on training rays, dB.
     """
 
-    centre: Array
+    chart: Chart
     window: Window
     middle: Array
     halfwidth: Array
@@ -56,7 +58,7 @@ class Fit:
     texels: tuple[int, int]
     reasons: tuple[Fact, ...]
     notes: tuple[Fact, ...]
-    losses: dict[float, float]
+    losses: dict[Chart, float]
     volume_psnr: float
 
 
@@ -68,21 +70,22 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     """
     start, geometry = params.start, params.geometry
     cameras = [scene.camera_in_head(i, volume.frame) for i in scene.indices("train")]
-    centre, losses = choose_centre(volume, visible_points(volume, cameras), start)
-    surface, notes = _trusted_surface(scene, volume, centre, params)
+    visible = visible_points(volume, cameras)
+    chart, losses = choose_chart(volume, visible, start)
+    surface, notes = _trusted_surface(scene, volume, chart, params)
     vertices = None if surface is None else surface[0].astype(np.float64)
-    window = fit_window(volume, centre, vertices, start)
+    window = fit_window(volume, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
-    directions = window_directions(window, rows, columns)
-    seen = profile(volume, centre, directions, start.subject_opacity)
+    uv = window_uv(window, rows, columns)
+    seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
         known = seen.radius
         trust = np.zeros((rows, columns))
         source = fact("middle_from_volume")
     else:
-        mesh = mesh_radii(vertices, surface[1], centre, directions)
-        points = (centre + mesh[..., None] * directions).reshape(-1, 3)
+        mesh = mesh_radii(vertices, surface[1], chart, uv)
+        points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_share(cameras, points).reshape(mesh.shape) < params.volume.min_view_share
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, params.mesh.reach)
@@ -95,7 +98,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
-        centre=centre,
+        chart=chart,
         window=window,
         middle=middle,
         halfwidth=widths,
@@ -103,7 +106,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[float(centre[0])], source), *notes),
+        reasons=(*_reasons(params, losses[chart], source), *notes),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
@@ -123,44 +126,48 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact) -> tuple[Fact, .
 
 
 def _trusted_surface(
-    scene: Scene, volume: Volume, centre: Array, params: ExplicitParams
+    scene: Scene, volume: Volume, chart: Chart, params: ExplicitParams
 ) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
     """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
     surface = scene.load_surface()
     if surface is None:
         return None, ()
     vertices = surface[0].astype(np.float64)
-    share = share_off(volume, centre, vertices, surface[1], params.mesh, params.start)
+    share = share_off(volume, chart, vertices, surface[1], params.mesh, params.start)
     if share <= params.mesh.max_share_off:
         return surface, ()
     return None, (fact("mesh_is_off", share=share, distance=params.mesh.max_distance),)
 
 
 def share_off(
-    volume: Volume, centre: Array, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
+    volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
 ) -> float:
     """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
     over `max_distance` apart; 0 where there are none."""
-    directions = window_directions(FULL_WINDOW, params.nodes, params.nodes)
+    uv = window_uv(whole_window(chart, start), params.nodes, params.nodes)
     least = start.subject_opacity
-    seen, mesh = profile(volume, centre, directions, least), mesh_radii(vertices, faces, centre, directions)
+    seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
     apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
     return float((apart > params.max_distance).mean()) if len(apart) else 0.0
 
 
-def fit_window(volume: Volume, centre: Array, vertices: Array | None, params: StartParams) -> Window:
-    """Box around the directions that hold the subject: the volume's, and those of mesh vertices (K, V, 3) before c."""
-    uv = np.linspace(-1, 1, 192)
-    directions, least = window_directions(FULL_WINDOW, len(uv), len(uv)), params.subject_opacity
-    opaque = profile(volume, centre, directions, least).opacity >= least
-    held = [np.stack(np.meshgrid(uv[::-1], uv, indexing="ij"), -1)[opaque]]
+def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams) -> Window:
+    """Box around the directions that hold the subject: the volume's near `points` that cameras see, (P, 3), and those
+    of mesh vertices (K, V, 3)."""
+    limits = whole_window(chart, params)
+    uv, least = window_uv(limits, 192, 192), params.subject_opacity
+    highest, lowest = np.array([limits[1], limits[3]]), np.array([limits[0], limits[2]])
+    nodes = np.rint((chart.uv(points)[0] - lowest) / (highest - lowest) * 191).astype(int)
+    nodes = nodes[((nodes >= 0) & (nodes <= 191)).all(1)]
+    seen = np.zeros((192, 192), bool)
+    seen[191 - nodes[:, 0], nodes[:, 1]] = True
+    near = ndimage.binary_dilation(seen, iterations=4)
+    held = [uv[near & (profile(volume, chart, uv, least).opacity >= least)]]
     if vertices is not None:
-        offset = vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3) - centre
-        offset = offset[offset[:, 0] > 0]
-        held.append(directions_to_uv(offset / np.linalg.norm(offset, axis=1, keepdims=True)))
-    points = np.concatenate(held)
-    margin, limit = params.window_margin, params.window_limit
-    low, high = np.maximum(points.min(0) - margin, -limit), np.minimum(points.max(0) + margin, limit)
+        places, _ = chart.uv(vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3))
+        held.append(places[((places >= lowest) & (places <= highest)).all(1)])
+    places, margin = np.concatenate(held), params.window_margin
+    low, high = np.maximum(places.min(0) - margin, lowest), np.minimum(places.max(0) + margin, highest)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
@@ -207,23 +214,23 @@ def _nodes(window: Window, longest: int) -> tuple[int, int]:
     return max(8, round(scale * height)), max(8, round(scale * width))
 
 
-def mesh_radii(vertices: Array, faces: NDArray[np.int32], centre: Array, directions: Array) -> Array:
-    """(...) distance of the mesh's outermost point from `centre` along (..., 3), mean over frames (K, V, 3).
+def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> Array:
+    """(...) radius of the mesh's outermost point along the chart's rays of (..., 2), mean over frames (K, V, 3).
 
-    NaN where no frame's mesh has a point on that side of `centre`.
+    NaN where no frame's mesh has a point on that ray.
     """
-    flat = directions.reshape(-1, 3)
+    origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
     total, count = np.zeros(len(flat)), np.zeros(len(flat))
     for frame in vertices[:: max(1, len(vertices) // 12)]:
         mesh = trimesh.Trimesh(frame, faces, process=False)
-        start = 2 * float(np.linalg.norm(frame - centre, axis=1).max())
-        points, ray, _ = mesh.ray.intersects_location(centre + start * flat, -flat, multiple_hits=False)
-        radius = ((points - centre) * flat[ray]).sum(1)
-        # A ray that meets nothing on this side runs on through the centre and may meet the back of a head.
+        start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
+        points, ray, _ = mesh.ray.intersects_location(origins + start * flat, -flat, multiple_hits=False)
+        radius = ((points - origins[ray]) * flat[ray]).sum(1)
+        # A ray that meets nothing on this side runs on through its origin and may meet the back of a head.
         near = radius > 0
         total[ray[near]] += radius[near]
         count[ray[near]] += 1
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(directions.shape[:-1])
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
 def extrapolate(radii: Array) -> Array:

@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
@@ -34,8 +35,8 @@ class GlossFit:
         on: whether there is one.
     """
 
-    def __init__(self, window: Window, params: ReflectionParams, turns: bool) -> None:
-        self.window, self.params = window, params
+    def __init__(self, chart: Chart, window: Window, params: ReflectionParams, turns: bool) -> None:
+        self.chart, self.window, self.params = chart, window, params
         self.on = params.enabled and not turns
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
@@ -46,7 +47,7 @@ class GlossFit:
             return
         blank = Maps.blank(self.window, self.params)
         radii = middle.cpu().numpy().astype(np.float64)
-        self._normals = surface_normals(radii, self.window, blank.gloss.shape[:2], self.params.normal_blur)
+        self._normals = surface_normals(radii, self.chart, self.window, blank.gloss.shape[:2], self.params.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, normals=self._normals)
             self._shine(state, self._look(state, source, images))

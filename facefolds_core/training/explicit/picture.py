@@ -36,13 +36,13 @@ def draw_fit(path: Path, fit: Fit, layers: int, subject_opacity: float) -> None:
         for axis in axes[:4]:
             axis.set_xlabel("v")
             axis.set_ylabel("u")
-        losses = fit.losses
-        colours = ["tab:orange" if np.isclose(x, fit.centre[0]) else "tab:blue" for x in losses]
-        axes[4].bar(list(losses), [100 * loss for loss in losses.values()], width=0.04, color=colours)
+        colours = ["tab:orange" if chart == fit.chart else "tab:blue" for chart in fit.losses]
+        losses = [100 * loss for loss in fit.losses.values()]
+        axes[4].barh([str(chart) for chart in fit.losses], losses, color=colours)
         axes[4].set_title("visible surface lost, %")
-        axes[4].set_xlabel("x of the centre (orange: chosen)")
+        axes[4].set_ylabel("x of the centre, degrees of the belt (orange: chosen)")
         figure.suptitle(
-            f"centre x = {fit.centre[0]:.2f}   window u {u0:.2f}..{u1:.2f}, v {v0:.2f}..{v1:.2f}   "
+            f"centre x = {fit.chart}   window u {u0:.2f}..{u1:.2f}, v {v0:.2f}..{v1:.2f}   "
             f"texels {fit.texels[0]} x {fit.texels[1]}   layers {layers}"
         )
         figure.savefig(path, dpi=90)

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.linalg import solveh_banded
 
-from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_directions
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit.reflection_kernel import normal_equations, reflect, sample
@@ -105,20 +106,22 @@ class Maps:
         return module
 
 
-def surface_normals(middle: NDArray[np.float64], window: Window, shape: tuple[int, int], blur: float) -> Array:
+def surface_normals(
+    middle: NDArray[np.float64], chart: Chart, window: Window, shape: tuple[int, int], blur: float
+) -> Array:
     """(h, w, 3) unit normals, outwards, of the surface with radii `middle` (rows, columns at its nodes), smoothed by
     `blur` nodes."""
     radii = ndimage.gaussian_filter(middle, blur, mode="nearest")
     rows, columns = radii.shape
     u0, u1, v0, v1 = window
     uv = np.stack(np.meshgrid(np.linspace(u1, u0, rows), np.linspace(v0, v1, columns), indexing="ij"), -1)
-    points = radii[..., None] * uv_to_directions(uv)
+    points = chart.points(uv, radii)
     normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     h, w = shape
     places = np.meshgrid((np.arange(h) + 0.5) / h * (rows - 1), (np.arange(w) + 0.5) / w * (columns - 1), indexing="ij")
     found = np.stack([ndimage.map_coordinates(normals[..., q], places, order=1) for q in range(3)], -1)
-    outwards = (found * uv_to_directions(texel_uv(h, w, window))).sum(-1, keepdims=True)
+    outwards = (found * chart.directions(texel_uv(h, w, window))).sum(-1, keepdims=True)
     found *= np.where(outwards < 0, -1, 1) / np.linalg.norm(found, axis=-1, keepdims=True)
     return np.asarray(found, np.float32)
 

@@ -40,8 +40,6 @@ class Trainer:
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
-        x, y, z = (float(v) for v in fit.centre)
-        self.centre = (x, y, z)
         self.views: Rays | None = None
         self.stride = 0
         self.state: TextureState | None = None
@@ -49,11 +47,11 @@ class Trainer:
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        self.gloss = GlossFit(fit.window, params.reflection, cameras.scene.poses is not None)
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses is not None)
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
-        return RadialManifolds(self.centre, self.fit.window, self.middle, halfwidth, self.params.layers)
+        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level, again from its start at a lower learning rate if it diverges."""
@@ -206,7 +204,7 @@ class Trainer:
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
-        manifolds = RadialManifolds(self.centre, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
+        manifolds = RadialManifolds(self.fit.chart, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
         reflection = self.gloss.model()
         textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames, reflection)
         with torch.no_grad():
@@ -215,7 +213,8 @@ class Trainer:
             textures.frame_colour.copy_(state.frame_colour[0].view(-1, h, w, 3))
             textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., first : last + 1])
         spec = ExplicitSpec(
-            centre=self.centre,
+            centre=self.fit.chart.centre,
+            belt=self.fit.chart.belt,
             window=self.fit.window,
             nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),
@@ -232,11 +231,12 @@ class Trainer:
             "window": list(spec.window),
             "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
             "centre": list(spec.centre),
+            "belt": None if spec.belt is None else spec.belt.degrees,
             "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
             "layers": spec.num_layers,
             "texels": list(spec.texels),
             "reasons": [reason.to_json() for reason in self.fit.reasons],
-            "lost_by_centre": {f"{x:.2f}": loss for x, loss in self.fit.losses.items()},
+            "lost_by_chart": {str(chart): loss for chart, loss in self.fit.losses.items()},
             "volume_psnr": self.fit.volume_psnr,
             "cameras": self.cameras.summary,
             "events": [event.to_json() for event in self.events],

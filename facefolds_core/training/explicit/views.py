@@ -45,6 +45,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool
     codes, cameras, pixels, along = [], [], [], []
     centre = manifolds.centre.cpu().numpy().astype(np.float64)
     window, trace = np.array(manifolds.window), manifolds.tracer(gpu)
+    belt = manifolds.chart.numbers
     for position, index in enumerate(scene.indices("train")):
         origins, directions = scene.cameras[index].rays()
         first = position * 7 % stride
@@ -53,7 +54,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool
         directions = np.ascontiguousarray(directions.reshape(-1, 3)[chosen])
         distance = trace(offsets, directions)
         hit = np.flatnonzero((distance > 0).any(1))
-        codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window))
+        codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window, belt))
         cameras.append(np.full(len(hit), position, np.int32))
         pixels.append(chosen[hit].astype(np.int32))
         along.append(directions[hit].astype(np.float32))
@@ -148,6 +149,7 @@ class MovingRays:
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
         self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
+        self._belt = manifolds.chart.numbers
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, params.sample_frames)})
@@ -180,7 +182,7 @@ class MovingRays:
         offsets, directions = (np.concatenate(arrays) for arrays in zip(*rays, strict=True))
         distance = self._trace(offsets, directions)
         hit = np.flatnonzero((distance > 0).any(1))
-        codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window)
+        codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window, self._belt)
         camera = np.repeat(np.arange(len(chosen), dtype=np.int32), [len(pixels) for pixels in chosen])
         pixels = np.concatenate(chosen)[hit].astype(np.int32)
         return Views(codes, camera[hit], pixels, directions[hit].astype(np.float32))

@@ -13,9 +13,9 @@ def warnings_of(scene: Scene, fit: Fit, params: WarningParams) -> tuple[Fact, ..
     found = []
     if fit.volume_psnr < params.min_volume_psnr:
         found.append(fact("volume_explains_little", psnr=fit.volume_psnr, under=params.min_volume_psnr))
-    lost = fit.losses[float(fit.centre[0])]
+    lost = fit.losses[fit.chart]
     if lost > params.max_lost:
-        found.append(fact("surface_without_a_place", share=lost, x=float(fit.centre[0])))
+        found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))
     if any(
         line.kind in ("front_found", "front_guessed") or "no `front` camera" in str(line) for line in scene.left_out
     ):

@@ -81,8 +81,8 @@ def render_ray(
 
 
 @kernel(parallel=True)
-def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
-    """Along each direction (R, 3), from `farthest` in to `centre`.
+def profile(grid, lower, voxel, origins, directions, farthest, step, shares):  # type: ignore[no-untyped-def]
+    """Along each ray, origins and directions (R, 3), from `farthest` in to the origin.
 
     Returns opacity (R,), colour over black (R, 3), and the radii (R, S) at which the given shares of the opacity are
     reached, linear between samples; 0 where all is clear.
@@ -97,9 +97,9 @@ def profile(grid, lower, voxel, centre, directions, farthest, step, shares):  # 
         t = np.float32(1.0)
         for n in range(samples):
             s = farthest - (n + 0.5) * step
-            x = (centre[0] + s * directions[r, 0] - lower[0]) / voxel
-            y = (centre[1] + s * directions[r, 1] - lower[1]) / voxel
-            z = (centre[2] + s * directions[r, 2] - lower[2]) / voxel
+            x = (origins[r, 0] + s * directions[r, 0] - lower[0]) / voxel
+            y = (origins[r, 1] + s * directions[r, 1] - lower[1]) / voxel
+            z = (origins[r, 2] + s * directions[r, 2] - lower[2]) / voxel
             inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
             if inside and t >= OPAQUE:
                 v0, v1, v2, v3 = sample(grid, x, y, z)

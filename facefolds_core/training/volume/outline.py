@@ -12,7 +12,8 @@ from scipy import ndimage
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, directions_to_uv, uv_to_directions
+from facefolds_core.geometry.chart import Belt, Chart
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window
 from facefolds_core.params import StartParams
 from facefolds_core.training.volume import look_kernel
 from facefolds_core.training.volume.fit import Volume
@@ -38,8 +39,8 @@ class Profile:
     rgb: NDArray[np.float32]
 
 
-def profile(volume: Volume, centre: Array, directions: Array, least: float) -> Profile:
-    """Integrate the volume from outside towards `centre` along unit directions (..., 3).
+def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
+    """Integrate the volume from outside inwards along the chart's rays of (u, v) (..., 2).
 
     Args:
         least: opacity of a direction from which on it has radii.
@@ -47,14 +48,21 @@ def profile(volume: Volume, centre: Array, directions: Array, least: float) -> P
     size = np.array(volume.grid.shape[:3]) - 1
     ends = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     corners = volume.lower + volume.voxel * ends * size
-    farthest = float(np.linalg.norm(corners - centre, axis=1).max())
-    flat = np.ascontiguousarray(directions.reshape(-1, 3))
+    origins, directions = (np.ascontiguousarray(of(uv).reshape(-1, 3)) for of in (chart.origins, chart.directions))
+    farthest = max(float(np.linalg.norm(corner - origins, axis=1).max()) for corner in corners)
     opacity, rgb, radii = look_kernel.profile(
-        volume.grid, volume.lower, volume.voxel, centre, flat, farthest, 0.5 * volume.voxel, np.array([0.5, 0.1, 0.9])
+        volume.grid,
+        volume.lower,
+        volume.voxel,
+        origins,
+        directions,
+        farthest,
+        0.5 * volume.voxel,
+        np.array([0.5, 0.1, 0.9]),
     )
     radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
     rgb /= np.maximum(opacity, look_kernel.CLEAR)[:, None]
-    shape = directions.shape[:-1]
+    shape = uv.shape[:-1]
     middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
     return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))
 
@@ -62,16 +70,15 @@ def profile(volume: Volume, centre: Array, directions: Array, least: float) -> P
 def thickness(volume: Volume, least: float) -> float:
     """Depth over which a surface is spread in the volume, units: from a tenth to nine tenths of the opacity, median
     over the directions of the hemisphere that are opaque by `least`; 0 where none is."""
-    found = profile(volume, np.array(SPHERE_CENTRE), window_directions(FULL_WINDOW, 96, 96), least)
+    found = profile(volume, Chart(SPHERE_CENTRE), window_uv(FULL_WINDOW, 96, 96), least)
     depths = (found.outer - found.inner)[np.isfinite(found.radius)]
     return float(np.median(depths)) if len(depths) else 0.0
 
 
-def window_directions(window: Window, rows: int, columns: int) -> Array:
-    """(rows, columns, 3) directions of the nodes of a radius map: they include the window's borders."""
+def window_uv(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 2) of the nodes of a radius map: they include the window's borders."""
     u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
-    directions: Array = uv_to_directions(np.stack(np.meshgrid(u, v, indexing="ij"), -1))
-    return directions
+    return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
 
 
 def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int = 2500) -> Array:
@@ -90,29 +97,34 @@ def visible_points(volume: Volume, cameras: list[Camera], rays_per_camera: int =
     return np.concatenate(points)
 
 
-def lost_share(volume: Volume, centre: Array, points: Array, params: StartParams) -> float:
-    """Share of visible points that no sheet over the hemisphere of `centre` can hold.
+def whole_window(chart: Chart, params: StartParams) -> Window:
+    """Of all (u, v) that a chart may hold: with a belt there is no lower pole."""
+    lowest = params.window_limit if chart.belt is None else params.column_limit
+    return -lowest, params.window_limit, -params.azimuth_limit, params.azimuth_limit
+
+
+def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams) -> float:
+    """Share of visible points that no sheet over the chart can hold.
 
     They lie behind it or at its rim, or beneath or above the outermost surface in their direction by more than two
     voxels and what the surface's slope explains.
     """
-    offset = points - centre
-    radius = np.linalg.norm(offset, axis=1)
-    uv = directions_to_uv(offset / radius[:, None])
-    front = (offset[:, 0] > 0) & (np.abs(uv) <= params.window_limit).all(1)
-    nodes = params.centre_nodes
-    radii = profile(volume, centre, window_directions(FULL_WINDOW, nodes, nodes), params.subject_opacity).radius
+    uv, radius = chart.uv(points)
+    u0, u1, v0, v1 = window = whole_window(chart, params)
+    rows, columns = params.centre_nodes, round(params.centre_nodes * (v1 - v0) / (u1 - u0))
+    radii = profile(volume, chart, window_uv(window, rows, columns), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
     low = ndimage.minimum_filter(np.where(np.isnan(radii), np.inf, radii), 3)
-    i = np.rint((1 - uv[:, 0]) / 2 * (nodes - 1)).astype(int).clip(0, nodes - 1)
-    j = np.rint((uv[:, 1] + 1) / 2 * (nodes - 1)).astype(int).clip(0, nodes - 1)
+    i, j = (u1 - uv[:, 0]) / (u1 - u0) * (rows - 1), (uv[:, 1] - v0) / (v1 - v0) * (columns - 1)
+    within = (i >= 0) & (i <= rows - 1) & (j >= 0) & (j <= columns - 1)
+    i, j = np.rint(i).astype(int).clip(0, rows - 1), np.rint(j).astype(int).clip(0, columns - 1)
     margin = 2 * volume.voxel
-    held = front & (radius <= high[i, j] + margin) & (radius >= low[i, j] - margin)
+    held = within & (radius <= high[i, j] + margin) & (radius >= low[i, j] - margin)
     return float(1 - held.mean())
 
 
-def choose_centre(volume: Volume, points: Array, params: StartParams) -> tuple[Array, dict[float, float]]:
-    """The centre that loses (nearly) the smallest share of `points`, and the shares of all candidates by x.
+def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Chart, dict[Chart, float]]:
+    """The chart that loses (nearly) the smallest share of `points`, and the shares of all candidates.
 
     Raises:
         UserError: if there are no points.
@@ -126,7 +138,15 @@ def choose_centre(volume: Volume, points: Array, params: StartParams) -> tuple[A
             remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
             "calibration, or take other frames",
         )
-    losses = {x: lost_share(volume, np.array([x, 0.0, 0.0]), points, params) for x in params.centres}
+    charts = [chart for x in params.centres for chart in _charts(x, points, params)]
+    losses = {chart: lost_share(volume, chart, points, params) for chart in charts}
     least = min(losses.values())
-    best = min(x for x, loss in losses.items() if loss <= least + params.centre_tie)
-    return np.array([best, 0.0, 0.0]), losses
+    best = min((c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: c.centre[0])
+    return best, losses
+
+
+def _charts(x: float, points: Array, params: StartParams) -> list[Chart]:
+    """Around (x, 0, 0): the sphere, and one with each belt. A radian of u below it is as long as one of v around it."""
+    centre = (x, 0.0, 0.0)
+    girth = float(np.median(np.linalg.norm(points - np.array(centre), axis=1)))
+    return [Chart(centre), *(Chart(centre, Belt(math.radians(belt), girth)) for belt in params.belts)]
