@@ -124,17 +124,28 @@ def test_decimated_layers_of_a_bumpy_column_stay_upright_and_in_order(bumpy: She
     meshes = decimate_sheets(bumpy, 300)
     for mesh in meshes:
         assert upright_faces(mesh.vertices, mesh.faces, CHART).all()
-    order = layer_order(meshes, CHART)
-    assert order.compared > 300 and order.crossed == 0
+    assert layer_order(meshes, CHART).crossed == 0
+    uv = np.random.default_rng(0).uniform([-0.97, -1.27], [0.67, 1.27], (5000, 2))  # and between the vertices
+    outer, inner = (cast(mesh, uv) for mesh in meshes)
+    assert (outer - inner).min() > 0.015  # of 0.02; NaN where a ray finds a hole
 
 
-def test_fitted_radii_err_no_more_than_those_of_the_samples(bumpy: Sheets) -> None:
+def cast(mesh: Surface, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Radii at which the chart's rays meet a mesh, NaN where they do not."""
+    origins = CHART.origins(uv)
+    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, CHART.directions(uv))
+    corners = mesh.vertices[mesh.faces[hits.triangle]].astype(np.float64)
+    points = (hits.barycentric[..., None] * corners).sum(1)
+    return np.where(hits.triangle >= 0, np.linalg.norm(points - origins, axis=-1), np.nan)
+
+
+def test_fitted_radii_err_less_than_those_of_the_samples(bumpy: Sheets) -> None:
     index = np.arange(N * N).reshape(N, N)[::9, ::9]
     a, b, c, d = (x.reshape(-1) for x in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
     faces = np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
     fitted = refit_radii(bumpy, np.ones(bumpy.radii.shape), faces, vertex_uv(bumpy), RefitParams())
     for layer in range(bumpy.num_layers):
-        for below, share in ((False, 0.6), (True, 1.05)):  # seen: 0.51 and 0.97
+        for below, share in ((False, 0.6), (True, 0.7)):  # seen: 0.49 and 0.59
             before, after = (radial_errors(kept, bumpy, layer, faces, below) for kept in (bumpy, fitted))
             assert np.sqrt((after**2).mean()) < share * np.sqrt((before**2).mean())
     assert (np.diff(fitted.radii, axis=0) <= 0).all()
@@ -146,13 +157,9 @@ def radial_errors(
     """Radius of a coarse mesh, by casting the chart's rays of one side of the belt, minus that of the samples."""
     uv = vertex_uv(sheets)
     mine = CHART.below(uv) == below
-    mesh, origins = sheet_mesh(coarse, layer, faces, uv), CHART.origins(uv[mine])
-    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, CHART.directions(uv[mine]))
-    found = hits.triangle >= 0
-    assert found.mean() > 0.8
-    corners = mesh.vertices[mesh.faces[hits.triangle[found]]].astype(np.float64)
-    points = (hits.barycentric[found][..., None] * corners).sum(1)
-    return np.linalg.norm(points - origins[found], axis=-1) - sheets.radii[layer].reshape(-1)[mine][found]
+    errors = cast(sheet_mesh(coarse, layer, faces, uv), uv[mine]) - sheets.radii[layer].reshape(-1)[mine]
+    assert np.isfinite(errors).mean() > 0.8
+    return np.asarray(errors[np.isfinite(errors)])
 
 
 def test_cosines_of_a_cone_are_those_of_its_normals() -> None:
