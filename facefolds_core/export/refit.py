@@ -81,7 +81,7 @@ def _shares(
     return shares, slides, below
 
 
-def _linear(shares: Array, slides: Array, below: Array, around: Array, radii: Array) -> tuple[Array, Array]:
+def _linear(shares: Array, slides: Array, below: NDArray[np.bool_], around: Array, radii: Array) -> tuple[Array, Array]:
     """Factors (S, 3) of the corners' inverse radii and right sides (S,), in units of inverse radii.
 
     Args:
