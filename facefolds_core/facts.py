@@ -55,7 +55,7 @@ WORDS = {
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
-    "centre_chosen": "centre: of the candidates whose hemispheres lose least of the visible surface, within {tie:.0%}, "
+    "centre_chosen": "chart: of the candidates that lose least of the visible surface, within {tie:.0%}, "
     "the one farthest back (it loses {lost:.1%})",
     "window_chosen": "window: directions in which the volume is at least {opacity:.0%} opaque (and the tracked mesh, "
     "where there is one), and {margin} on each side",
@@ -91,9 +91,9 @@ WORDS = {
     "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
     "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
     "mattes help (docs/guide/subjects.md)",
-    "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in front of the centre "
-    "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres, or look at fit.png for what is no "
-    "subject",
+    "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in the chart around "
+    "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres or train.start.belts, or look at "
+    "fit.png for what is no subject",
     "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: "
     "finer quantisation gives no more; finer textures (texture.resolution) or fewer specks in them (fit.png) do",
     "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "

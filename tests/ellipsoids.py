@@ -13,7 +13,10 @@ import torch
 from torch import Tensor
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
-from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, uv_to_directions
+
+CHART = Chart(SPHERE_CENTRE)
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,9 @@ class Ellipsoids:
     hole: float = 0.0
     num_frames: int = 2
     centre: Tensor = field(default_factory=lambda: torch.tensor(SPHERE_CENTRE, dtype=torch.float64))
+
+    chart: Chart = CHART
+    window: Window = FULL_WINDOW
 
     @property
     def num_layers(self) -> int:

@@ -73,7 +73,7 @@ class Layer(Part):
 
     Attributes:
         texture_rect: of its colour, within the colour image; its alpha has the same place within the alpha image.
-        uv_window: (u0, u1, v0, v1), what its texture covers of the hemisphere's (u, v).
+        uv_window: (u0, u1, v0, v1), what its texture covers of the UV map.
         mesh, offset, bytes, sha256: the file among the level's `meshes`, and the bytes in it that are this Draco mesh.
     """
 
@@ -159,7 +159,7 @@ class Reflection(StoredFile):
 
     Attributes:
         width, height: of the PNG.
-        uv_window: (u0, u1, v0, v1), what gloss, offset and normals cover of the hemisphere's (u, v).
+        uv_window: (u0, u1, v0, v1), what gloss, offset and normals cover of the UV map.
         environment_rect, gloss_rect, offset_rect, normals_rect: in pixels of the PNG.
         environment_scale, gloss_scale, offset_scale: what code 255 means; code 0 is 0, of the offset its negative.
     """

@@ -2,8 +2,10 @@
 
 Along a direction d = sum_k a_k d_k in a triangle's cone the mesh lies at 1/t = sum_k a_k / rho_k (see `sheets`): linear
 in the inverse radii. So each layer's are the solution of a sparse linear least-squares problem. Below a chart's belt,
-where rays slide down an axis, it is the radius itself that is linear, with the shares b_k of (u, v): there 1 / rho_k is
-taken to first order around the samples' radii. A sample's residual is weighted by how much it shows and by the cosine
+where rays slide down an axis, it is the radius itself that is linear: of the point of the triangle that has the shares
+b_k of (u, v), as far as it lies along d, sum_k b_k (rho_k d_k + o_k - o) . d, o being the rays' origins. (On a column
+that is the chord's distance, up to fourth order in the angle.) There 1 / rho_k is taken to first order around the
+samples' radii. A sample's residual is weighted by how much it shows and by the cosine
 between the surface's normal and d, which turns a distance along d into one from the surface: a steep place may be off
 along d without being off.
 """
@@ -36,7 +38,7 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Arra
     inside = face >= 0
     used, index = np.unique(faces, return_inverse=True)
     corners = faces[face[inside]]
-    shares, below = _shares(sheets, uv, corners, inside)
+    shares, slides, below = _shares(sheets, uv, corners, inside)
     rows = np.arange(0, 3 * len(corners) + 1, 3)
     columns = index.reshape(-1, 3)[face[inside]].reshape(-1)
     fitted = np.empty((sheets.num_layers, len(used)))
@@ -44,7 +46,7 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Arra
         cosines = radial_cosines(sheets, layer).reshape(-1)
         weight = shows[layer].reshape(-1) + params.empty_weight
         weights = (weight * np.maximum(cosines, params.min_cosine) ** 2)[inside]
-        values, wanted = _linear(shares, below, radii[corners], radii[inside])
+        values, wanted = _linear(shares, slides, below, radii[corners], radii[inside])
         matrix = csr_matrix((values.reshape(-1), columns, rows), shape=(len(corners), len(used)))
         normal = matrix.T @ diags(weights) @ matrix
         stay = diags(params.stay * normal.diagonal() + 1e-6)
@@ -55,8 +57,14 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Arra
     return Sheets(**{**vars(sheets), "radii": result.reshape(sheets.radii.shape)})
 
 
-def _shares(sheets: Sheets, uv: Array, corners: NDArray[np.int64], inside: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Of samples in triangles with `corners` (S, 3): their shares (S, 3), and (S,) bool whether they are of (u, v)."""
+def _shares(
+    sheets: Sheets, uv: Array, corners: NDArray[np.int64], inside: NDArray[np.bool_]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Of samples in triangles with `corners` (S, 3): what their radii are of the corners'.
+
+    Returns:
+        shares (S, 3): a_k, below the belt b_k d_k . d; slides (S,): sum_k b_k (o_k - o) . d; and (S,) bool: below.
+    """
     chart = sheets.chart
     below = np.asarray(chart.below(uv)[inside] | chart.below(uv)[corners].any(1))
     directions = np.asarray(chart.directions(uv))
@@ -65,19 +73,24 @@ def _shares(sheets: Sheets, uv: Array, corners: NDArray[np.int64], inside: NDArr
     for which, vectors in ((~below, directions), (below, flat)):
         own, aims = vectors[corners[which]].transpose(0, 2, 1), vectors[inside][which][..., None]
         shares[which] = np.linalg.solve(own, aims)[..., 0]
-    return shares, below
+    slides = np.zeros(len(corners))
+    own, origins, along = corners[below], np.asarray(chart.origins(uv)), directions[inside][below][:, None]
+    shifts = origins[own] - origins[inside][below][:, None]
+    slides[below] = (shares[below] * (shifts * along).sum(-1)).sum(1)
+    shares[below] *= (directions[own] * along).sum(-1)
+    return shares, slides, below
 
 
-def _linear(shares: Array, below: Array, around: Array, radii: Array) -> tuple[Array, Array]:
+def _linear(shares: Array, slides: Array, below: NDArray[np.bool_], around: Array, radii: Array) -> tuple[Array, Array]:
     """Factors (S, 3) of the corners' inverse radii and right sides (S,), in units of inverse radii.
 
     Args:
-        shares, below: of `_shares`.
+        shares, slides, below: of `_shares`.
         around: (S, 3) radii of the samples at the corners.
         radii: (S,) of the samples.
     """
     values = np.where(below[:, None], shares * (around / radii[:, None]) ** 2, shares)
-    wanted = np.where(below, 2 * (shares * around).sum(1) / radii - 1, 1) / radii
+    wanted = np.where(below, (2 * (shares * around).sum(1) + slides) / radii - 1, 1) / radii
     return values, wanted
 
 

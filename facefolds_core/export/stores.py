@@ -1,7 +1,7 @@
 """The geometry files between the export stages: sampled grids, surfaces, textured meshes. All are npz archives.
 
 - `samples/grids.npz`: points and normals (N, R, R, 3) float32, valid (N, R, R) bool, opacity (N, R, R) uint8,
-  windows (N, 4) float64, centre (3,) float64, belt (0,) or (2,) float64 of the chart; of a model with a reflection its
+  windows (N, 4) float64, centre (3,) float64, belt (2,) float64 if the chart has one; of a model with a reflection its
   arrays, as `reflection_gloss`, ...;
 - `surfaces/surfaces.npz`: of `poisson` vertices_00 (V, 3) float32, faces_00 (F, 3) int32, ... one pair a layer; of
   `grid` the arrays of `Sheets`;
@@ -150,18 +150,19 @@ def read_chart(path: Path) -> Chart:
 
 
 def _chart_arrays(chart: Chart) -> dict[str, NDArray[Any]]:
-    belt = () if chart.belt is None else (chart.belt.elevation, chart.belt.girth)
-    return {"centre": np.array(chart.centre, np.float64), "belt": np.array(belt, np.float64)}
+    arrays = {"centre": np.array(chart.centre, np.float64)}
+    if chart.belt is not None:
+        arrays["belt"] = np.array([chart.belt.elevation, chart.belt.girth], np.float64)
+    return arrays
 
 
 def _take_chart(arrays: dict[str, NDArray[Any]], path: Path) -> Chart:
     x, y, z = (float(value) for value in _take(arrays, path, "centre", (3,), np.float64))
-    numbers = _take(arrays, path, "belt", (len(arrays.get("belt", ())),), np.float64)
-    if len(numbers) == 0:
+    if "belt" not in arrays:
         return Chart((x, y, z))
-    elevation, girth = (float(value) for value in numbers) if len(numbers) == 2 else (-1.0, 0.0)
+    elevation, girth = (float(value) for value in _take(arrays, path, "belt", (2,), np.float64))
     if not (0 <= elevation < np.pi / 2 and girth > 0):
-        raise _damaged(path, "belt", "nothing, or an elevation from 0 to below pi / 2 and a girth", numbers.tolist())
+        raise _damaged(path, "belt", "an elevation from 0 to below pi / 2, and a girth above 0", (elevation, girth))
     return Chart((x, y, z), Belt(elevation, girth))
 
 

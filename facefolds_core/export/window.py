@@ -1,4 +1,4 @@
-"""The part of the hemisphere that the training cameras see something on: `sample.window: auto`.
+"""The part of the UV map that the training cameras see something on: `sample.window: auto`.
 
 A layer's crossing on a ray contributes its compositing weight w_i = alpha_i prod_{k<i}(1 - alpha_k). Colours lie in
 [0, 1], so taking a set S of crossings off a ray, from the back to the front, changes its colour by at most sum_S w_i

@@ -37,8 +37,8 @@ class SampleParams(Section):
     """R; each layer is sampled at R x R directions over the window."""
 
     window: Literal["full", "auto"] = "auto"
-    """"full" is the whole hemisphere (the paper); "auto" is the part of it outside which no training ray that was
-    looked at changes by more than 1/255 (export/window.py)."""
+    """"full" is all that the model has (the paper: the whole hemisphere); "auto" is the part of it outside which no
+    training ray that was looked at changes by more than 1/255 (export/window.py)."""
 
     auto_window: AutoWindowParams = AutoWindowParams()
     """How `window: auto` is found."""
@@ -110,7 +110,7 @@ class DecimateParams(Section):
 
     uv: Literal["nearest", "exact"] = "exact"
     """Of Poisson surfaces: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper), "exact"
-    those of its own direction from the sphere centre. Vertices of `grid` are samples and keep theirs."""
+    those of its own place in the chart. Vertices of `grid` are samples and keep theirs."""
 
     collapse: CollapseParams = CollapseParams()
     """Of sheets (`reconstruct.method: grid`)."""

@@ -27,7 +27,7 @@ class StartParams(Section):
     directions fan out less."""
 
     centre_nodes: Annotated[int, Field(ge=8, le=4096)] = 96
-    """A side of the coarse radius map over the hemisphere by which centres are compared."""
+    """Rows of the coarse radius map, over all (u, v) that a chart may hold, by which charts are compared."""
 
     window_limit: Annotated[float, Field(gt=0, le=1)] = 0.9
     """No window reaches beyond |u| of this: at the poles a radius map has no meaning."""
@@ -78,7 +78,7 @@ class MeshParams(Section):
     actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.70."""
 
     nodes: Annotated[int, Field(ge=8, le=4096)] = 128
-    """Directions a side of the hemisphere in which the mesh is compared with the volume."""
+    """Rows and columns of (u, v), of all that the chart may hold, at which the mesh is compared with the volume."""
 
     halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
     """Where it rules, the layers lie within this distance of it, units, and within what it moves (twice the standard

@@ -65,7 +65,7 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
         "no videos": (["levels", 0, "texture", "videos"], []),
         "negative rect": (["levels", 0, "layers", 0, "texture_rect", 0], -2),
         "short rect": (["levels", 0, "layers", 0, "texture_rect"], [0, 0, 64]),
-        "window": (["levels", 0, "layers", 0, "uv_window", 1], 1.5),
+        "window": (["levels", 0, "layers", 0, "uv_window", 1], 2.5),
         "path": (["levels", 0, "layers", 0, "mesh"], "../layer_00.drc"),
         "hash": (["levels", 0, "texture", "videos", 0, "sha256"], "0" * 63),
         "count as text": (["levels", 0, "texture", "frames"], "5"),

@@ -16,7 +16,7 @@ from facefolds_core.export.sampling import sample_grids, texture_rows
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import Window, points_to_uv, uv_to_st
+from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.hit_codes import SCALE
 from facefolds_core.params import BakeParams
 from tests.ellipsoids import Ellipsoids
@@ -108,9 +108,9 @@ def test_reprojection_finds_the_direction_of_the_point_where_a_texel_lies(
     mesh = coarse[0]
     positions = reprojection(mesh, sheets, R)
     share = np.array([0.2, 0.3, 0.5])
-    places = uv_to_st(points_to_uv((share @ mesh.vertices[mesh.faces]).astype(np.float64), sheets.centre)[0], WINDOW)
+    places = uv_to_st(sheets.chart.uv((share @ mesh.vertices[mesh.faces]).astype(np.float64))[0], WINDOW)
     corners = mesh.faces[np.abs(places - share @ mesh.st[mesh.faces]).max(-1).argmax()]  # where it matters most
-    uv, _ = points_to_uv(share @ mesh.vertices[corners].astype(np.float64), sheets.centre)
+    uv, _ = sheets.chart.uv(share @ mesh.vertices[corners].astype(np.float64))
     at, true = share @ mesh.st[corners].astype(np.float64) * R - 0.5, uv_to_st(uv, WINDOW) * R - 0.5
     column, row = np.rint(at).astype(int)
     # Positions are smooth inside a triangle: compared through the difference to the texel's own place.

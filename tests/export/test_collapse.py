@@ -13,7 +13,7 @@ from facefolds_core.export.decimation import exact_st, layer_order
 from facefolds_core.export.poisson import boundary_loops
 from facefolds_core.export.refit import radial_cosines, refit_radii
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.sheets import directions, grid_sheets, sheet_mesh
+from facefolds_core.export.sheets import grid_sheets, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
@@ -23,6 +23,7 @@ from tests.ellipsoids import Ellipsoids
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 N = 64
+CENTRE = np.array(Ellipsoids().chart.centre)
 
 
 @pytest.fixture(scope="module")
@@ -48,16 +49,15 @@ def test_the_bound_on_the_vertices_is_met(sheets: Sheets, target: int) -> None:
 def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
     for mesh, axes in zip(decimate_sheets(sheets, 256), Ellipsoids().axes, strict=True):
         middle = mesh.vertices[mesh.faces].mean(1)
-        assert np.abs(np.linalg.norm((middle - sheets.centre) / np.array(axes), axis=-1) - 1).max() < 0.01
-        assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.centre)).max() < 1e-5
-        drift = mesh.st[mesh.faces].mean(1) - exact_st(middle.astype(np.float32), WINDOW, sheets.centre)
+        assert np.abs(np.linalg.norm((middle - CENTRE) / np.array(axes), axis=-1) - 1).max() < 0.01
+        assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.chart)).max() < 1e-5
+        drift = mesh.st[mesh.faces].mean(1) - exact_st(middle.astype(np.float32), WINDOW, sheets.chart)
         assert np.abs(drift).max() < 0.005
 
 
 def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
-    towards = directions(sheets)
     faces = coarse_faces()
-    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, towards, RefitParams())
+    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, vertex_uv(sheets), RefitParams())
     for layer in range(sheets.num_layers):
         before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
         assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both
@@ -72,23 +72,23 @@ def coarse_faces() -> NDArray[np.int64]:
 
 
 def radial_errors(coarse: Sheets, sheets: Sheets, layer: int, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Radius of a coarse mesh, by casting rays from c, minus that of the samples."""
-    towards = directions(sheets)
-    mesh = sheet_mesh(coarse, layer, faces, towards)
-    origins = np.tile(sheets.centre, (len(towards), 1))
-    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, towards)
+    """Radius of a coarse mesh, by casting the chart's rays, minus that of the samples."""
+    uv = vertex_uv(sheets)
+    mesh, origins = sheet_mesh(coarse, layer, faces, uv), sheets.chart.origins(uv)
+    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, sheets.chart.directions(uv))
     found = hits.triangle >= 0
     corners = mesh.vertices[mesh.faces[hits.triangle[found]]].astype(np.float64)
     points = (hits.barycentric[found][..., None] * corners).sum(1)
-    return np.linalg.norm(points - sheets.centre, axis=-1) - sheets.radii[layer].reshape(-1)[found]
+    return np.linalg.norm(points - origins[found], axis=-1) - sheets.radii[layer].reshape(-1)[found]
 
 
 def test_cosines_are_those_of_the_normals(sheets: Sheets) -> None:
     for layer, axes in enumerate(Ellipsoids().axes):
-        points = sheets.radii[layer].reshape(-1, 1) * directions(sheets)
+        outward = sheets.chart.directions(vertex_uv(sheets))
+        points = sheets.radii[layer].reshape(-1, 1) * outward
         normals = points / np.array(axes) ** 2
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        cosines = (normals * directions(sheets)).sum(-1).reshape(N, N)
+        cosines = (normals * outward).sum(-1).reshape(N, N)
         inside = (slice(1, -1), slice(1, -1))  # differences are one-sided at the border
         assert np.abs(radial_cosines(sheets, layer) - cosines)[inside].max() < 1e-3
 
@@ -111,7 +111,7 @@ def covered_area(mesh: TexturedMesh) -> float:
 @pytest.mark.parametrize("seed", range(5))
 def test_layers_never_cross_and_faces_never_turn_over(sheets: Sheets, seed: int) -> None:
     meshes = decimate_sheets(rough(sheets, seed), 300)
-    order = layer_order(meshes, sheets.centre)
+    order = layer_order(meshes, sheets.chart)
     assert order.compared > 500
     assert order.deepest < 1e-7  # rounding of the vertices to float32
     for mesh in meshes:
@@ -144,7 +144,7 @@ def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
     (mesh, _) = decimate_sheets(replace(sheets, radii=radii), 256)
     column = mesh.st[:, 0] * N - 0.5
     assert (np.abs(column - (N / 2 - 0.5)) < 1).mean() > 0.1  # 2 of 64 columns, 3 %; seen: 16 %
-    radius = np.linalg.norm(mesh.vertices - sheets.centre, axis=-1)
+    radius = np.linalg.norm(mesh.vertices - CENTRE, axis=-1)
     assert np.minimum(np.abs(radius - 0.3), np.abs(radius - 0.35)).max() < 2e-3
 
 

@@ -23,7 +23,8 @@ from facefolds_core.params import DecimateParams, ReconstructParams
 from tests.ellipsoids import Ellipsoids
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
-CENTRE = Ellipsoids().centre.numpy()
+CHART = Ellipsoids().chart
+CENTRE = np.array(CHART.centre)
 
 
 @pytest.fixture(scope="module")
@@ -39,34 +40,34 @@ def surfaces(grids: Grids) -> list[Surface]:
 
 @pytest.mark.parametrize("resolution", [8, 16, 32])
 def test_the_bound_holds_and_is_used(surfaces: list[Surface], resolution: int) -> None:
-    count = len(decimate(surfaces[0], resolution**2, CENTRE).vertices)
+    count = len(decimate(surfaces[0], resolution**2, CHART).vertices)
     assert 0.9 * resolution**2 < count <= resolution**2
 
 
 def test_a_surface_below_the_bound_stays_as_it_is(surfaces: list[Surface]) -> None:
-    coarse = decimate(surfaces[0], len(surfaces[0].vertices), CENTRE)
+    coarse = decimate(surfaces[0], len(surfaces[0].vertices), CHART)
     assert np.array_equal(coarse.vertices, surfaces[0].vertices)
 
 
 def test_the_shape_stays(surfaces: list[Surface]) -> None:
-    coarse = decimate(surfaces[0], 32**2, CENTRE)
+    coarse = decimate(surfaces[0], 32**2, CHART)
     scaled = (coarse.vertices - CENTRE) / np.array(Ellipsoids().axes[0])
     assert np.abs(np.linalg.norm(scaled, axis=-1) - 1).mean() < 1e-3
 
 
 def test_the_sheet_keeps_one_boundary(surfaces: list[Surface]) -> None:
-    assert boundary_loops(decimate(surfaces[0], 32**2, CENTRE).faces) == 1
+    assert boundary_loops(decimate(surfaces[0], 32**2, CHART).faces) == 1
 
 
 def test_every_vertex_is_used(surfaces: list[Surface]) -> None:
-    coarse = decimate(surfaces[0], 16**2, CENTRE)
+    coarse = decimate(surfaces[0], 16**2, CHART)
     assert np.array_equal(np.unique(coarse.faces), np.arange(len(coarse.vertices)))
 
 
 def test_faces_that_turn_over_or_have_no_area_are_found() -> None:
     vertices = np.array([[0.1, 0, 0], [0.1, 0.1, 0], [0.1, 0, 0.1], [0.1, 0.05, 0]], np.float32)
     faces = np.array([[0, 1, 2], [0, 2, 1], [0, 1, 1], [0, 3, 1]], np.int32)
-    assert upright_faces(vertices, faces, CENTRE).tolist() == [True, False, False, False]
+    assert upright_faces(vertices, faces, CHART).tolist() == [True, False, False, False]
 
 
 def test_nearest_texture_coordinates_are_a_texel_centre_half_a_texel_away_at_most(grids: Grids) -> None:
@@ -74,7 +75,7 @@ def test_nearest_texture_coordinates_are_a_texel_centre_half_a_texel_away_at_mos
     st = nearest_st(vertices, grids.points[0], grids.valid[0])
     texel = st * 96 - 0.5
     assert np.abs(texel - np.rint(texel)).max() < 1e-3
-    assert np.abs(st - exact_st(vertices, WINDOW, CENTRE)).max() < 0.75 / 96
+    assert np.abs(st - exact_st(vertices, WINDOW, CHART)).max() < 0.75 / 96
 
 
 def test_nearest_texture_coordinates_skip_invalid_samples(grids: Grids) -> None:
@@ -89,23 +90,23 @@ def test_exact_texture_coordinates_are_the_direction(grids: Grids) -> None:
     angles = uv * np.pi / 2
     flat = np.cos(angles[:, 0])
     n = np.stack([flat * np.cos(angles[:, 1]), flat * np.sin(angles[:, 1]), np.sin(angles[:, 0])], -1)
-    st = exact_st((CENTRE + 0.3 * n).astype(np.float32), WINDOW, CENTRE)
+    st = exact_st((CENTRE + 0.3 * n).astype(np.float32), WINDOW, CHART)
     assert np.allclose(st[:2], uv_to_st(uv[:2], WINDOW), atol=1e-6)
     assert st[2, 1] == 0  # beyond the window's top: its edge
 
 
 def test_layers_in_order_do_not_cross(grids: Grids, surfaces: list[Surface]) -> None:
-    order = layer_order(decimate_layers(surfaces, grids, CENTRE, DecimateParams(resolution=16), progress=False), CENTRE)
+    order = layer_order(decimate_layers(surfaces, grids, DecimateParams(resolution=16), progress=False), CHART)
     assert order.compared > 200
     assert order.crossed == 0
 
 
 def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
-    order = layer_order([surfaces[1], surfaces[0]], CENTRE)
+    order = layer_order([surfaces[1], surfaces[0]], CHART)
     assert order.crossed == order.compared
     assert order.deepest == pytest.approx(0.03, abs=2e-3)
 
 
 def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
     with pytest.raises(UserError, match="do not belong together"):
-        decimate_layers(surfaces * 2, grids, CENTRE, DecimateParams(), progress=False)
+        decimate_layers(surfaces * 2, grids, DecimateParams(), progress=False)

@@ -15,7 +15,7 @@ from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
     Grids,
     holds_sheets,
-    read_centre,
+    read_chart,
     read_grids,
     read_meshes,
     read_sheets,
@@ -25,6 +25,7 @@ from facefolds_core.export.stores import (
     write_sheets,
     write_surfaces,
 )
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from tests.ellipsoids import Ellipsoids
 
@@ -41,8 +42,9 @@ def grids() -> Grids:
 def test_grids_round_trip(tmp_path: Path, grids: Grids) -> None:
     write_grids(tmp_path / "grids.npz", grids)
     back = read_grids(tmp_path / "grids.npz")
-    for name in ("points", "normals", "valid", "opacity", "windows", "centre"):
+    for name in ("points", "normals", "valid", "opacity", "windows"):
         assert np.array_equal(getattr(back, name), getattr(grids, name))
+    assert back.chart == grids.chart
 
 
 def test_meshes_round_trip(tmp_path: Path) -> None:
@@ -69,9 +71,11 @@ def test_sheets_round_trip_and_are_told_from_surfaces(tmp_path: Path, grids: Gri
     assert not holds_sheets(tmp_path / "surfaces.npz")
 
 
-def test_the_centre_can_be_read_alone(tmp_path: Path, grids: Grids) -> None:
-    write_grids(tmp_path / "grids.npz", replace(grids, centre=np.array([0.1, 0.2, 0.3])))
-    assert read_centre(tmp_path / "grids.npz") == (0.1, 0.2, 0.3)
+@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+def test_the_chart_can_be_read_alone(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
+    chart = Chart((0.1, 0.2, 0.3), belt)
+    write_grids(tmp_path / "grids.npz", replace(grids, chart=chart))
+    assert read_chart(tmp_path / "grids.npz") == chart
 
 
 def test_the_same_meshes_make_the_same_file(tmp_path: Path) -> None:
@@ -128,7 +132,7 @@ def test_pickled_objects_are_refused(tmp_path: Path) -> None:
         ({"normals": np.full((2, 8, 8, 3), np.nan, np.float32)}, "normals"),
         ({"valid": np.ones((2, 8, 8), np.uint8)}, "valid"),
         ({"opacity": np.ones((2, 8, 8), bool)}, "opacity"),
-        ({"centre": np.array([0.0, np.nan, 0.0])}, "centre"),
+        ({"chart": Chart((0.0, np.nan, 0.0))}, "centre"),
         ({"windows": np.tile([0.5, -0.5, -1.0, 1.0], (2, 1))}, "windows"),
     ],
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.model import radial, radial_gpu, radial_kernel
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import decays
@@ -176,18 +178,20 @@ def splatting() -> Problem:
     return Problem(kernels_gpu.splat, THREADS, arguments, {"gradient": 3e-6, "touched": 0}, on_cpu)
 
 
-def tracing() -> Problem:
+def tracing(belt: Belt | None = None) -> Problem:
     origins, directions, _ = _rays(np.random.default_rng(6))
-    window = np.array([-0.6, 0.6, -0.6, 0.6])
+    window = np.array([-0.6, 0.6, -0.6, 0.6]) if belt is None else np.array([-1.2, 0.6, -1.4, 1.4])
     waves = 0.03 * np.sin(np.arange(30) / 3)[:, None] + 0.02 * np.cos(np.arange(26) / 2)[None]
     rho = (0.3 + waves[..., None] + np.linspace(0.02, -0.02, FAST.layers)).astype(np.float32)
+    numbers = Chart((0.0, 0.0, 0.0), belt).numbers
     arguments = {
         "offsets": origins.astype(np.float64),
         "directions": directions.astype(np.float64),
         "rho": rho,
         "window": window,
-        "ceiling": radial_kernel.ceiling(rho, window),
-        "bound": float(rho.max()) + radial.MARGIN,
+        "belt": numbers,
+        "ceiling": radial_kernel.ceiling(rho, window, numbers),
+        "bound": float(rho.max()) + radial.MARGIN + (0.0 if belt is None else 2 * belt.girth),
         "step": radial.STEP,
         "result": np.zeros((RAYS, FAST.layers), np.float32),
     }
@@ -208,4 +212,5 @@ PROBLEMS = {
     "looking at the room": looking,
     "splatting into the room": splatting,
     "tracing": tracing,
+    "tracing below a belt": partial(tracing, Belt(0.2, 0.3)),
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,10 @@ from facefolds_core.config import read_subject, read_train
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
+    Grids,
+    Sheets,
     holds_sheets,
-    read_centre,
+    read_chart,
     read_grids,
     read_meshes,
     read_sheets,
@@ -37,6 +39,7 @@ from facefolds_core.export.stores import (
 )
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.storage import ModelSpec, build_model, load_model, save_model
@@ -98,14 +101,18 @@ def _surface(folder: Path) -> Any:
     return made.load_surface()
 
 
+def _parts(stored: Grids | Sheets) -> list[Any]:
+    return [repr(part) if isinstance(part, Chart) else part for part in vars(stored).values()]
+
+
 def _grids(folder: Path) -> Any:
     path = folder / "samples" / "grids.npz"
-    return [*astuple(read_grids(path)), np.array(read_windows(path)), np.array(read_centre(path))]
+    return [*_parts(read_grids(path)), np.array(read_windows(path)), repr(read_chart(path))]
 
 
 def _sheets(folder: Path) -> Any:
     path = folder / "surfaces" / "sheets.npz"
-    return [*astuple(read_sheets(path)), np.array(holds_sheets(path))]
+    return [*_parts(read_sheets(path)), np.array(holds_sheets(path))]
 
 
 def _surfaces(folder: Path) -> Any:
@@ -161,6 +168,7 @@ def make(root: Path) -> None:
     vertices, faces = random.normal(size=(2, 5, 3)).astype(np.float32), np.array([[0, 1, 2], [2, 3, 4]], np.int32)
     np.savez(root / "scene" / "surface.npz", vertices=vertices, faces=faces)
     grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5), progress=False)
+    grids = replace(grids, chart=Chart(grids.chart.centre, Belt(0.8, 0.3)))
     write_grids(root / "samples" / "grids.npz", grids)
     write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None).sheets)
     mesh = TexturedMesh(vertices[0], faces, random.random((5, 2)).astype(np.float32))

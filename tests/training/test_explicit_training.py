@@ -14,6 +14,8 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.sphere_uv import directions_to_uv
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
@@ -155,7 +157,7 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    chosen = fit.Fit(np.zeros(3), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
+    chosen = fit.Fit(Chart((0, 0, 0)), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
     levels = plan(chosen, _params(iterations=400), frames=11)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
@@ -207,7 +209,7 @@ def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
     faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
     directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    radii = fit.mesh_radii(back[None], faces, np.zeros(3), directions)
+    radii = fit.mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
     assert np.isnan(radii[:2]).all()
     assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
 

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import MovingParams
@@ -28,7 +29,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def layers() -> RadialManifolds:
     middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
-    return RadialManifolds((float(CENTRE[0]), 0.0, 0.0), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
+    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
 def rays(scene: Scene, stride: int = 1, share: float = 400.0, **params: int) -> MovingRays:

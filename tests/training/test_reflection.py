@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
@@ -154,5 +155,5 @@ def test_the_fit_does_not_depend_on_threads() -> None:
 
 
 def test_normals_of_a_sphere_are_its_directions() -> None:
-    normals = surface_normals(np.full((40, 40), 0.3), WINDOW, (6, 6), 2.0)
+    normals = surface_normals(np.full((40, 40), 0.3), Chart((0, 0, 0)), WINDOW, (6, 6), 2.0)
     np.testing.assert_allclose(normals, uv_to_directions(texel_uv(6, 6, WINDOW)), atol=2e-3)

@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.plan import Epochs, plan
@@ -15,7 +16,18 @@ from facefolds_core.training.explicit.plan import Epochs, plan
 def fitted() -> Fit:
     ones = np.ones((4, 4))
     return Fit(
-        np.zeros(3), (-0.5, 0.5, -0.5, 0.5), ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0
+        Chart((0, 0, 0)),
+        (-0.5, 0.5, -0.5, 0.5),
+        ones,
+        ones,
+        ones,
+        ones,
+        np.ones((4, 4, 3)),
+        (128, 96),
+        (),
+        (),
+        {},
+        30.0,
     )
 
 

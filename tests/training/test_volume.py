@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import share_off
 from facefolds_core.training.volume import fit, kernel, outline, reference, sight
@@ -28,6 +29,7 @@ PARAMS = ExplicitParams()
 START, LEAST = PARAMS.start, PARAMS.start.subject_opacity
 LOWER = np.array([-0.4, -0.3, -0.35])
 VOXEL = 0.05
+ORIGIN = Chart((0.0, 0.0, 0.0))
 
 
 def _problem(rays: int = 200) -> dict[str, np.ndarray]:
@@ -130,10 +132,10 @@ def _ball(radius: float, centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -
 
 
 def test_profile_of_a_ball() -> None:
-    centre = np.array([-0.1, 0.0, 0.0])
-    directions = outline.window_directions((-0.6, 0.6, -0.6, 0.6), 9, 9)
-    seen = outline.profile(_ball(0.3), centre, directions, LEAST)
-    b = directions @ centre
+    chart = Chart((-0.1, 0.0, 0.0))
+    uv = outline.window_uv((-0.6, 0.6, -0.6, 0.6), 9, 9)
+    seen = outline.profile(_ball(0.3), chart, uv, LEAST)
+    b = chart.directions(uv) @ np.array(chart.centre)
     expected = -b + np.sqrt(b**2 - 0.1**2 + 0.3**2)
     np.testing.assert_allclose(seen.radius, expected, atol=0.01)
     assert (seen.outer >= seen.radius).all() and (seen.radius >= seen.inner).all()
@@ -142,9 +144,7 @@ def test_profile_of_a_ball() -> None:
 
 
 def test_profile_beside_the_ball_is_clear() -> None:
-    seen = outline.profile(
-        _ball(0.1, (0.25, 0, 0)), np.zeros(3), outline.window_directions((0.9, 1, -1, 1), 3, 3), LEAST
-    )
+    seen = outline.profile(_ball(0.1, (0.25, 0, 0)), ORIGIN, outline.window_uv((0.9, 1, -1, 1), 3, 3), LEAST)
     assert np.isnan(seen.radius).all()
     np.testing.assert_allclose(seen.opacity, 0, atol=1e-3)
 
@@ -152,20 +152,19 @@ def test_profile_beside_the_ball_is_clear() -> None:
 def test_what_floats_is_removed() -> None:
     ball, crumb = _ball(0.25), _ball(0.05, (0.38, 0.0, 0.0))
     both = replace(ball, grid=np.where(crumb.grid[..., :1] > ball.grid[..., :1], crumb.grid, ball.grid))
-    outward = np.array([[1.0, 0.0, 0.0]])
-    assert outline.profile(both, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.43, abs=0.01)
+    outward = np.zeros((1, 2))
+    assert outline.profile(both, ORIGIN, outward, LEAST).radius[0] == pytest.approx(0.43, abs=0.01)
     cleaned = subject_of(both, (), PARAMS)
-    assert outline.profile(cleaned, np.zeros(3), outward, LEAST).radius[0] == pytest.approx(0.25, abs=0.01)
+    assert outline.profile(cleaned, ORIGIN, outward, LEAST).radius[0] == pytest.approx(0.25, abs=0.01)
 
 
 def test_points_behind_the_centre_are_lost() -> None:
     ball = _ball(0.2)
     n = np.random.default_rng(0).normal(size=(4000, 3))
     points = 0.2 * n / np.linalg.norm(n, axis=1, keepdims=True)
-    assert outline.lost_share(ball, np.array([-0.35, 0.0, 0.0]), points[points[:, 0] > 0], START) == pytest.approx(
-        0, abs=0.01
-    )
-    assert outline.lost_share(ball, np.zeros(3), points, START) > 0.5
+    front = points[points[:, 0] > 0]
+    assert outline.lost_share(ball, Chart((-0.35, 0.0, 0.0)), front, START) == pytest.approx(0, abs=0.01)
+    assert outline.lost_share(ball, ORIGIN, points, START.model_copy(update={"azimuth_limit": 0.9})) > 0.5
 
 
 def test_environment_learns_what_it_is_shown() -> None:
@@ -189,8 +188,7 @@ def test_a_sphere_is_found_from_images_alone(tmp_path: Path, resolution: int) ->
     levels = [{"resolution": r, "iterations": 120 * resolution // 96} for r in (resolution // 2, resolution)]
     params = ExplicitParams.model_validate({"volume": {"levels": levels}})
     volume = subject_of(fit.fit_volume(scene, params, tqdm(disable=True)), (), params)
-    centre = np.array(SPHERE_CENTRE)
-    seen = outline.profile(volume, centre, outline.window_directions((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
+    seen = outline.profile(volume, Chart(SPHERE_CENTRE), outline.window_uv((-0.3, 0.3, -0.3, 0.3), 9, 9), LEAST)
     voxel = 0.008 * 96 / resolution
     assert np.nanmedian(seen.radius) == pytest.approx(OPAQUE[0].radius, abs=voxel)
 
@@ -207,7 +205,7 @@ def test_a_tracked_mesh_of_another_size_is_found_out(scale: float, wrong: bool) 
     centre = np.array([-0.1, 0.0, 0.0])
     ball = trimesh.creation.icosphere(4, 0.3)
     vertices = centre + scale * (np.asarray(ball.vertices)[None] - centre)
-    share = share_off(_ball(0.3), centre, vertices, ball.faces, PARAMS.mesh, START)
+    share = share_off(_ball(0.3), Chart((-0.1, 0.0, 0.0)), vertices, ball.faces, PARAMS.mesh, START)
     assert (share > PARAMS.mesh.max_share_off) == wrong
     assert share > 0.95 or share < 0.05
 

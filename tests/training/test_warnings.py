@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.facts import fact
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.warnings import warnings_of
 from tests.scenes import make_scene
 
+BACK, FARTHER = Chart((-0.3, 0.0, 0.0)), Chart((-0.4, 0.0, 0.0))
+
 WELL = Fit(
-    centre=np.array([-0.3, 0.0, 0.0]),
+    chart=BACK,
     window=(-0.5, 0.5, -0.5, 0.5),
     middle=np.zeros((2, 2)),
     halfwidth=np.zeros((2, 2)),
@@ -24,7 +27,7 @@ WELL = Fit(
     texels=(16, 16),
     reasons=(),
     notes=(),
-    losses={-0.3: 0.02, -0.4: 0.3},
+    losses={BACK: 0.02, FARTHER: 0.3},
     volume_psnr=30.0,
 )
 
@@ -34,7 +37,7 @@ def test_what_is_not_well_is_said_with_a_remedy(tmp_path: Path) -> None:
     assert warnings_of(scene, WELL, params) == ()
     (low,) = warnings_of(scene, replace(WELL, volume_psnr=20.1), params)
     assert low.kind == "volume_explains_little" and "20.1 dB" in str(low) and "plates" in str(low)
-    (lost,) = warnings_of(scene, replace(WELL, centre=np.array([-0.4, 0.0, 0.0])), params)
+    (lost,) = warnings_of(scene, replace(WELL, chart=FARTHER), params)
     assert "30%" in str(lost) and "train.start.centres" in str(lost)
     guessed = replace(scene, left_out=(fact("front_guessed"),))
     assert "`front`" in str(warnings_of(guessed, WELL, params)[0])

@@ -1,0 +1,155 @@
+"""Radius maps over a chart with a belt: closed forms, compiled search against the reference, gradients, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from facefolds_core.errors import UserError
+from facefolds_core.geometry.chart import Belt, Chart
+from facefolds_core.model import load_model, radial, save_model
+from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.model.radial_kernel import ceiling, crossing_distances
+from facefolds_core.model.storage import ExplicitSpec, build_model
+
+C = (-0.25, 0.0, 0.05)
+SLANTED = Chart(C, Belt(0.2, 0.3))
+BROAD = (-1.2, 0.7, -1.4, 1.4)
+SPEC = ExplicitSpec(centre=C, window=(-1.2, 0.7, -1.4, 1.4), nodes=(6, 7), texels=(8, 9), num_layers=2, num_frames=2)
+
+
+def bumpy(chart: Chart = SLANTED, window: tuple[float, float, float, float] = BROAD) -> RadialManifolds:
+    generator = torch.Generator().manual_seed(0)
+    coarse = torch.randn(1, 1, 6, 6, generator=generator)
+    bumps = torch.nn.functional.interpolate(coarse, size=(48, 60), mode="bicubic")[0, 0]
+    return RadialManifolds(chart, window, 0.25 + 0.01 * bumps, torch.full((48, 60), 0.01), 4)
+
+
+def rays_around(count: int, seed: int = 0) -> tuple[Tensor, Tensor]:
+    """From all sides towards points around the axis, from above the head to below the neck."""
+    generator = torch.Generator().manual_seed(seed)
+    origins = torch.nn.functional.normalize(torch.randn(count, 3, generator=generator), dim=1)
+    low, high = torch.tensor([-0.45, -0.2, -0.5]), torch.tensor([-0.05, 0.2, 0.25])
+    targets = low + (high - low) * torch.rand(count, 3, generator=generator)
+    return origins, torch.nn.functional.normalize(targets - origins, dim=1)
+
+
+@pytest.mark.parametrize("grad", [False, True])
+def test_a_column_is_a_cylinder(grad: bool) -> None:
+    """Belt at elevation 0, constant radius: a vertical wall, open behind, met from outside or from within."""
+    window = (-1.2, -0.05, -1.4, 1.4)
+    chart = Chart(C, Belt(0.0, 0.3))
+    wall = RadialManifolds(chart, window, torch.full((8, 12), 0.2), torch.full((8, 12), 0.02), 3)
+    origins, directions = (x.double() for x in rays_around(600))
+    with torch.set_grad_enabled(grad):
+        found = wall.crossings(origins, directions)
+    o, d = (origins - torch.tensor(C)).numpy(), directions.numpy()
+    a, b = (d[:, :2] ** 2).sum(1), (o[:, :2] * d[:, :2]).sum(1)
+    met = np.zeros(2, int)
+    for layer, radius in enumerate((0.22, 0.20, 0.18)):
+        root = np.sqrt((b**2 - a * ((o[:, :2] ** 2).sum(1) - radius**2)).clip(0))
+        expected, edge = np.zeros(len(o)), np.zeros(len(o), bool)
+        for distance in ((-b + root) / a, (-b - root) / a):  # the nearer one last: it wins
+            p = o + distance[:, None] * d
+            u, v = 2 / np.pi * p[:, 2] / 0.3, 2 / np.pi * np.arctan2(p[:, 1], p[:, 0])
+            inside = np.minimum.reduce([u - window[0], window[1] - u, v - window[2], window[3] - v])
+            edge |= (np.abs(inside) < 0.03) | (root < 0.03)
+            expected = np.where((inside > 0) & (root > 0), distance, expected)
+        actual = (found.distance * found.hit).detach().numpy()[:, layer]
+        np.testing.assert_allclose(actual[~edge], expected[~edge], atol=1e-5)
+        met += [(expected[~edge] > 0).sum(), ((expected == (-b + root) / a) & ~edge & (expected > 0)).sum()]
+    assert met[0] > 900 and met[1] > 100  # and some of them from within
+
+
+def test_compiled_search_matches_the_reference() -> None:
+    manifolds = bumpy()
+    origins, directions = rays_around(800)
+    with torch.no_grad():
+        compiled = manifolds.crossings(origins, directions)
+        reference = manifolds.reference_crossings(origins, directions)
+    same = compiled.hit == reference.hit
+    assert same.float().mean() > 0.995  # a grazing ray may be met by one search and not by the other
+    both = compiled.hit & reference.hit
+    error = (compiled.distance - reference.distance)[both].abs()
+    assert (error < 1e-4).float().mean() > 0.995
+    assert error.median() < 1e-6
+    uv, radius = manifolds.chart.uv(compiled.points[both])
+    assert manifolds.chart.below(uv).float().mean() > 0.2
+    assert (uv[:, 1].abs() > 1.05).float().mean() > 0.1
+    rho, _ = manifolds.radii_at(uv)
+    layer = both.nonzero()[:, 1]
+    assert (rho.gather(1, layer[:, None])[:, 0] - radius).abs().max() < 2e-5
+
+
+@pytest.mark.parametrize("chart", [Chart(C), SLANTED, Chart(C, Belt(1.0, 0.1))], ids=str)
+def test_strides_through_empty_space_miss_nothing(chart: Chart) -> None:
+    window = BROAD if chart.belt is not None else (-0.8, 0.7, -1.4, 1.4)
+    manifolds = bumpy(chart, window)
+    rho, belt = manifolds.radii().detach().numpy(), chart.numbers
+    origins, directions = (x.double().numpy() for x in rays_around(3000, seed=1))
+    top = ceiling(rho, np.array(window), belt)
+    assert (top == 0).mean() > 0.2
+    found = [
+        crossing_distances(
+            origins - np.array(C), directions, rho, np.array(window), belt, high, manifolds.radius, radial.STEP
+        )
+        for high in (top, np.full_like(top, np.inf))
+    ]
+    assert ((found[0] > 0) == (found[1] > 0)).mean() > 0.998  # grazing rays
+    both = (found[0] > 0) & (found[1] > 0)
+    assert both.mean() > 0.5
+    assert (np.abs(found[0] - found[1])[both] < 1e-5).mean() > 0.998
+
+
+def test_distance_gradient_against_finite_differences() -> None:
+    """Of a column seen from its front, behind the belt and across it, by rays that graze nothing."""
+    manifolds = bumpy()
+    heights = torch.linspace(0, -0.4, 64)
+    targets = manifolds.centre + torch.stack([0 * heights, 0 * heights, heights], -1)
+    azimuths = 7 * torch.arange(64) % 64 / 32 - 1
+    outward = torch.stack([torch.cos(azimuths), torch.sin(azimuths), 0.3 * torch.sin(5 * azimuths)], -1)
+    origins, directions = targets + outward, torch.nn.functional.normalize(-outward, dim=1)
+    crossings = manifolds.crossings(origins, directions)
+    below = manifolds.chart.below(manifolds.chart.uv(crossings.points.detach())[0])
+    assert crossings.hit.all() and 0.5 < below.float().mean() < 0.95
+    weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance)
+    (crossings.distance * weights).sum().backward()
+    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
+    analytic = float((manifolds.middle.grad * step).sum())
+    values = []
+    for sign in (1, -1):
+        moved = RadialManifolds(SLANTED, BROAD, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4)
+        with torch.no_grad():
+            values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
+    assert analytic == pytest.approx((values[0] - values[1]) / 4e-4, rel=0.03)
+
+
+def test_the_ball_around_c_holds_the_column() -> None:
+    manifolds = bumpy()
+    uv = torch.tensor([[-1.2, 0.3], [0.7, 0.0], [-0.3, 1.4], [-1.2, -1.4]])
+    radii, _ = manifolds.radii_at(uv)
+    far = (manifolds.chart.points(uv, radii[:, 0]) - manifolds.centre).norm(dim=-1)
+    assert manifolds.radius > far.max() > manifolds.radii().max() + 0.1
+
+
+@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+def test_a_model_keeps_its_chart(tmp_path: Path, belt: Belt | None) -> None:
+    spec = SPEC.model_copy(update={"belt": belt})
+    save_model(build_model(spec), spec, tmp_path)
+    written = json.loads((tmp_path / "model.json").read_text())
+    assert ("belt" in written) == (belt is not None)  # a model without one is read by older versions
+    assert load_model(tmp_path).chart == Chart(C, belt)
+
+
+@pytest.mark.parametrize("belt", [{"elevation": 0.2}, {"elevation": None, "girth": 0.3}, [0.2, 0.3], 0.2])
+def test_a_damaged_belt_is_named(tmp_path: Path, belt: object) -> None:
+    save_model(build_model(SPEC), SPEC, tmp_path)
+    description = {**json.loads((tmp_path / "model.json").read_text()), "belt": belt}
+    (tmp_path / "model.json").write_text(json.dumps(description))
+    with pytest.raises(UserError, match="belt"):
+        load_model(tmp_path)

@@ -1,0 +1,150 @@
+"""Which chart is chosen: a belt where a neck stands in a collar, the plain sphere where that holds all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from facefolds_core.geometry.chart import Belt, Chart
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.fit import fit_window, mesh_radii
+from facefolds_core.training.volume import kernel, outline
+from facefolds_core.training.volume.cameras import CameraFit
+from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.room import Room
+
+PARAMS = ExplicitParams()
+START = PARAMS.start.model_copy(update={"centres": (-0.15, -0.2, -0.25), "belts": (10.0,)})
+AXIS, VOXEL = -0.2, 0.0125
+HEAD, NECK, RIM, ROOT, EDGE, FLOOR = 0.16, 0.07, 0.3, -0.2, -0.3, -0.36
+"""A ball 0.05 above the origin, a neck down to ROOT, and a collar that slopes from there to its RIM at EDGE."""
+
+Array = NDArray[np.float64]
+
+
+def volume_of(inside: Array) -> Volume:
+    """From depths below the surface, units, on a grid over +-0.45."""
+    grid = np.zeros((*inside.shape, 4), np.float32)
+    grid[..., 0] = (inside / VOXEL * 10).clip(-kernel.LIMIT, kernel.LIMIT)
+    room = Room(np.zeros(3, np.float32), 1.0, 0.45, PARAMS.room, PARAMS.environment)
+    cameras = CameraFit.alike(1, PARAMS.cameras)
+    return Volume(grid, np.full(3, -0.45), VOXEL, PARAMS.volume.step, room, 0, 30.0, cameras)
+
+
+def nodes() -> tuple[Array, Array]:
+    """Of the grid: distance from the axis, and height."""
+    axis = np.linspace(-0.45, 0.45, 73)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    return np.hypot(x - AXIS, y), z
+
+
+@pytest.fixture(scope="module")
+def bust() -> Volume:
+    flat, z = nodes()
+    head = HEAD - np.hypot(flat, z - 0.05)
+    neck = np.minimum(NECK - flat, -z)
+    slope = (EDGE - ROOT) / (RIM - NECK)
+    under_the_top = (ROOT + slope * (flat - NECK) - z) / math.hypot(1, slope)
+    collar = np.minimum.reduce([under_the_top, RIM - flat, z - FLOOR])
+    return volume_of(np.maximum.reduce([head, neck, collar]))
+
+
+def around(flat: Array, z: Array) -> Array:
+    """(P, 3) before the axis, at these distances and heights."""
+    azimuth = np.random.default_rng(0).uniform(-1.4, 1.4, len(flat))
+    return np.stack([AXIS + flat * np.cos(azimuth), flat * np.sin(azimuth), z], -1)
+
+
+def seen_of_the_bust() -> dict[str, Array]:
+    """What cameras before it see."""
+    t = np.linspace(0.03, 0.97, 400)
+    tilt = -1.0 + 2.4 * t
+    return {
+        "head": around(HEAD * np.cos(tilt), 0.05 + HEAD * np.sin(tilt)),
+        "neck": around(np.full(400, NECK), ROOT + 0.1 * t),
+        "collar": around(NECK + (RIM - NECK) * t, ROOT + (EDGE - ROOT) * t),
+        "rim": around(np.full(400, RIM), FLOOR + (EDGE - FLOOR) * t),
+    }
+
+
+def test_a_neck_in_a_collar_needs_a_belt(bust: Volume) -> None:
+    parts = seen_of_the_bust()
+    sphere, belted = Chart((AXIS, 0.0, 0.0)), Chart((AXIS, 0.0, 0.0), Belt(math.radians(10), 0.25))
+    lost = {name: [outline.lost_share(bust, c, part, START) for c in (sphere, belted)] for name, part in parts.items()}
+    assert lost["neck"][0] > 0.5
+    assert lost["neck"][1] < 0.3
+    assert max(lost["head"]) < 0.1 and lost["collar"][1] < 0.15
+    chosen, losses = outline.choose_chart(bust, np.concatenate(list(parts.values())), START)
+    assert chosen.belt is not None and math.degrees(chosen.belt.elevation) == pytest.approx(10)
+    plain = min(loss for chart, loss in losses.items() if chart.belt is None)
+    assert losses[chosen] < 0.6 * plain
+    assert len(losses) == 2 * len(START.centres)
+
+
+def ball() -> tuple[Volume, Array]:
+    """Radius 0.25 around (-0.2, 0, 0), and points of its front."""
+    flat, z = nodes()
+    n = np.random.default_rng(0).normal(size=(3000, 3))
+    points = 0.25 * n / np.linalg.norm(n, axis=1, keepdims=True)
+    front = (points[:, 0] > 0) & (np.abs(points[:, 2]) < 0.2)
+    return volume_of(0.25 - np.hypot(flat, z)), points[front] + np.array([AXIS, 0, 0])
+
+
+def test_a_ball_keeps_the_sphere_farthest_back() -> None:
+    volume, points = ball()
+    chosen, losses = outline.choose_chart(volume, points, START)
+    assert chosen == Chart((-0.25, 0.0, 0.0))
+    assert losses[chosen] < 0.02
+    alike = [chart for chart, loss in losses.items() if loss <= min(losses.values()) + START.centre_tie]
+    assert any(chart.belt is not None and chart.centre == chosen.centre for chart in alike)  # it was a tie
+
+
+def test_no_belt_is_tried_where_none_is_asked_for() -> None:
+    volume, points = ball()
+    _, losses = outline.choose_chart(volume, points, START.model_copy(update={"belts": ()}))
+    assert [chart.centre[0] for chart in losses] == list(START.centres)
+    assert all(chart.belt is None for chart in losses)
+
+
+def test_a_radian_below_the_belt_is_as_long_as_one_around_it() -> None:
+    volume, points = ball()
+    _, losses = outline.choose_chart(volume, points, START)
+    girths = {chart.centre[0]: chart.belt.girth for chart in losses if chart.belt is not None}
+    assert girths[-0.2] == pytest.approx(0.25)
+
+
+def test_the_profile_of_a_neck_is_its_radius(bust: Volume) -> None:
+    chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
+    slides = np.array([0.13, 0.15, 0.17])
+    uv = np.stack([-2 / math.pi * slides / 0.25, [-1.2, 0.0, 0.7]], -1)
+    seen = outline.profile(bust, chart, uv, PARAMS.start.subject_opacity)
+    assert seen.radius == pytest.approx(np.full(3, NECK), abs=0.01)
+
+
+def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_seen(bust: Volume) -> None:
+    chart = Chart((AXIS, 0.0, 0.0), Belt(math.radians(10), 0.25))
+    whole = fit_window(bust, chart, np.concatenate(list(seen_of_the_bust().values())), None, START)
+    assert -START.column_limit <= whole[0] < -0.8  # u of the floor: -0.86
+    ears = chart.points(np.array([[0.0, -1.3], [0.0, 1.3]]), np.full(2, HEAD))
+    u0, u1, v0, v1 = fit_window(bust, chart, ears, None, START)
+    assert -START.azimuth_limit <= v0 < -1.2 and 1.2 < v1 <= START.azimuth_limit
+    assert -0.3 < u0 < u1 < 0.3
+
+
+def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
+    """A square pipe about the axis."""
+    angles = np.radians([45, 135, 225, 315])
+    ring = np.stack([AXIS + 0.1 * np.cos(angles), 0.1 * np.sin(angles)], -1)
+    vertices = np.concatenate([np.insert(ring, 2, z, 1) for z in (-0.4, 0.0)])
+    sides = np.arange(4)
+    after = (sides + 1) % 4
+    faces = np.concatenate([np.stack([sides, after, 4 + sides], 1), np.stack([after, 4 + after, 4 + sides], 1)])
+    chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
+    uv = np.array([[-0.5, 0.0], [-0.5, 0.5], [-0.9, -1.0], [-1.3, 0.0], [0.5, 0.0]])
+    radii = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
+    inner = 0.1 / math.sqrt(2)
+    assert radii[:3] == pytest.approx([inner, 0.1, inner], abs=1e-6)
+    assert np.isnan(radii[3:]).all()
