@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.fit import fit_window, mesh_radii
+from facefolds_core.training.explicit.fit import fit_window
+from facefolds_core.training.explicit.tracked import mesh_radii
 from facefolds_core.training.volume import kernel, outline
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
