@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -14,8 +13,9 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import ExplicitParams, GeometryParams, MeshParams, StartParams
+from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
+from facefolds_core.training.explicit.tracked import blend, mesh_halfwidth, mesh_radii, trusted_surface
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import (
     Profile,
@@ -72,7 +72,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     cameras = [scene.camera_in_head(i, volume.frame) for i in scene.indices("train")]
     visible = visible_points(volume, cameras)
     chart, losses = choose_chart(volume, visible, start)
-    surface, notes = _trusted_surface(scene, volume, chart, params)
+    surface, notes = trusted_surface(scene, volume, chart, params)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(volume, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
@@ -80,20 +80,19 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
-        known = seen.radius
-        trust = np.zeros((rows, columns))
+        known, kept, sure = seen.radius, np.zeros((rows, columns)), np.zeros((rows, columns))
         source = fact("middle_from_volume")
     else:
-        mesh = mesh_radii(vertices, surface[1], chart, uv)
+        mesh, motion = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_share(cameras, points).reshape(mesh.shape) < params.volume.min_view_share
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, params.mesh.reach)
-        trust = params.mesh.trust * kept
+        sure = mesh_halfwidth(seen.radius - mesh, motion, params, volume.voxel)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
         source = fact("middle_from_mesh", reach=params.mesh.reach)
     middle = extrapolate(known).clip(geometry.min_radius)
-    widths = spread(seen, middle, geometry, volume.voxel)
+    widths = spread(seen, middle, kept, sure, geometry, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
@@ -102,7 +101,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         window=window,
         middle=middle,
         halfwidth=widths,
-        trust=trust,
+        trust=params.mesh.trust * kept,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
@@ -125,32 +124,6 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact) -> tuple[Fact, .
     )
 
 
-def _trusted_surface(
-    scene: Scene, volume: Volume, chart: Chart, params: ExplicitParams
-) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
-    """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
-    surface = scene.load_surface()
-    if surface is None:
-        return None, ()
-    vertices = surface[0].astype(np.float64)
-    share = share_off(volume, chart, vertices, surface[1], params.mesh, params.start)
-    if share <= params.mesh.max_share_off:
-        return surface, ()
-    return None, (fact("mesh_is_off", share=share, distance=params.mesh.max_distance),)
-
-
-def share_off(
-    volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
-) -> float:
-    """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
-    over `max_distance` apart; 0 where there are none."""
-    uv = window_uv(whole_window(chart, start), params.nodes, params.nodes)
-    least = start.subject_opacity
-    seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
-    apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
-    return float((apart > params.max_distance).mean()) if len(apart) else 0.0
-
-
 def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams) -> Window:
     """Box around the directions that hold the subject: the volume's near `points` that cameras see, (P, 3), and those
     of mesh vertices (K, V, 3)."""
@@ -171,36 +144,22 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
-    """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
+def spread(seen: Profile, middle: Array, kept: Array, sure: Array, params: GeometryParams, voxel: float) -> Array:
+    """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
+    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed.
 
     Args:
-        mesh, volume: radii, units, NaN where there is none.
-        reach: where the volume lies outside the mesh by more, units, it is believed.
-
-    Returns:
-        radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
+        kept: share of the tracked mesh, 0 to 1.
+        sure: in that share at most this (`mesh_halfwidth`).
     """
-    close = np.isfinite(mesh) & ~(volume - mesh > reach)
-    # Ten nodes inside the border the mesh rules alone.
-    kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
-    kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
-    filled = np.where(np.isnan(volume), mesh, volume)
-    return np.where(
-        kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled
-    ), kept
-
-
-def spread(seen: Profile, middle: Array, params: GeometryParams, voxel: float) -> Array:
-    """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
-    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
     thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
     halfwidth = params.halfwidth
-    wide: Array = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
+    wide = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
         halfwidth, max(halfwidth, params.max_halfwidth)
     )
-    return wide
+    found: Array = ndimage.gaussian_filter(kept * np.minimum(sure, wide) + (1 - kept) * wide, 2.0, mode="nearest")
+    return found if kept.any() else wide
 
 
 def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
@@ -212,25 +171,6 @@ def _nodes(window: Window, longest: int) -> tuple[int, int]:
     height, width = window[1] - window[0], window[3] - window[2]
     scale = longest / max(height, width)
     return max(8, round(scale * height)), max(8, round(scale * width))
-
-
-def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> Array:
-    """(...) radius of the mesh's outermost point along the chart's rays of (..., 2), mean over frames (K, V, 3).
-
-    NaN where no frame's mesh has a point on that ray.
-    """
-    origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
-    total, count = np.zeros(len(flat)), np.zeros(len(flat))
-    for frame in vertices[:: max(1, len(vertices) // 12)]:
-        mesh = trimesh.Trimesh(frame, faces, process=False)
-        start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
-        points, ray, _ = mesh.ray.intersects_location(origins + start * flat, -flat, multiple_hits=False)
-        radius = ((points - origins[ray]) * flat[ray]).sum(1)
-        # A ray that meets nothing on this side runs on through its origin and may meet the back of a head.
-        near = radius > 0
-        total[ray[near]] += radius[near]
-        count[ray[near]] += 1
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
 def extrapolate(radii: Array) -> Array:

@@ -1,0 +1,95 @@
+"""What a tracked mesh says of the surfaces: whether it is to be believed, where it lies, how far it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.facts import Fact, fact
+from facefolds_core.geometry.chart import Chart
+from facefolds_core.params import ExplicitParams, MeshParams, StartParams
+from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.outline import profile, whole_window, window_uv
+
+Array = NDArray[np.float64]
+
+
+def trusted_surface(
+    scene: Scene, volume: Volume, chart: Chart, params: ExplicitParams
+) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
+    """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
+    surface = scene.load_surface()
+    if surface is None:
+        return None, ()
+    vertices = surface[0].astype(np.float64)
+    share = share_off(volume, chart, vertices, surface[1], params.mesh, params.start)
+    if share <= params.mesh.max_share_off:
+        return surface, ()
+    return None, (fact("mesh_is_off", share=share, distance=params.mesh.max_distance),)
+
+
+def share_off(
+    volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
+) -> float:
+    """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
+    over `max_distance` apart; 0 where there are none."""
+    uv = window_uv(whole_window(chart, start), params.nodes, params.nodes)
+    least = start.subject_opacity
+    seen, (mesh, _) = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
+    apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
+    return float((apart > params.max_distance).mean()) if len(apart) else 0.0
+
+
+def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> tuple[Array, Array]:
+    """Radius (...) of the mesh's outermost point along the chart's rays of (u, v) (..., 2): mean and standard deviation
+    over the frames of vertices (K, V, 3), units; NaN where no frame's mesh has a point on that ray.
+    """
+    origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
+    total, squares, count = (np.zeros(len(flat)) for _ in range(3))
+    for frame in vertices[:: max(1, len(vertices) // 12)]:
+        mesh = trimesh.Trimesh(frame, faces, process=False)
+        start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
+        points, ray, _ = mesh.ray.intersects_location(origins + start * flat, -flat, multiple_hits=False)
+        radius = ((points - origins[ray]) * flat[ray]).sum(1)
+        # A ray that meets nothing on this side runs on through its origin and may meet the back of a head.
+        near = radius > 0
+        total[ray[near]] += radius[near]
+        squares[ray[near]] += radius[near] ** 2
+        count[ray[near]] += 1
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    deviation = np.sqrt(np.maximum(squares / np.maximum(count, 1) - mean**2, 0))
+    return mean.reshape(uv.shape[:-1]), deviation.reshape(uv.shape[:-1])
+
+
+def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
+    """Radii of the mesh where it is close to the volume, outside it or alone; of the volume elsewhere; a soft border.
+
+    Args:
+        mesh, volume: radii, units, NaN where there is none.
+        reach: where the volume lies outside the mesh by more, units, it is believed.
+
+    Returns:
+        radii (NaN where neither has one), and the share of the mesh in them, 0 to 1.
+    """
+    close = np.isfinite(mesh) & ~(volume - mesh > reach)
+    # Ten nodes inside the border the mesh rules alone.
+    kept = np.clip(ndimage.distance_transform_edt(close) / 10, 0, 1)
+    kept = np.where(np.isnan(volume), close.astype(np.float64), kept)
+    filled = np.where(np.isnan(volume), mesh, volume)
+    return np.where(
+        kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled
+    ), kept
+
+
+def mesh_halfwidth(outside: Array, motion: Array, params: ExplicitParams, voxel: float) -> Array:
+    """Halfwidths where the tracked mesh rules: `mesh.halfwidth`, plus what it moves from its mean (twice its standard
+    deviation, `motion`), plus by how much more than a voxel the volume lies `outside` it (hair), units.
+
+    The volume's blur says nothing of a surface that is known: at a steep place its opacity is spread along a ray, and
+    layers spread as far show a camera what no other sees.
+    """
+    hair = np.clip(outside - voxel, 0, None)
+    return np.asarray(params.mesh.halfwidth + 2 * np.nan_to_num(motion) + np.nan_to_num(hair))
