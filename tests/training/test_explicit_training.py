@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-import trimesh
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import directions_to_uv
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
@@ -28,7 +26,7 @@ from tests.scenes import OPAQUE, make_scene
 
 pytestmark = pytest.mark.slow
 
-GEOMETRY, MESH = ExplicitParams().geometry, ExplicitParams().mesh
+GEOMETRY = ExplicitParams().geometry
 
 
 ROUGH = {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]}
@@ -130,28 +128,33 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
     np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
 
 
-def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
-    mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.31)
-    mesh[:, 30:] = np.nan
-    volume[:, :10] = 0.3 + 2 * MESH.reach
-    volume[20, 20] = np.nan
-    radii, kept = fit.blend(mesh, volume, MESH.reach)
-    np.testing.assert_allclose(radii[:, :10], volume[:, :10])
-    np.testing.assert_allclose(radii[:, 30:], 0.31)
-    assert radii[20, 20] == 0.3
-    deep = np.where(np.arange(41) == 20, 0.3 - 2 * MESH.reach, volume)
-    np.testing.assert_array_equal(fit.blend(mesh, deep, MESH.reach)[0][5, 20], 0.3)  # a hole of the volume
-    assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
-
-
 def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
     radius = np.full((30, 30), 0.3)
     seen = Profile(
         radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
     )
-    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.01), 0.006)
-    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
-    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, GEOMETRY, voxel=0.01), GEOMETRY.max_halfwidth)
+    none = np.zeros((30, 30))
+
+    def spread(middle: np.ndarray, voxel: float) -> np.ndarray:
+        return fit.spread(seen, middle, none, none, GEOMETRY, voxel)
+
+    np.testing.assert_allclose(spread(radius, 0.01), 0.006)
+    np.testing.assert_allclose(spread(radius, 0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(spread(radius + 0.5, 0.01), GEOMETRY.max_halfwidth)
+
+
+def test_where_a_mesh_rules_layers_are_as_close_as_it_says() -> None:
+    """The left half is the mesh's; the volume is blurred all over."""
+    radius, left = np.full((40, 60), 0.3), np.broadcast_to(np.arange(60) < 30, (40, 60))
+    seen = Profile(
+        radius, radius + 0.02, radius - 0.02, np.ones((40, 60), np.float32), np.ones((40, 60, 3), np.float32)
+    )
+    sure = np.full((40, 60), 0.007)
+    found = fit.spread(seen, radius, left.astype(float), sure, GEOMETRY, voxel=0.01)
+    np.testing.assert_allclose(found[:, :20], 0.007)
+    np.testing.assert_allclose(found[:, 40:], 0.006 + 0.5 * (0.04 - 3 * 0.01))
+    wider = fit.spread(seen, radius, left.astype(float), sure + 1, GEOMETRY, voxel=0.01)
+    np.testing.assert_allclose(wider, found[0, -1])  # never wider than without a mesh
 
 
 def test_plan_spends_all_iterations() -> None:
@@ -201,17 +204,6 @@ def test_wide_layers_keep_their_distance_from_the_centre() -> None:
     assert (
         fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= GEOMETRY.min_radius - 1e-12
     ).all()
-
-
-def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
-    ball = trimesh.creation.icosphere(3, 0.2)
-    back = np.asarray(ball.vertices)
-    faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
-    directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    radii = fit.mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
-    assert np.isnan(radii[:2]).all()
-    assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
 
 
 def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:

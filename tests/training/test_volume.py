@@ -16,7 +16,7 @@ from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.fit import share_off
+from facefolds_core.training.explicit.tracked import share_off
 from facefolds_core.training.volume import fit, kernel, outline, reference, sight
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.environment import Environment
