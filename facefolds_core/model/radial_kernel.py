@@ -56,7 +56,8 @@ def ceiling(rho: Array, window: Array, belt: Array) -> Array:
     """
     rows, columns = rho.shape[:2]
     stride = SKIP * belt[2]
-    reach = max(math.asin(min(1.0, stride / (float(rho.min()) - stride))), stride * belt[3] if belt[2] > 1 else 0.0)
+    sliding = stride * belt[3] if math.isfinite(belt[1]) else 0.0
+    reach = max(math.asin(stride / max(float(rho.min()) - stride, stride)), sliding)
     reach = _TO_UV * reach + 4.0 / CEILING_CELLS
     top = np.zeros((CEILING_CELLS, CEILING_CELLS), np.float32)
     u = np.linspace(window[1], window[0], rows)

@@ -31,3 +31,9 @@ def test_the_window_fits_the_scene() -> None:
 
 def test_an_invisible_model_keeps_the_whole_hemisphere() -> None:
     assert visible_window(Ellipsoids(patch=1e-6), RIG[:1]) == FULL_WINDOW
+
+
+@pytest.mark.parametrize("patch", [1e-6, 0.6])
+def test_no_window_is_larger_than_the_models(patch: float) -> None:
+    own = (-0.1, 0.2, -0.15, 0.25)
+    assert visible_window(Ellipsoids(patch=patch, window=own), RIG[:2]) == own

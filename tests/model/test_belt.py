@@ -106,6 +106,27 @@ def test_strides_through_empty_space_miss_nothing(chart: Chart) -> None:
     assert (np.abs(found[0] - found[1])[both] < 1e-5).mean() > 0.998
 
 
+@pytest.mark.parametrize("elevation", [0.0, 0.3])
+def test_strides_downwards_miss_no_ledge(elevation: float) -> None:
+    """Where u falls fast with height a stride crosses much of it: rays straight down beside a thin ring of a column."""
+    chart, window = Chart(C, Belt(elevation, 0.05)), (-1.9, -0.2, -1.4, 1.4)
+    middle = torch.full((120, 12), 0.15)
+    middle[56:64] = 0.25  # 0.009 units thick: more than a step, less than a stride
+    column = RadialManifolds(chart, window, middle, torch.full_like(middle, 0.001), 2)
+    azimuth = np.linspace(-2, 2, 200)
+    offsets = np.stack([0.2 * np.cos(azimuth), 0.2 * np.sin(azimuth), np.linspace(0.03, 0.06, 200)], -1)
+    found = column.compiled_distances(offsets, np.tile([0.0, 0.0, -1.0], (200, 1)))
+    assert (found > 0).all()
+
+
+def test_a_steep_belt_on_a_thin_column_has_a_ceiling() -> None:
+    """Rays 80 degrees down: a stride is longer than the smallest radius."""
+    chart = Chart(C, Belt(np.radians(80), 0.3))
+    top = ceiling(np.full((8, 8, 1), 0.15, np.float32), np.array([-1.2, 0.5, -0.5, 0.5]), chart.numbers)
+    inside = top[48:102, 48:80]  # u from 0.5 to -1.2, v from -0.5 to 0.5
+    assert (inside == np.float32(0.15)).all()
+
+
 def test_distance_gradient_against_finite_differences() -> None:
     """Of a column seen from its front, behind the belt and across it, by rays that graze nothing."""
     manifolds = bumpy()

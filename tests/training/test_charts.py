@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import fit_window
-from facefolds_core.training.explicit.tracked import mesh_radii
 from facefolds_core.training.volume import kernel, outline
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
@@ -133,19 +132,3 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
     u0, u1, v0, v1 = fit_window(bust, chart, ears, None, START)
     assert -START.azimuth_limit <= v0 < -1.2 and 1.2 < v1 <= START.azimuth_limit
     assert -0.3 < u0 < u1 < 0.3
-
-
-def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
-    """A square pipe about the axis."""
-    angles = np.radians([45, 135, 225, 315])
-    ring = np.stack([AXIS + 0.1 * np.cos(angles), 0.1 * np.sin(angles)], -1)
-    vertices = np.concatenate([np.insert(ring, 2, z, 1) for z in (-0.4, 0.0)])
-    sides = np.arange(4)
-    after = (sides + 1) % 4
-    faces = np.concatenate([np.stack([sides, after, 4 + sides], 1), np.stack([after, 4 + after, 4 + sides], 1)])
-    chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
-    uv = np.array([[-0.5, 0.0], [-0.5, 0.5], [-0.9, -1.0], [-1.3, 0.0], [0.5, 0.0]])
-    radii = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
-    inner = 0.1 / math.sqrt(2)
-    assert radii[:3] == pytest.approx([inner, 0.1, inner], abs=1e-6)
-    assert np.isnan(radii[3:]).all()

@@ -26,7 +26,7 @@ from tests.scenes import OPAQUE, make_scene
 
 pytestmark = pytest.mark.slow
 
-GEOMETRY, MESH = ExplicitParams().geometry, ExplicitParams().mesh
+GEOMETRY = ExplicitParams().geometry
 
 
 ROUGH = {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]}
@@ -143,13 +143,18 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
     np.testing.assert_allclose(spread(radius + 0.5, 0.01), GEOMETRY.max_halfwidth)
 
 
-def test_where_a_mesh_rules_the_blur_of_the_volume_widens_nothing() -> None:
-    radius, ones = np.full((60, 60), 0.3), np.ones((60, 60), np.float32)
-    blurred = Profile(radius, radius + 0.05, radius - 0.05, ones, np.ones((60, 60, 3), np.float32))
-    kept = np.where(np.arange(60) < 30, 1.0, 0.0)[None] * np.ones((60, 1))
-    widths = fit.spread(blurred, radius, kept, np.full((60, 60), 0.004), GEOMETRY, voxel=0.01)
-    np.testing.assert_allclose(widths[:, :20], 0.004, atol=1e-6)
-    np.testing.assert_allclose(widths[:, 40:], GEOMETRY.max_halfwidth, atol=1e-6)
+def test_where_a_mesh_rules_layers_are_as_close_as_it_says() -> None:
+    """The left half is the mesh's; the volume is blurred all over."""
+    radius, left = np.full((40, 60), 0.3), np.broadcast_to(np.arange(60) < 30, (40, 60))
+    seen = Profile(
+        radius, radius + 0.02, radius - 0.02, np.ones((40, 60), np.float32), np.ones((40, 60, 3), np.float32)
+    )
+    sure = np.full((40, 60), 0.007)
+    found = fit.spread(seen, radius, left.astype(float), sure, GEOMETRY, voxel=0.01)
+    np.testing.assert_allclose(found[:, :20], 0.007)
+    np.testing.assert_allclose(found[:, 40:], 0.006 + 0.5 * (0.04 - 3 * 0.01))
+    wider = fit.spread(seen, radius, left.astype(float), sure + 1, GEOMETRY, voxel=0.01)
+    np.testing.assert_allclose(wider, found[0, -1])  # never wider than without a mesh
 
 
 def test_plan_spends_all_iterations() -> None:

@@ -1,18 +1,21 @@
-"""What a tracked mesh says of the surfaces."""
+"""What a tracked mesh says: radii and motion along a chart's rays, where it rules, how close layers lie to it."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
 import trimesh
 
-from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import directions_to_uv
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit import tracked
+from facefolds_core.training.explicit.tracked import blend, mesh_halfwidth, mesh_radii
 
 PARAMS = ExplicitParams()
 MESH = PARAMS.mesh
+AXIS = -0.2
 
 
 def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
@@ -20,12 +23,12 @@ def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     mesh[:, 30:] = np.nan
     volume[:, :10] = 0.3 + 2 * MESH.reach
     volume[20, 20] = np.nan
-    radii, kept = tracked.blend(mesh, volume, MESH.reach)
+    radii, kept = blend(mesh, volume, MESH.reach)
     np.testing.assert_allclose(radii[:, :10], volume[:, :10])
     np.testing.assert_allclose(radii[:, 30:], 0.31)
     assert radii[20, 20] == 0.3
     deep = np.where(np.arange(41) == 20, 0.3 - 2 * MESH.reach, volume)
-    np.testing.assert_array_equal(tracked.blend(mesh, deep, MESH.reach)[0][5, 20], 0.3)  # a hole of the volume
+    np.testing.assert_array_equal(blend(mesh, deep, MESH.reach)[0][5, 20], 0.3)  # a hole of the volume
     assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
 
 
@@ -35,24 +38,38 @@ def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
     faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
     directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    radii, _ = tracked.mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
+    radii, motion = mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
     assert np.isnan(radii[:2]).all()
     assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
+    assert motion[2:] == pytest.approx([0, 0], abs=1e-7)
 
 
-def test_a_mesh_that_breathes_has_the_deviation_of_its_radius() -> None:
+def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
+    """A square pipe about the axis."""
+    angles = np.radians([45, 135, 225, 315])
+    ring = np.stack([AXIS + 0.1 * np.cos(angles), 0.1 * np.sin(angles)], -1)
+    vertices = np.concatenate([np.insert(ring, 2, z, 1) for z in (-0.4, 0.0)])
+    sides = np.arange(4)
+    after = (sides + 1) % 4
+    faces = np.concatenate([np.stack([sides, after, 4 + sides], 1), np.stack([after, 4 + after, 4 + sides], 1)])
+    chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
+    uv = np.array([[-0.5, 0.0], [-0.5, 0.5], [-0.9, -1.0], [-1.3, 0.0], [0.5, 0.0]])
+    radii, _ = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
+    inner = 0.1 / math.sqrt(2)
+    assert radii[:3] == pytest.approx([inner, 0.1, inner], abs=1e-6)
+    assert np.isnan(radii[3:]).all()
+
+
+def test_motion_is_the_standard_deviation_over_the_frames() -> None:
     ball = trimesh.creation.icosphere(4, 1.0)
-    frames = np.stack([radius * np.asarray(ball.vertices) for radius in (0.20, 0.22)])
-    uv = np.array([[0.1, 0.2], [-0.3, 0.4]])
-    mean, deviation = tracked.mesh_radii(frames, ball.faces, Chart((0, 0, 0)), uv)
-    assert mean == pytest.approx([0.21, 0.21], abs=0.001)
-    assert deviation == pytest.approx([0.01, 0.01], abs=1e-4)
+    sizes = np.array([0.28, 0.30, 0.30, 0.32])
+    uv = np.random.default_rng(0).uniform(-0.8, 0.8, (50, 2))
+    radii, motion = mesh_radii(sizes[:, None, None] * ball.vertices, ball.faces, Chart((0, 0, 0)), uv)
+    assert radii == pytest.approx(np.full(50, 0.3), abs=1e-3)
+    assert motion == pytest.approx(np.full(50, sizes.std()), abs=1e-4)
 
 
-def test_layers_on_a_mesh_reach_as_far_as_it_moves_and_hair_stands_out() -> None:
-    still, nan = np.zeros(4), np.nan
-    outside = np.array([0.0, 0.03, -0.05, nan])  # of the volume; deeper is a hole of it
-    widths = tracked.mesh_halfwidth(outside, still, PARAMS, voxel=0.01)
-    assert widths == pytest.approx(MESH.halfwidth + np.array([0, 0.02, 0, 0]))
-    moving = tracked.mesh_halfwidth(np.zeros(1), np.array([0.005]), PARAMS, voxel=0.01)
-    assert moving == pytest.approx([MESH.halfwidth + 0.01])
+def test_layers_lie_as_close_as_the_mesh_moves_and_hair_stands_out() -> None:
+    outside, motion = np.array([0.0, 0.0, 0.03, -0.03, np.nan]), np.array([0.0, 0.002, 0.0, 0.0, np.nan])
+    found = mesh_halfwidth(outside, motion, PARAMS, 0.008)
+    assert found - MESH.halfwidth == pytest.approx([0, 0.004, 0.022, 0, 0])
