@@ -80,10 +80,6 @@ class MeshParams(Section):
     nodes: Annotated[int, Field(ge=8, le=4096)] = 128
     """Rows and columns of (u, v), of all that the chart may hold, at which the mesh is compared with the volume."""
 
-    halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
-    """Where it rules, the layers lie within this distance of it, units, and within what it moves (twice the standard
-    deviation of its radius over the frames) and hair stands out from it."""
-
     trust: Annotated[float, Field(ge=0, le=10)] = 0.004
     """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as much,
     units."""

@@ -133,28 +133,9 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
     seen = Profile(
         radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
     )
-    none = np.zeros((30, 30))
-
-    def spread(middle: np.ndarray, voxel: float) -> np.ndarray:
-        return fit.spread(seen, middle, none, none, GEOMETRY, voxel)
-
-    np.testing.assert_allclose(spread(radius, 0.01), 0.006)
-    np.testing.assert_allclose(spread(radius, 0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
-    np.testing.assert_allclose(spread(radius + 0.5, 0.01), GEOMETRY.max_halfwidth)
-
-
-def test_where_a_mesh_rules_layers_are_as_close_as_it_says() -> None:
-    """The left half is the mesh's; the volume is blurred all over."""
-    radius, left = np.full((40, 60), 0.3), np.broadcast_to(np.arange(60) < 30, (40, 60))
-    seen = Profile(
-        radius, radius + 0.02, radius - 0.02, np.ones((40, 60), np.float32), np.ones((40, 60, 3), np.float32)
-    )
-    sure = np.full((40, 60), 0.007)
-    found = fit.spread(seen, radius, left.astype(float), sure, GEOMETRY, voxel=0.01)
-    np.testing.assert_allclose(found[:, :20], 0.007)
-    np.testing.assert_allclose(found[:, 40:], 0.006 + 0.5 * (0.04 - 3 * 0.01))
-    wider = fit.spread(seen, radius, left.astype(float), sure + 1, GEOMETRY, voxel=0.01)
-    np.testing.assert_allclose(wider, found[0, -1])  # never wider than without a mesh
+    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.01), 0.006)
+    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, GEOMETRY, voxel=0.01), GEOMETRY.max_halfwidth)
 
 
 def test_plan_spends_all_iterations() -> None:

@@ -1,4 +1,4 @@
-"""What a tracked mesh says: radii and motion along a chart's rays, where it rules, how close layers lie to it."""
+"""What a tracked mesh says: radii along a chart's rays, and where it rules."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import trimesh
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import directions_to_uv
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.tracked import blend, mesh_halfwidth, mesh_radii
+from facefolds_core.training.explicit.tracked import blend, mesh_radii
 
 PARAMS = ExplicitParams()
 MESH = PARAMS.mesh
@@ -38,10 +38,9 @@ def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
     faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
     directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    radii, motion = mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
+    radii = mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
     assert np.isnan(radii[:2]).all()
     assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
-    assert motion[2:] == pytest.approx([0, 0], abs=1e-7)
 
 
 def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
@@ -54,22 +53,15 @@ def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
     faces = np.concatenate([np.stack([sides, after, 4 + sides], 1), np.stack([after, 4 + after, 4 + sides], 1)])
     chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
     uv = np.array([[-0.5, 0.0], [-0.5, 0.5], [-0.9, -1.0], [-1.3, 0.0], [0.5, 0.0]])
-    radii, _ = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
+    radii = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
     inner = 0.1 / math.sqrt(2)
     assert radii[:3] == pytest.approx([inner, 0.1, inner], abs=1e-6)
     assert np.isnan(radii[3:]).all()
 
 
-def test_motion_is_the_standard_deviation_over_the_frames() -> None:
+def test_the_radius_is_the_mean_over_the_frames() -> None:
     ball = trimesh.creation.icosphere(4, 1.0)
-    sizes = np.array([0.28, 0.30, 0.30, 0.32])
+    sizes = np.array([0.28, 0.30, 0.30, 0.36])
     uv = np.random.default_rng(0).uniform(-0.8, 0.8, (50, 2))
-    radii, motion = mesh_radii(sizes[:, None, None] * ball.vertices, ball.faces, Chart((0, 0, 0)), uv)
-    assert radii == pytest.approx(np.full(50, 0.3), abs=1e-3)
-    assert motion == pytest.approx(np.full(50, sizes.std()), abs=1e-4)
-
-
-def test_layers_lie_as_close_as_the_mesh_moves_and_hair_stands_out() -> None:
-    outside, motion = np.array([0.0, 0.0, 0.03, -0.03, np.nan]), np.array([0.0, 0.002, 0.0, 0.0, np.nan])
-    found = mesh_halfwidth(outside, motion, PARAMS, 0.008)
-    assert found - MESH.halfwidth == pytest.approx([0, 0.004, 0.022, 0, 0])
+    radii = mesh_radii(sizes[:, None, None] * ball.vertices, ball.faces, Chart((0, 0, 0)), uv)
+    assert radii == pytest.approx(np.full(50, sizes.mean()), abs=1e-3)

@@ -15,7 +15,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
-from facefolds_core.training.explicit.tracked import blend, mesh_halfwidth, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import blend, mesh_radii, trusted_surface
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import (
     Profile,
@@ -80,19 +80,18 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
-        known, kept, sure = seen.radius, np.zeros((rows, columns)), np.zeros((rows, columns))
+        known, kept = seen.radius, np.zeros((rows, columns))
         source = fact("middle_from_volume")
     else:
-        mesh, motion = mesh_radii(vertices, surface[1], chart, uv)
+        mesh = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_share(cameras, points).reshape(mesh.shape) < params.volume.min_view_share
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, params.mesh.reach)
-        sure = mesh_halfwidth(seen.radius - mesh, motion, params, volume.voxel)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
         source = fact("middle_from_mesh", reach=params.mesh.reach)
     middle = extrapolate(known).clip(geometry.min_radius)
-    widths = spread(seen, middle, kept, sure, geometry, volume.voxel)
+    widths = spread(seen, middle, geometry, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
@@ -144,22 +143,16 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def spread(seen: Profile, middle: Array, kept: Array, sure: Array, params: GeometryParams, voxel: float) -> Array:
+def spread(seen: Profile, middle: Array, params: GeometryParams, voxel: float) -> Array:
     """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
-    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed.
-
-    Args:
-        kept: share of the tracked mesh, 0 to 1.
-        sure: in that share at most this (`mesh_halfwidth`).
-    """
+    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
     thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
     halfwidth = params.halfwidth
-    wide = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
+    wide: Array = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
         halfwidth, max(halfwidth, params.max_halfwidth)
     )
-    found: Array = ndimage.gaussian_filter(kept * np.minimum(sure, wide) + (1 - kept) * wide, 2.0, mode="nearest")
-    return found if kept.any() else wide
+    return wide
 
 
 def least_middle(halfwidth: Array, params: GeometryParams) -> Array:

@@ -1,4 +1,4 @@
-"""What a tracked mesh says of the surfaces: whether it is to be believed, where it lies, how far it moves."""
+"""What a tracked mesh says of the surfaces: whether it is to be believed, and where it lies."""
 
 from __future__ import annotations
 
@@ -38,17 +38,16 @@ def share_off(
     over `max_distance` apart; 0 where there are none."""
     uv = window_uv(whole_window(chart, start), params.nodes, params.nodes)
     least = start.subject_opacity
-    seen, (mesh, _) = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
+    seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
     apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
     return float((apart > params.max_distance).mean()) if len(apart) else 0.0
 
 
-def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> tuple[Array, Array]:
-    """Radius (...) of the mesh's outermost point along the chart's rays of (u, v) (..., 2): mean and standard deviation
-    over the frames of vertices (K, V, 3), units; NaN where no frame's mesh has a point on that ray.
-    """
+def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> Array:
+    """Radius (...) of the mesh's outermost point along the chart's rays of (u, v) (..., 2), mean over the frames of
+    vertices (K, V, 3), units; NaN where no frame's mesh has a point on that ray."""
     origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
-    total, squares, count = (np.zeros(len(flat)) for _ in range(3))
+    total, count = np.zeros(len(flat)), np.zeros(len(flat))
     for frame in vertices[:: max(1, len(vertices) // 12)]:
         mesh = trimesh.Trimesh(frame, faces, process=False)
         start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
@@ -57,11 +56,8 @@ def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Arra
         # A ray that meets nothing on this side runs on through its origin and may meet the back of a head.
         near = radius > 0
         total[ray[near]] += radius[near]
-        squares[ray[near]] += radius[near] ** 2
         count[ray[near]] += 1
-    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    deviation = np.sqrt(np.maximum(squares / np.maximum(count, 1) - mean**2, 0))
-    return mean.reshape(uv.shape[:-1]), deviation.reshape(uv.shape[:-1])
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
 def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
@@ -82,14 +78,3 @@ def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
     return np.where(
         kept > 0, kept * np.where(close, mesh, 0) + (1 - kept) * np.where(kept < 1, filled, 0), filled
     ), kept
-
-
-def mesh_halfwidth(outside: Array, motion: Array, params: ExplicitParams, voxel: float) -> Array:
-    """Halfwidths where the tracked mesh rules: `mesh.halfwidth`, plus what it moves from its mean (twice its standard
-    deviation, `motion`), plus by how much more than a voxel the volume lies `outside` it (hair), units.
-
-    The volume's blur says nothing of a surface that is known: at a steep place its opacity is spread along a ray, and
-    layers spread as far show a camera what no other sees.
-    """
-    hair = np.clip(outside - voxel, 0, None)
-    return np.asarray(params.mesh.halfwidth + 2 * np.nan_to_num(motion) + np.nan_to_num(hair))
