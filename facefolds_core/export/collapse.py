@@ -79,7 +79,7 @@ def _meshes(
 
 
 def contribution(opacity: NDArray[np.uint8], least: float) -> Array:
-    """(N, n, n) compositing weights of the layers seen from outside towards c, at least `least` times the opacity."""
+    """(N, n, n) compositing weights of the layers seen along the rays, at least `least` times the opacity."""
     alpha = opacity / 255.0
     return np.asarray(alpha * np.maximum(transmittance_before(alpha, 0), least))
 

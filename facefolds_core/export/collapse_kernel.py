@@ -92,7 +92,7 @@ def _cost(a, b, x):  # type: ignore[no-untyped-def]
 
 @inlined
 def _upright(st, directions, i, j, k, least):  # type: ignore[no-untyped-def]
-    """Triangle (i, j, k) keeps its side both in the plane of (s, t) and seen from c."""
+    """Triangle (i, j, k) keeps its side in the plane of (s, t) and of `Chart.unrolled`."""
     area = (st[j, 0] - st[i, 0]) * (st[k, 1] - st[i, 1]) - (st[j, 1] - st[i, 1]) * (st[k, 0] - st[i, 0])
     if -area <= least:  # t points down
         return False

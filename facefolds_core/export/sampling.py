@@ -77,7 +77,7 @@ def _check_points(points: NDArray[np.float32], valid: NDArray[np.bool_]) -> None
             raise UserError(
                 "a layer has no surface in any sampled direction",
                 place=f"layer {layer} (0 is the outermost)",
-                expected="a surface in front of the sphere centre",
+                expected="a surface within the model's window",
                 found="no crossing",
                 remedy="train longer, with fewer layers (train.layers) or a smaller distance between them "
                 "(train.geometry.halfwidth; train.level_halfwidth of the perceptrons)",

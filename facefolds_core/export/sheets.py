@@ -1,4 +1,4 @@
-"""Nested sheets: all layers as radii on one grid of directions from c, and as meshes that share one triangulation.
+"""Nested sheets: all layers as radii on one grid of a chart's (u, v), and as meshes that share one triangulation.
 
 Over each (u, v) of a chart a layer has one radius. So a mesh of a layer is a triangulation of the window with a radius
 at each vertex, and one triangulation serves all layers.

@@ -157,13 +157,15 @@ def _chart_arrays(chart: Chart) -> dict[str, NDArray[Any]]:
 
 
 def _take_chart(arrays: dict[str, NDArray[Any]], path: Path) -> Chart:
+    """Of files from before there were belts, too."""
     x, y, z = (float(value) for value in _take(arrays, path, "centre", (3,), np.float64))
     if "belt" not in arrays:
         return Chart((x, y, z))
     elevation, girth = (float(value) for value in _take(arrays, path, "belt", (2,), np.float64))
-    if not (0 <= elevation < np.pi / 2 and girth > 0):
-        raise _damaged(path, "belt", "an elevation from 0 to below pi / 2, and a girth above 0", (elevation, girth))
-    return Chart((x, y, z), Belt(elevation, girth))
+    belt = Belt(elevation, girth)
+    if not belt.sound:
+        raise _damaged(path, "belt", f"one {Belt.BOUNDS}", [elevation, girth])
+    return Chart((x, y, z), belt)
 
 
 def _check_windows(windows: NDArray[np.float64], path: Path) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,13 @@ class Belt:
 
     elevation: float
     girth: float
+
+    BOUNDS: ClassVar[str] = "with an elevation from 0 to 1.5 and a girth from 0.001 to 10"
+
+    @property
+    def sound(self) -> bool:
+        """Whether both lie within `BOUNDS`: what a file says may be anything."""
+        return 0 <= self.elevation <= 1.5 and 1e-3 <= self.girth <= 10
 
     @property
     def degrees(self) -> float:

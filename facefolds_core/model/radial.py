@@ -90,15 +90,15 @@ class RadialManifolds(nn.Module):
         """`compiled_distances` with the surfaces as they are now, prepared for many calls; on a GPU if asked for."""
         rho = self.radii().detach().cpu().numpy()
         window, belt = np.array(self.window), self.chart.numbers
-        top = ceiling(rho, window, belt)
+        top, bound = ceiling(rho, window, belt), self.radius
         if gpu:
             from facefolds_core.model.radial_gpu import Tracer
 
-            return Tracer(rho, window, belt, top, self.radius, STEP)
+            return Tracer(rho, window, belt, top, bound, STEP)
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)
-            found: np.ndarray = crossing_distances(offsets, directions, rho, window, belt, top, self.radius, STEP)
+            found: np.ndarray = crossing_distances(offsets, directions, rho, window, belt, top, bound, STEP)
             return found
 
         return distances

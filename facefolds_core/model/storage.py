@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
@@ -78,6 +78,13 @@ class ModelSpec(BaseModel):
         return value
 
 
+def _sound_belt(belt: Belt | None) -> Belt | None:
+    """Refuses one from a file that no search could end with."""
+    if belt is not None and not belt.sound:
+        raise ValueError(f"a belt {Belt.BOUNDS}")
+    return belt
+
+
 class ExplicitSpec(BaseModel):
     """The same for the explicit model (`radial`, `grids`).
 
@@ -99,7 +106,7 @@ class ExplicitSpec(BaseModel):
     version: Literal[1] = 1
     kind: Literal["explicit"] = "explicit"
     centre: tuple[float, float, float]
-    belt: Annotated[Belt | None, Field(exclude_if=lambda belt: belt is None)] = None
+    belt: Annotated[Belt | None, AfterValidator(_sound_belt), Field(exclude_if=lambda belt: belt is None)] = None
     window: tuple[float, float, float, float]
     nodes: tuple[Count, Count]
     texels: tuple[Count, Count]

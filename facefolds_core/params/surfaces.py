@@ -23,19 +23,19 @@ class StartParams(Section):
     instead: candidates, tried with each centre beside the plain sphere. They hold a collar under hair."""
 
     centre_tie: Share = 0.02
-    """Of the centres that lose a share of the visible surface within this of the least, the one farthest back wins:
+    """Of the charts that lose a share of the visible surface within this of the least, the one farthest back wins:
     directions fan out less."""
 
     centre_nodes: Annotated[int, Field(ge=8, le=4096)] = 96
     """Rows of the coarse radius map, over all (u, v) that a chart may hold, by which charts are compared."""
 
-    window_limit: Annotated[float, Field(gt=0, le=1)] = 0.9
+    window_limit: Annotated[float, Field(ge=0.1, le=1)] = 0.9
     """No window reaches beyond |u| of this: at the poles a radius map has no meaning."""
 
-    column_limit: Annotated[float, Field(gt=0, le=1.9)] = 1.5
+    column_limit: Annotated[float, Field(ge=0.1, le=1.9)] = 1.5
     """With a belt no window reaches below u of minus this."""
 
-    azimuth_limit: Annotated[float, Field(gt=0, le=1.9)] = 1.5
+    azimuth_limit: Annotated[float, Field(ge=0.1, le=1.9)] = 1.5
     """No window reaches beyond |v| of this; 1 is straight sideways from c."""
 
     window_margin: Share = 0.04

@@ -143,10 +143,11 @@ def spacings(radius: Array) -> list[Spacing]:
 
 
 def shape_of(asset: Asset) -> Shape:
-    """By rays from the sphere centre: a grid over the layers' common window, and two arcs through its middle."""
+    """By rays from the sphere centre: a grid over the layers' common window, and two arcs through its middle; what a
+    chart's belt has below the lower pole is left out."""
     centre = np.array(asset.manifest.coordinates.sphere_centre)
     windows = np.array([layer.uv_window for layer in asset.manifest.full.layers])
-    window = windows[:, 0].min(), windows[:, 1].max(), windows[:, 2].min(), windows[:, 3].max()
+    window = max(windows[:, 0].min(), -1.0), min(windows[:, 1].max(), 1.0), windows[:, 2].min(), windows[:, 3].max()
     steps = (np.arange(SPACING_GRID) + 0.5) / SPACING_GRID
     grid = uv_to_directions(st_to_uv(np.stack(np.meshgrid(steps, steps), -1), window))
     line, zero = np.linspace(0, 1, SECTION_RAYS), np.zeros(SECTION_RAYS)

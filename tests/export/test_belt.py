@@ -211,7 +211,7 @@ def test_grids_and_sheets_keep_the_chart(tmp_path: Path, grids: Grids, sheets: S
         assert np.array_equal(getattr(back, field.name), getattr(sheets, field.name))
 
 
-@pytest.mark.parametrize("belt", [(-0.1, 0.3), (np.pi / 2, 0.3), (0.2, 0.0), (0.2, -1.0), (0.2, np.nan)])
+@pytest.mark.parametrize("belt", [(-0.1, 0.3), (np.pi / 2, 0.3), (0.2, 0.0), (0.2, -1.0), (0.2, np.nan), (0.2, 1e300)])
 def test_a_damaged_belt_is_refused(tmp_path: Path, grids: Grids, sheets: Sheets, belt: tuple[float, float]) -> None:
     chart = replace(CHART, belt=Belt(*belt))
     write_grids(tmp_path / "grids.npz", replace(grids, chart=chart))

@@ -167,7 +167,16 @@ def test_a_model_keeps_its_chart(tmp_path: Path, belt: Belt | None) -> None:
     assert load_model(tmp_path).chart == Chart(C, belt)
 
 
-@pytest.mark.parametrize("belt", [{"elevation": 0.2}, {"elevation": None, "girth": 0.3}, [0.2, 0.3], 0.2])
+@pytest.mark.parametrize(
+    "belt",
+    [
+        {"elevation": 0.2},
+        {"elevation": None, "girth": 0.3},
+        [0.2, 0.3],
+        0.2,
+        *({"elevation": e, "girth": girth} for e, girth in ((0.2, 0.0), (1e9, 0.3), (0.2, 1e300), (-0.1, 0.3))),
+    ],
+)
 def test_a_damaged_belt_is_named(tmp_path: Path, belt: object) -> None:
     save_model(build_model(SPEC), SPEC, tmp_path)
     description = {**json.loads((tmp_path / "model.json").read_text()), "belt": belt}

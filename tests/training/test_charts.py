@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 
+from facefolds_core.errors import UserError
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import fit_window
@@ -132,3 +134,19 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
     u0, u1, v0, v1 = fit_window(bust, chart, ears, None, START)
     assert -START.azimuth_limit <= v0 < -1.2 and 1.2 < v1 <= START.azimuth_limit
     assert -0.3 < u0 < u1 < 0.3
+
+
+def test_a_subject_beyond_every_window_is_said(bust: Volume) -> None:
+    behind = np.array([[AXIS - 0.3, 0.001, 0.0], [AXIS - 0.3, -0.001, 0.0]])
+    with pytest.raises(UserError, match="no place|has a place"):
+        fit_window(bust, Chart((AXIS, 0.0, 0.0)), behind, None, START)
+
+
+def test_the_back_of_a_tracked_head_widens_no_window(bust: Volume) -> None:
+    chart = Chart((AXIS, 0.0, 0.0))
+    face = chart.points(np.random.default_rng(0).uniform(-0.4, 0.4, (400, 2)), np.full(400, HEAD))
+    ball = trimesh.creation.icosphere(3, HEAD)
+    vertices = np.asarray(ball.vertices)[None] + np.array(chart.centre)
+    alone, tracked = (fit_window(bust, chart, face, mesh, START) for mesh in (None, vertices))
+    assert alone[3] < 0.6
+    assert -1.1 < tracked[2] < -0.9 and 0.9 < tracked[3] < 1.1  # straight sideways, and the margin

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
@@ -125,7 +126,11 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact) -> tuple[Fact, .
 
 def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | None, params: StartParams) -> Window:
     """Box around the directions that hold the subject: the volume's near `points` that cameras see, (P, 3), and those
-    of mesh vertices (K, V, 3)."""
+    of mesh vertices (K, V, 3) in front of the axis: nobody needs to see the back of a whole head.
+
+    Raises:
+        UserError: if there is nothing.
+    """
     limits = whole_window(chart, params)
     uv, least = window_uv(limits, 192, 192), params.subject_opacity
     highest, lowest = np.array([limits[1], limits[3]]), np.array([limits[0], limits[2]])
@@ -137,8 +142,16 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     held = [uv[near & (profile(volume, chart, uv, least).opacity >= least)]]
     if vertices is not None:
         places, _ = chart.uv(vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3))
-        held.append(places[((places >= lowest) & (places <= highest)).all(1)])
+        held.append(places[((places >= lowest) & (places <= highest)).all(1) & (np.abs(places[:, 1]) <= 1)])
     places, margin = np.concatenate(held), params.window_margin
+    if not len(places):
+        raise UserError(
+            "nothing of what the cameras see has a place on the layers",
+            place="the starting volume",
+            expected=f"a subject around the origin, seen within {90 * params.azimuth_limit:.0f} degrees of its front",
+            found="one that lies elsewhere",
+            remedy="check `front` and `centre` of the subject (`facefolds doctor`), or add to train.start.centres",
+        )
     low, high = np.maximum(places.min(0) - margin, lowest), np.minimum(places.max(0) + margin, highest)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
@@ -190,7 +203,7 @@ def texel_count(scene: Scene, window: Window, radius: float, pixels_per_texel: f
 
 
 def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
-    """How far the layers should move to lie around the opacity found, along the directions from outside to c.
+    """How far the layers should move to lie around the opacity found, along the rays, from outside inwards.
 
     With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - middle) / sum_i w_i. It is
     smoothed with sum_i w_i as the weight, so that transparent directions follow their neighbours and detail of the

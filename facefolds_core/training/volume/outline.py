@@ -1,4 +1,4 @@
-"""What a volume says about star-shaped layers: where they lie in each direction from a centre, how opaque they are."""
+"""What a volume says about layers over a chart: where they lie on each of its rays, how opaque they are."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Profile:
-    """The volume along directions from a centre.
+    """The volume along the rays of a chart.
 
     Attributes:
         radius: (...) where half of the opacity is reached from outside; NaN where there is too little of it, units.
@@ -111,7 +111,7 @@ def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams)
     """
     uv, radius = chart.uv(points)
     u0, u1, v0, v1 = window = whole_window(chart, params)
-    rows, columns = params.centre_nodes, round(params.centre_nodes * (v1 - v0) / (u1 - u0))
+    rows, columns = params.centre_nodes, max(2, round(params.centre_nodes * (v1 - v0) / (u1 - u0)))
     radii = profile(volume, chart, window_uv(window, rows, columns), params.subject_opacity).radius
     high = ndimage.maximum_filter(np.where(np.isnan(radii), -np.inf, radii), 3)
     low = ndimage.minimum_filter(np.where(np.isnan(radii), np.inf, radii), 3)
