@@ -138,7 +138,7 @@ def test_windows_reach_behind_the_ears_and_below_the_pole_where_something_is_see
 
 def test_a_subject_beyond_every_window_is_said(bust: Volume) -> None:
     behind = np.array([[AXIS - 0.3, 0.001, 0.0], [AXIS - 0.3, -0.001, 0.0]])
-    with pytest.raises(UserError, match="no place|has a place"):
+    with pytest.raises(UserError, match="has a place"):
         fit_window(bust, Chart((AXIS, 0.0, 0.0)), behind, None, START)
 
 
