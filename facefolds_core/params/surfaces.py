@@ -44,6 +44,16 @@ class StartParams(Section):
     subject_opacity: Share = 0.5
     """Of the volume, from which on a direction is taken to hold the subject."""
 
+    surface_share: Annotated[float, Field(gt=0, lt=1)] = 0.5
+    """Where so much of a direction's opacity in the volume is reached from outside, there is the surface."""
+
+    fog_depth: Length = 0.13
+    """Median depth over which the subject is spread in the volume, units, from which on it is fog: smooth pale plaster
+    is explained as well by fog as by a surface. `studio` has 0.04, `fox` 0.10, `buddha` 0.15."""
+
+    fog_share: Annotated[float, Field(gt=0, lt=1)] = 0.1
+    """Instead of `surface_share` in fog, whose middle lies deep within the subject."""
+
     beside_opacity: Share = 0.1
     """Directions in which the volume is less opaque lie beside the subject: what was painted there is room, and is made
     transparent at the end."""

@@ -127,11 +127,6 @@ class RoomParams(Section):
     fog: Factor = 1.0
     """Optical depth at the start, from the ball to infinity: half of the volume's, behind which it lies."""
 
-    max_thickness: Length = 0.13
-    """Median depth over which the subject's surface is spread in the volume, units, above which the outer zone is given
-    up again: the volume explains the images, but by fog, which layers cannot show. `studio` 0.04, `fox` 0.10; of the
-    smooth pale plaster of `buddha` 0.15, and 0.12 without an outer zone."""
-
     step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
     """Between samples on a ray, voxels: no voxel is stepped over."""
 

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.fit import surface_share
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
-from facefolds_core.training.volume.outline import thickness
+from facefolds_core.training.volume.outline import profile, thickness
 from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.search import cut_share, in_ball
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
@@ -92,6 +94,18 @@ def test_a_solid_head_is_thin_and_a_foggy_one_thick() -> None:
     # Of 1 - exp(-s / 0.15) a tenth is reached 0.015 deep, nine tenths 0.3 deep; most ways through the ball are shorter.
     assert 0.15 < thickness(fog, 0.5) < 0.25
     assert thickness(_volume(), 0.5) == 0
+
+
+def test_the_surface_of_fog_lies_near_its_outside() -> None:
+    head = _ball(0.2, 0.0, 0.0, 0.0)
+    share, said = surface_share(_volume((head, 8.0)), PARAMS.start)
+    assert share == PARAMS.start.surface_share and not said
+    share, said = surface_share(_volume((head, float(np.log(np.expm1(0.1))))), PARAMS.start)
+    assert share == PARAMS.start.fog_share and said[0].kind == "fog"
+    fog = _volume((head, float(np.log(np.expm1(0.1)))))
+    ahead = np.zeros((1, 2))  # from the ball's centre
+    outside, middle = (profile(fog, Chart((0.0, 0.0, 0.0)), ahead, 0.3, s).radius[0] for s in (share, 0.5))
+    assert middle < outside - 0.03 and outside > 0.2 - 2 * VOXEL
 
 
 def test_nothing_solid_is_no_body() -> None:

@@ -13,7 +13,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.volume.fit import Volume, VolumeFit
-from facefolds_core.training.volume.outline import thickness, visible_points
+from facefolds_core.training.volume.outline import visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
 from facefolds_core.training.volume.walls import Wall, find_walls
 
@@ -34,12 +34,7 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     cut_out = all(view.photo.matte is not None for view in plain.views)
     if plain.psnr < params.room.needed_below and not cut_out:
         notes.append(fact("room_fitted", psnr=plain.psnr, under=params.room.needed_below))
-        found = _with_room(scene, params, bar, notes)
-        depth = thickness(found, params.start.subject_opacity)
-        if depth <= params.room.max_thickness:
-            return found, tuple(notes)
-        notes = [fact("room_given_up", depth=depth, over=params.room.max_thickness)]
-        bar.total += sum(level.iterations for level in params.volume.levels[1:])
+        return _with_room(scene, params, bar, notes), tuple(notes)
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
