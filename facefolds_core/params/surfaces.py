@@ -51,7 +51,7 @@ class StartParams(Section):
     """Median depth over which the subject is spread in the volume, units, from which on it is fog: smooth pale plaster
     is explained as well by fog as by a surface. `studio` has 0.04, `fox` 0.10, `buddha` 0.15."""
 
-    fog_share: Annotated[float, Field(gt=0, lt=1)] = 0.3
+    fog_share: Annotated[float, Field(gt=0, lt=1)] = 0.2
     """Instead of `surface_share` in fog, whose middle lies deep within the subject."""
 
     beside_opacity: Share = 0.1
