@@ -79,8 +79,8 @@ WORDS = {
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
-    "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): layers start where {share:.0%} "
-    "of its opacity is reached from outside (train.start.fog_depth, fog_share)",
+    "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
+    "{gain:g} times as dense (train.start.fog_gain)",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",

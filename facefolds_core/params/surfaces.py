@@ -44,15 +44,13 @@ class StartParams(Section):
     subject_opacity: Share = 0.5
     """Of the volume, from which on a direction is taken to hold the subject."""
 
-    surface_share: Annotated[float, Field(gt=0, lt=1)] = 0.5
-    """Where so much of a direction's opacity in the volume is reached from outside, there is the surface."""
-
     fog_depth: Length = 0.13
     """Median depth over which the subject is spread in the volume, units, from which on it is fog: smooth pale plaster
     is explained as well by fog as by a surface. `studio` has 0.04, `fox` 0.10, `buddha` 0.15."""
 
-    fog_share: Annotated[float, Field(gt=0, lt=1)] = 0.2
-    """Instead of `surface_share` in fog, whose middle lies deep within the subject."""
+    fog_gain: Annotated[float, Field(ge=1, le=1000)] = 10.0
+    """Fog is taken to be so many times as dense: its middle lies deep within the subject, and where few cameras look it
+    is thin. 1 leaves it."""
 
     beside_opacity: Share = 0.1
     """Directions in which the volume is less opaque lie beside the subject: what was painted there is room, and is made

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from facefolds_core.facts import Fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.fit import surface_share
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.outline import profile, thickness
 from facefolds_core.training.volume.room import Room
-from facefolds_core.training.volume.search import cut_share, in_ball
+from facefolds_core.training.volume.search import _clear_of_fog, cut_share, in_ball
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
 from facefolds_core.training.volume.walls import Wall
 
@@ -96,16 +96,22 @@ def test_a_solid_head_is_thin_and_a_foggy_one_thick() -> None:
     assert thickness(_volume(), 0.5) == 0
 
 
-def test_the_surface_of_fog_lies_near_its_outside() -> None:
+def test_fog_is_taken_to_be_denser_and_a_solid_head_is_left() -> None:
     head = _ball(0.2, 0.0, 0.0, 0.0)
-    share, said = surface_share(_volume((head, 8.0)), PARAMS.start)
-    assert share == PARAMS.start.surface_share and not said
-    share, said = surface_share(_volume((head, float(np.log(np.expm1(0.1))))), PARAMS.start)
-    assert share == PARAMS.start.fog_share and said[0].kind == "fog"
-    fog = _volume((head, float(np.log(np.expm1(0.1)))))
+    solid, fog = _volume((head, 8.0)), _volume((head, float(np.log(np.expm1(0.1)))))
+    notes: list[Fact] = []
+    assert _clear_of_fog(solid, PARAMS.start, notes) is solid and not notes
+    dense = _clear_of_fog(fog, PARAMS.start, notes)
+    assert [note.kind for note in notes] == ["fog"]
     ahead = np.zeros((1, 2))  # from the ball's centre
-    outside, middle = (profile(fog, Chart((0.0, 0.0, 0.0)), ahead, 0.3, s).radius[0] for s in (share, 0.5))
-    assert middle < outside - 0.03 and outside > 0.2 - 2 * VOXEL
+    middle, surface = (profile(v, Chart((0.0, 0.0, 0.0)), ahead, 0.3).radius[0] for v in (fog, dense))
+    assert middle < surface - 0.03 and surface > 0.2 - 2 * VOXEL
+
+
+def test_a_denser_volume_has_so_many_times_the_optical_depth() -> None:
+    volume = _volume((_ball(0.2, 0.0, 0.0, 0.0), 1.5))
+    before, after = (np.logaddexp(0, v.grid[..., 0].astype(float)) for v in (volume, volume.denser(7.0)))
+    np.testing.assert_allclose(after, 7 * before, rtol=1e-5, atol=1e-9)
 
 
 def test_nothing_solid_is_no_body() -> None:

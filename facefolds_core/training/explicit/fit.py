@@ -22,7 +22,6 @@ from facefolds_core.training.volume.outline import (
     Profile,
     choose_chart,
     profile,
-    thickness,
     visible_points,
     whole_window,
     window_uv,
@@ -79,8 +78,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     window = fit_window(volume, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
     uv = window_uv(window, rows, columns)
-    share, fog = surface_share(volume, start)
-    seen = profile(volume, chart, uv, start.subject_opacity, share)
+    seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
         known, kept = seen.radius, np.zeros((rows, columns))
@@ -107,19 +105,11 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source), *fog, *notes),
-        notes=(*fog, *notes),
+        reasons=(*_reasons(params, losses[chart], source), *notes),
+        notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
-
-
-def surface_share(volume: Volume, params: StartParams) -> tuple[float, tuple[Fact, ...]]:
-    """The share of a direction's opacity at which its surface is taken to lie, and what is to be said of it."""
-    depth = thickness(volume, params.subject_opacity)
-    if depth <= params.fog_depth:
-        return params.surface_share, ()
-    return params.fog_share, (fact("fog", depth=depth, over=params.fog_depth, share=params.fog_share),)
 
 
 def _reasons(params: ExplicitParams, lost: float, middle: Fact) -> tuple[Fact, ...]:

@@ -53,6 +53,14 @@ class Volume:
     cameras: CameraFit
     removed: Array | None = None
 
+    def denser(self, gain: float) -> Volume:
+        """With the optical depths of the subject times `gain`."""
+        depth = gain * np.logaddexp(0, self.grid[..., 0].astype(np.float64))
+        grid = self.grid.copy()
+        # The inverse of softplus, which is the identity for all that is opaque.
+        grid[..., 0] = np.where(depth > 30, depth, np.log(np.expm1(np.clip(depth, 1e-12, 30))))
+        return replace(self, grid=grid)
+
     def behind(self, origins: Array, directions: Array) -> Array:
         """Rays (R, 3) -> colours (R, 3) of what stands behind the subject: what was removed, and the room."""
         colours = self.room.look_up(origins, directions)

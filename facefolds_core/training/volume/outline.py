@@ -26,7 +26,7 @@ class Profile:
     """The volume along the rays of a chart.
 
     Attributes:
-        radius: (...) where a share of the opacity (half) is reached from outside, units; NaN where there is too little.
+        radius: (...) where half of the opacity is reached from outside; NaN where there is too little of it, units.
         outer, inner: (...) where a tenth and nine tenths of it are reached, units.
         opacity: (...) along the whole direction, float32.
         rgb: (..., 3) colour, composited from outside and divided by the opacity, float32.
@@ -39,12 +39,11 @@ class Profile:
     rgb: NDArray[np.float32]
 
 
-def profile(volume: Volume, chart: Chart, uv: Array, least: float, share: float = 0.5) -> Profile:
+def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
     """Integrate the volume from outside inwards along the chart's rays of (u, v) (..., 2).
 
     Args:
         least: opacity of a direction from which on it has radii.
-        share: of the opacity, reached at `radius`.
     """
     size = np.array(volume.grid.shape[:3]) - 1
     ends = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -59,7 +58,7 @@ def profile(volume: Volume, chart: Chart, uv: Array, least: float, share: float 
         directions,
         farthest,
         0.5 * volume.voxel,
-        np.array([share, 0.1, 0.9]),
+        np.array([0.5, 0.1, 0.9]),
     )
     radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
     rgb /= np.maximum(opacity, look_kernel.CLEAR)[:, None]

@@ -11,9 +11,9 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import ExplicitParams, StartParams
 from facefolds_core.training.volume.fit import Volume, VolumeFit
-from facefolds_core.training.volume.outline import visible_points
+from facefolds_core.training.volume.outline import thickness, visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
 from facefolds_core.training.volume.walls import Wall, find_walls
 
@@ -34,10 +34,20 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     cut_out = all(view.photo.matte is not None for view in plain.views)
     if plain.psnr < params.room.needed_below and not cut_out:
         notes.append(fact("room_fitted", psnr=plain.psnr, under=params.room.needed_below))
-        return _with_room(scene, params, bar, notes), tuple(notes)
+        found = _clear_of_fog(_with_room(scene, params, bar, notes), params.start, notes)
+        return found, tuple(notes)
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
+
+
+def _clear_of_fog(volume: Volume, params: StartParams, notes: list[Fact]) -> Volume:
+    """The volume; a denser one where the subject is fog in it, which `notes` say."""
+    depth = thickness(volume, params.subject_opacity)
+    if depth <= params.fog_depth:
+        return volume
+    notes.append(fact("fog", depth=depth, over=params.fog_depth, gain=params.fog_gain))
+    return volume.denser(params.fog_gain)
 
 
 def in_ball(radius: float | None, params: ExplicitParams) -> ExplicitParams:
