@@ -58,8 +58,8 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
 def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
     """The parameters of the layers' training after what the volume's said.
 
-    Where the subject was fog, backgrounds stay what the room shows (`background.rate` 0): those that learn would take up
-    what is as pale as what stands behind it, and the layers would clear.
+    Where the subject was fog, backgrounds stay what the room shows (`background.rate` 0): those that learn would take
+    up what is as pale as what stands behind it, and the layers would clear.
     """
     if not any(note.kind == "fog" for note in notes):
         return params
