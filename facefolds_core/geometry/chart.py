@@ -85,13 +85,10 @@ class Chart:
 
     def origins(self, uv: Any) -> Any:
         """(u, v) (..., 2) -> where the rays begin (..., 3): c, or below it."""
-        lib = library_of(uv)
         zero = uv[..., 0] * 0
         x, y, z = self.centre
-        down = zero
-        if self.belt is not None:
-            down = lib.clip(-uv[..., 0] * _TO_ANGLE - self.belt.elevation, 0, None) * self.belt.girth
-        return lib.stack([zero + x, zero + y, z - down], -1)
+        down = zero if self.belt is None else self._fall(uv, self.belt) * self.belt.girth
+        return library_of(uv).stack([zero + x, zero + y, z - down], -1)
 
     def points(self, uv: Any, radius: Any) -> Any:
         """(u, v) (..., 2) and radius (...) -> points (..., 3). The inverse of `uv`."""
@@ -103,9 +100,8 @@ class Chart:
         directions = self.directions(uv)
         if self.belt is None:
             return directions
-        lib = library_of(uv)
-        falls = lib.clip(-uv[..., 0] * _TO_ANGLE - self.belt.elevation, 0, None)
-        return lib.stack([directions[..., 0], directions[..., 1], directions[..., 2] - falls], -1)
+        x, y, z = (directions[..., k] for k in range(3))
+        return library_of(uv).stack([x, y, z - self._fall(uv, self.belt)], -1)
 
     def below(self, uv: Any) -> Any:
         """(u, v) (..., 2) -> (...) bool: below the belt."""
@@ -127,6 +123,11 @@ class Chart:
             return np.array([math.pi / 2, math.inf, 1.0, 1.0])
         e = self.belt.elevation
         return np.array([e, math.tan(e), 1 / math.cos(e), 1 / self.belt.girth])
+
+    @staticmethod
+    def _fall(uv: Any, belt: Belt) -> Any:
+        """(u, v) (..., 2) -> (...) radians of u below the belt, 0 above it."""
+        return library_of(uv).clip(-uv[..., 0] * _TO_ANGLE - belt.elevation, 0, None)
 
     def _below(self, offset: Any) -> tuple[Any, Any, Any]:
         """Of p - c: distance from the axis, whether it is below the belt, and how far its ray's origin has slid."""
