@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from facefolds_core.captures.chosen_mattes import scored_scene
 import sys
 
 from facefolds_core.asset import Asset, read_asset
+from facefolds_core.captures.chosen_mattes import scored_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config import read_stage, read_subject, read_train
 from facefolds_core.facts import Fact
