@@ -40,7 +40,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.matte import CutOutParams, MatteParams, VoteParams
+from facefolds_core.params.matte import CutOutParams, MatteParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -99,6 +99,7 @@ __all__ = [
     "MovingParams",
     "NormalizeParams",
     "Overrides",
+    "PlateParams",
     "Preset",
     "PruningParams",
     "ReconstructParams",

@@ -70,6 +70,13 @@ class SegmentParams(Section):
     """Learning rate of a frame's parts against that of the training at once; it falls to `textures.final_rate` of
     itself."""
 
+    checkpoint_seconds: Annotated[float, Field(ge=0, le=1e6)] = 60.0
+    """Between checkpoints of a base while it is trained, of which a kill takes no more,"""
+
+    checkpoint_share: Annotated[Share, Field(gt=0)] = 0.05
+    """and more where writing one takes more than this share of the time. A checkpoint is as large as the textures and
+    their moments, in memory the greatest part."""
+
     processes: Natural = 0
     """That fit segments at once on this machine, its threads shared out among them. 0: as many as there are cores,
     segments, memory and work (`process_seconds`) for; 1: the training's own. The result does not depend on it."""

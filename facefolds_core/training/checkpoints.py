@@ -22,8 +22,15 @@ from facefolds_core.model.tensor_files import check_tensors, read_tensors, write
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"
-PROCESSES = {"processes", "process_seconds", "ray_nanoseconds", "free_share"}
-"""Keys of `segments` that say who fits them, and what is foretold."""
+PROCESSES = {
+    "processes",
+    "process_seconds",
+    "ray_nanoseconds",
+    "free_share",
+    "checkpoint_seconds",
+    "checkpoint_share",
+}
+"""Keys of `segments` that say who fits them, what is foretold, and how often what is done is kept."""
 
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
 

@@ -28,7 +28,10 @@ PARAMS: dict[str, Any] = {
         "iterations": 60,
         "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
         "textures": {"steps_per_frame": 8},
-        "segments": {"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60, "processes": 2},
+        "segments": {
+            **{"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60, "processes": 2},
+            **{"checkpoint_seconds": 0.2, "checkpoint_share": 0.5},
+        },
     },
     **{stage: {} for stage in ("sample", "reconstruct", "decimate", "texture", "bake", "compress", "evaluate")},
 }

@@ -1,5 +1,5 @@
 """Training of the explicit model: geometry in rounds at coarse textures, then textures coarse to fine on stored
-crossings. Under two minutes, so that an interrupted run simply starts again."""
+crossings. A short take simply starts again where it was interrupted; the base of a long one has checkpoints."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.cameras import choose_cameras
+from facefolds_core.training.explicit.checkpoints import Checkpoints
 from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
@@ -84,11 +85,16 @@ class Surroundings:
 
 
 def fit_with_surroundings(
-    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None
+    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None, kept: Path | None = None
 ) -> tuple[Trained, Surroundings]:
-    """`fit_explicit`, and what else was found out."""
+    """`fit_explicit`, and what else was found out.
+
+    Args:
+        kept: folder of this very training's checkpoint, which the caller deletes; None keeps none.
+    """
     check_images(scene)
     device = choose(params.device)
+    checkpoints = None if kept is None else Checkpoints(kept, params.segments)
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
@@ -106,13 +112,18 @@ def fit_with_surroundings(
         trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params, scene.num_frames)
         bar.total = bar.n + sum(level.iterations for level in levels)
-        for k, level in enumerate(levels):
-            trainer.run(level, k, live, bar)
+        begun = None
+        if checkpoints is not None:
+            begun = checkpoints.take_up(trainer, levels, live, bar)
+            checkpoints.follow(trainer)
+        for k in range(0 if begun is None else begun.level, len(levels)):
+            trainer.run(levels[k], k, live, bar, begun)
+            begun = None
         bar.close()
         patiently(live.make_summary)
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
-        time.perf_counter() - began,
+        time.perf_counter() - began + (0.0 if checkpoints is None else checkpoints.before),
         trainer.iteration,
         device.name,
         device.peak_memory(),

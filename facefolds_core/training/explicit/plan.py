@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,16 +36,17 @@ class Epochs:
     Args:
         frames: K.
         random: draws the orders.
+        left: of the order at hand, the next one last.
     """
 
-    def __init__(self, frames: int, random: np.random.Generator) -> None:
+    def __init__(self, frames: int, random: np.random.Generator, left: Sequence[int] = ()) -> None:
         self._frames, self._random = frames, random
-        self._left: list[int] = []
+        self.left = list(left)
 
     def next(self) -> int:
-        if not self._left:
-            self._left = self._random.permutation(self._frames).tolist()
-        return self._left.pop()
+        if not self.left:
+            self.left = self._random.permutation(self._frames).tolist()
+        return self.left.pop()
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:

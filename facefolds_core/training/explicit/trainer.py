@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
+from facefolds_core.training.explicit.attempt import Attempt
 from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
@@ -31,7 +33,12 @@ from facefolds_core.training.volume.fit import Volume
 
 
 class Trainer:
-    """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings."""
+    """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings.
+
+    Attributes:
+        logged: lines of the log: iteration, PSNR, rows of texels.
+        keep: called after each step; for checkpoints.
+    """
 
     def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: Device) -> None:
         self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
@@ -48,24 +55,32 @@ class Trainer:
         self.psnr = 0.0
         self.events = list(cameras.notes)
         self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses is not None)
+        self.logged: list[tuple[int, float, int]] = []
+        self.keep: Callable[[Trainer, Attempt], None] | None = None
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
-    def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
-        """One level, again from its start at a lower learning rate if it diverges."""
-        self._prepare(level)
+    def run(self, level: Level, number: int, live: Live, bar: tqdm, begun: Attempt | None = None) -> None:
+        """One level, again from its start at a lower learning rate if it diverges.
+
+        Args:
+            begun: how far it has come, if a checkpoint was taken up.
+        """
+        if begun is None:
+            self._prepare(level)
         assert self.state is not None and self.views is not None
-        saved = self.state.snapshot()
-        for _ in range(self.params.divergence.attempts):
-            if self._attempt(level, number, live, bar):
+        at = begun or Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
+        while at.tries < self.params.divergence.attempts:
+            if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
                 return
-            self.state.restore(saved)
+            self.state.restore(at.saved)
             self.rate /= self.params.divergence.slow_down
             self.events.append(fact("diverged", level=number, rate=self.rate))
             bar.write(f"train: {self.events[-1]}")
+            at.begin_again(Epochs(self.scene.num_frames, self.random))
         raise UserError(
             "training diverged",
             place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {self.rate:.3g}",
@@ -87,25 +102,38 @@ class Trainer:
         moved = self.geometry != level.geometry
         if moved and self.state is not None:
             self._recentre()
-        self.geometry = level.geometry
         new_rays = moved or self.stride != level.stride
         if new_rays:
-            finest = level.texels if level.stride > 1 else self.fit.texels
-            share = self.params.textures.rays_per_texel * finest[0] * finest[1]
-            self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
-            self.stride = level.stride
+            self._trace(level)
         assert self.views is not None
         if self.state is None:
             background = first_background(self.scene, self.images, self.volume, self.params.background)
-            start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
-            shape = (self.params.layers, self.scene.num_frames)
-            self.state = state_type(self.device.gpu)(level.texels, *shape, start, background, self.params)
+            self.state = self._new_state(level.texels, background)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:
             self.state.reset_alpha()
         if new_rays:
             self.gloss.follow(self.state, self.views, self.images, self.middle)
+
+    def take_up(self, level: Level, background: torch.Tensor) -> TextureState:
+        """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
+        self._trace(level)
+        self.state = self._new_state(level.texels, background)
+        assert self.views is not None
+        self.gloss.follow(self.state, self.views, self.images, self.middle)
+        return self.state
+
+    def _trace(self, level: Level) -> None:
+        finest = level.texels if level.stride > 1 else self.fit.texels
+        share = self.params.textures.rays_per_texel * finest[0] * finest[1]
+        self.geometry, self.stride = level.geometry, level.stride
+        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
+
+    def _new_state(self, texels: tuple[int, int], background: torch.Tensor) -> TextureState:
+        start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
+        shape = (self.params.layers, self.scene.num_frames)
+        return state_type(self.device.gpu)(texels, *shape, start, background, self.params)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
@@ -129,16 +157,14 @@ class Trainer:
             moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
         )
 
-    def _attempt(self, level: Level, number: int, live: Live, bar: tqdm) -> bool:
-        """All iterations of a level; False if it diverges."""
+    def _attempt(self, level: Level, at: Attempt, live: Live, bar: tqdm) -> bool:
+        """What is left of a level's iterations; False if it diverges."""
         assert self.state is not None and self.views is not None
         stride = self._stride()
-        coarse = number < len(self.params.geometry.rounds)
-        weights, smoothing = self._weights(coarse), self.params.divergence.smoothing
-        best, recent = float("inf"), float("nan")
-        epochs = Epochs(self.scene.num_frames, self.random)
-        for i in range(level.iterations):
-            frame = epochs.next()
+        coarse = at.level < len(self.params.geometry.rounds)
+        weights, divergence = self._weights(coarse), self.params.divergence
+        for i in range(at.step, level.iterations):
+            frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             rates = self._rates(i / level.iterations if level.last else 0.0)
             error = self.state.step(
@@ -151,21 +177,26 @@ class Trainer:
             )
             if not coarse and i % self.params.textures.smooth_every == 0:
                 self.state.smooth_alpha(frame)
-            recent = error if i == 0 else (1 - smoothing) * recent + smoothing * error
-            best = min(best, recent)
-            if not np.isfinite(error) or recent > self.params.divergence.error_ratio * best + 1e-4:
+            if not at.heed(error, divergence.smoothing, divergence.error_ratio):
                 return False
             if self.gloss.due(i, level):
                 done = level.last and i == level.iterations - 1
                 self.gloss.fit(self.state, self.views, self.images, done)
             self.iteration += 1
             self.rays += len(rays)
-            self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
+            self.psnr = -10 * float(np.log10(max(at.recent, 1e-12)))
             if i % 10 == 9:
-                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
+                self._log(live, self.iteration, self.psnr, level.texels[0])
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
+            at.step = i + 1
+            if self.keep is not None:
+                self.keep(self, at)
         return True
+
+    def _log(self, live: Live, iteration: int, psnr: float, rows: int) -> None:
+        self.logged.append((iteration, psnr, rows))
+        log_metrics(live, iteration, {"psnr": psnr, "texel_rows": rows})
 
     def _weights(self, coarse: bool) -> LossWeights:
         """Once the rounds have decided what the background explains, opacity is cheap, and half opacity dear."""

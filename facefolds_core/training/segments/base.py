@@ -31,6 +31,9 @@ from facefolds_core.training.patience import patiently
 LOG = "log"
 """Folder in a base's: dvclive's files of its training."""
 
+BEGUN = "begun-"
+"""Before a base's name: its checkpoint while it is trained."""
+
 _REMEDY = "delete the folder: the base is then trained again"
 
 
@@ -119,11 +122,16 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
 
 
 def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
-    """Train the key frames at once, and write the base's folder, whole or not at all."""
+    """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
+    folder, whole or not at all."""
+    kept = folder.with_name(f"{BEGUN}{folder.name}")
+    for other in folder.parent.glob(f"{BEGUN}*"):
+        if other != kept:
+            shutil.rmtree(other)
     # The frames are fitted without a reflection, which is added to what they then show.
     reflection = params.reflection.model_copy(update={"begin": "end"})
     params = params.model_copy(update={"reflection": reflection})
-    trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder)
+    trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder, kept)
 
     def write() -> None:
         with atomic_folder(folder) as temporary:
@@ -135,11 +143,13 @@ def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Pa
                 "background": torch.from_numpy(found.background),
                 "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
             }
-            about = {"splits": json.dumps(found.splits), "rate": repr(found.rate)}
+            # One entry: safetensors writes several in any order, and equal bases are to be equal files.
+            about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
             write_tensors(temporary / "surroundings.safetensors", tensors, about)
             shutil.copytree(log, temporary / LOG)
 
     patiently(write)
+    shutil.rmtree(kept, ignore_errors=True)
 
 
 def read_base(folder: Path, fingerprint: str) -> Base:
@@ -151,12 +161,10 @@ def read_base(folder: Path, fingerprint: str) -> Base:
     assert isinstance(textures, GridTextures) and isinstance(manifolds, RadialManifolds)
     shared = GridTextures(spec.window, spec.texels, spec.num_layers, 0, textures.reflection)
     shared.colour, shared.layers = textures.colour, textures.layers
-    tensors, about = read_tensors(folder / "surroundings.safetensors", _REMEDY)
+    tensors, metadata = read_tensors(folder / "surroundings.safetensors", _REMEDY)
+    about = json.loads(metadata["about"])
     surroundings = Surroundings(
-        tuple(json.loads(about["splits"])),
-        tensors["gains"].numpy(),
-        tensors["background"].numpy(),
-        float(about["rate"]),
+        tuple(about["splits"]), tensors["gains"].numpy(), tensors["background"].numpy(), about["rate"]
     )
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 

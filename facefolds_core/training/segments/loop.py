@@ -188,7 +188,7 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
     """The base of a take, trained if it is not in `folder`, and the log of its training."""
     place = folder / f"base-{plan.base}"
     if not place.exists():
-        tqdm.write(f"train: the base of {len(plan.keys)} key frames first: killed meanwhile, it begins anew")
+        tqdm.write(f"train: the base of {len(plan.keys)} key frames first")
         train_base(scene, list(plan.keys), params, place, log)
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)

@@ -1,0 +1,96 @@
+"""A base that is cut off goes on from its last checkpoint, to the same files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.training.explicit.checkpoints import STATE
+from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.segments.loop import base_of
+from facefolds_core.training.segments.plan import TakePlan, plan_take
+from tests.scenes import make_scene
+from tests.training.test_segments import FRAMES, params
+
+pytestmark = pytest.mark.slow
+
+STEPS = 30
+"""Of the base: 10 of geometry at a quarter of its texels, 8 at half, 12 at all of them."""
+
+OFTEN = {"checkpoint_seconds": 0.0, "checkpoint_share": 1.0}
+
+
+@contextmanager
+def counted(most: int = 1000) -> Iterator[list[int]]:
+    """The steps that are done meanwhile, frames of the base; a kill before number `most`."""
+    done: list[int] = []
+    step: Callable[..., float] = TextureState.step
+
+    def counting(self: TextureState, *arguments: object) -> float:
+        if len(done) == most:
+            raise KeyboardInterrupt
+        done.append(int(arguments[3]))  # type: ignore[call-overload]
+        return step(self, *arguments)
+
+    with patch.object(TextureState, "step", counting):
+        yield done
+
+
+def make(scene: Scene, plan: TakePlan, folder: Path, **segments: object) -> dict[str, bytes]:
+    """Train the base; its files, but for the times."""
+    base = base_of(plan, scene, params(**segments), folder, folder / "log")
+    files = [path for path in sorted(base.folder.rglob("*")) if path.is_file() and path.name != "training.json"]
+    return {str(path.relative_to(base.folder)): path.read_bytes() for path in files}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, TakePlan, dict[str, bytes]]:
+    """A take, and its base trained in one go."""
+    folder = tmp_path_factory.mktemp("base")
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    plan = plan_take(scene, params(), 2)
+    with counted() as steps:
+        found = make(scene, plan, folder / "take")
+    assert len(steps) == STEPS and "log/plots/metrics/psnr.tsv" in found
+    return scene, plan, found
+
+
+@pytest.mark.parametrize("after", [4, 15, 25])
+def test_a_base_that_is_cut_off_goes_on_where_it_was(
+    after: int, whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, expected = whole
+    with counted(most=after), pytest.raises(KeyboardInterrupt):
+        make(scene, plan, tmp_path, **OFTEN)
+    with counted() as left:
+        assert make(scene, plan, tmp_path, **OFTEN) == expected
+    assert len(left) == STEPS - after
+    assert [path.name for path in tmp_path.glob("begun-*")] == []
+
+
+def test_it_is_not_written_more_often_than_asked(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, _ = whole
+    with counted(most=20), pytest.raises(KeyboardInterrupt):
+        make(scene, plan, tmp_path, checkpoint_seconds=1000.0)
+    assert list(tmp_path.glob("begun-*")) == []
+
+
+@pytest.mark.parametrize("name", [STATE, "frame_alpha.npy"])
+def test_a_damaged_checkpoint_is_none(
+    name: str, whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, expected = whole
+    with counted(most=20), pytest.raises(KeyboardInterrupt):
+        make(scene, plan, tmp_path, **OFTEN)
+    path = next(tmp_path.glob("begun-*")) / name
+    path.write_bytes(path.read_bytes()[:200])
+    with counted() as steps:
+        assert make(scene, plan, tmp_path, **OFTEN) == expected
+    assert len(steps) == STEPS
