@@ -64,6 +64,8 @@ WORDS = {
     "outside it",
     "halfwidth_chosen": "halfwidth: {least}, more where the volume is blurred or far from the middle, at most {most}",
     "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
+    "resolution_chosen": "{what}: auto took {chosen} of {tried}: {below:.2f} dB below the best of them on {views} "
+    "views of cameras of the split {split}, {to_finest:.1f} dB to the finest one's pictures",
     # of a training: what happened
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
     "the others see as the median camera does; check its calibration",
