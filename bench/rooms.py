@@ -24,6 +24,7 @@ from facefolds_core.captures.actor import make_rig
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
+from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.strips import strip
 
 MARKS = ("<!-- rooms: written by bench/rooms.py -->", "<!-- end of rooms -->")
@@ -72,7 +73,7 @@ def run(name: str, folder: Path, captures: Path) -> Found:
     project.write(params)
     project.run("configure", *STAGE_SECTIONS)
     asset, metrics = read_asset(project.folders.asset), read_json(project.folders.metrics)
-    Image.fromarray(strip(asset, range(-80, 81, 20), COLOURS, (150, 190), 30.0)).save(
+    Image.fromarray(strip(asset, range(-80, 81, 20), COLOURS, (130, 165), 20.0)).save(
         folder / f"{project.root.name}.jpg"
     )
     fresh, cost = metrics.get("fresh_views"), metrics["cost"]
@@ -107,10 +108,11 @@ def main(
     for one in store.fill([Found(room=name) for name in names], lambda blank: run(blank.room, folder, captures)):
         typer.echo(f"{one.room}: {one.figures}")
     known = {one.room: one for one in store.read()}
-    text = f"{now()[:10]}, {machine_name('cpu')}.\n\n" + table({name: known[name] for name in ROOMS if name in known})
-    typer.echo(text)
+    typer.echo(text := f"{now()[:10]}, {machine_name('cpu')}.\n\n{table({n: known[n] for n in ROOMS if n in known})}")
     if write:
         replace_between(ROOT / "bench" / "RESULTS.md", *MARKS, text)
+        strips = [open_picture(folder / f"{name}.jpg") for name in ("actor", "clutter", "actor_8-cameras")]
+        Image.fromarray(np.vstack([np.asarray(one) for one in strips])).save(ROOT / "docs" / "images" / "rooms.jpg")
 
 
 if __name__ == "__main__":
