@@ -13,7 +13,7 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from facefolds_core.errors import UserError
-from facefolds_core.params import SECTIONS, Section, Subject, TrainParams, TrainSection
+from facefolds_core.params import SECTIONS, ExplicitParams, Section, Subject, TrainParams, TrainSection
 from facefolds_core.parsing import brief, parse_json
 from facefolds_core.reading import read_text
 
@@ -59,3 +59,16 @@ class LevelResolutions(Section):
 def read_level_resolutions(folder: Path) -> tuple[int, ...]:
     """R^m of the coarser levels of detail, each once."""
     return _read(TypeAdapter(LevelResolutions), folder / "levels.json").mesh_resolutions
+
+
+class VolumeSource(Section):
+    """`volume.json`: what `matte` needs to know of `train`, where it fits a starting volume; else null, so that changes
+    of `train` do not rerun it."""
+
+    train: TrainSection | None
+
+
+def read_volume_source(folder: Path) -> ExplicitParams:
+    """The training whose starting volume `matte` fits: of other models than `explicit` that of its defaults."""
+    train = _read(TypeAdapter(VolumeSource), folder / "volume.json").train
+    return train if isinstance(train, ExplicitParams) else ExplicitParams(seed=0 if train is None else train.seed)

@@ -64,6 +64,8 @@ WORDS = {
     "outside it",
     "halfwidth_chosen": "halfwidth: {least}, more where the volume is blurred or far from the middle, at most {most}",
     "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
+    "resolution_chosen": "{what}: auto took {chosen} of {tried}: {below:.2f} dB below the best of them on {views} "
+    "views of cameras of the split {split}, {to_finest:.1f} dB to the finest one's pictures",
     # of a training: what happened
     "camera_contradicts": "camera {camera} is left out: on the subject it differs {times:.1f} times as much from what "
     "the others see as the median camera does; check its calibration",
@@ -100,7 +102,8 @@ WORDS = {
     "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
     "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
-    "one training's cannot be compared with another's. Give masks of the scored cameras (docs/guide/subjects.md)",
+    "one training's cannot be compared with another's. Give masks of the scored cameras, or find mattes: "
+    "`matte: {method: auto}` in params.yaml (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }

@@ -143,12 +143,13 @@ def _has(overrides: Any, name: str) -> bool:
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
-    """Write `subject.json`, one file a stage, and `levels.json` (see `config`); returns their paths."""
+    """Write `subject.json`, one file a stage, `levels.json` and `volume.json` (see `config`); returns their paths."""
     core = params.subject(subject).model_dump(mode="json", by_alias=True, exclude=set(Overrides.model_fields))
     values: dict[str, Any] = {"subject": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
     resolutions = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
     values["levels"] = {"mesh_resolutions": resolutions}
+    values["volume"] = {"train": values["train"] if values["matte"]["method"] in ("auto", "pictures") else None}
     for name, value in values.items():
         write_json(folder / f"{name}.json", value)
     return [folder / f"{name}.json" for name in values]

@@ -40,6 +40,11 @@ class SubjectFolders:
         return self.root / "scene"
 
     @property
+    def mattes(self) -> Path:
+        """matte: where the subject is in the pictures (training/mattes/folder.py), and which mattes train."""
+        return self.root / "mattes"
+
+    @property
     def model(self) -> Path:
         """train: `model.safetensors`, `model.json`, `training.json`."""
         return self.root / "model"

@@ -35,6 +35,7 @@ STAGE_OF = {
     "config": "configure",
     "capture": "capture",
     "scene": "normalize",
+    "mattes": "matte",
     "model": "train",
     "samples": "sample",
     "surfaces": "reconstruct",

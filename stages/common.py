@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.facts import Fact
 from facefolds_core.files import write_json
 from facefolds_core.locks import Lock, holding, owner, try_lock
 from facefolds_core.paths import SubjectFolders, check_subject_name, subject_folders, subject_of_dvc_stage
@@ -21,11 +22,22 @@ Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject
 Work = Callable[[SubjectFolders], str]
 """Does a stage's work on one subject's folders, and says in a line what was made and where; more lines may follow."""
 
+CHOICE = "choice.json"
+"""Name of the record of what `auto` chose, in the folder of the stage that chose it."""
+
 LOCK_WAIT = 20.0
 """Seconds that a stage waits for another run of it, which may be ending, on the same subject."""
 
 LOOK = 0.25
 """Seconds between two looks at DVC's lock."""
+
+
+def write_choice(folder: Path, why: Fact | None) -> str:
+    """Write `choice.json` of a stage's folder: what `auto` chose, and why. Returns the line that says it, or ""."""
+    if why is None:
+        return ""
+    write_json(folder / CHOICE, why.to_json())
+    return f"\n  {why}"
 
 
 def run_stage(name: str, work: Work, help_text: str) -> None:

@@ -4,26 +4,34 @@ from __future__ import annotations
 
 import typer
 
+from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
+from facefolds_core.export.steps import TEXTURES, texels_for
+from facefolds_core.export.stores import read_meshes
 from facefolds_core.export.textures import resample_store
 from facefolds_core.files import atomic_folder
 from facefolds_core.params import TextureParams
 from facefolds_core.paths import SubjectFolders
-from stages.common import run_stage
+from stages.common import run_stage, write_choice
 
 
 def texture(folders: SubjectFolders) -> str:
-    size = read_stage(TextureParams, folders.config).resolution
+    params, samples = read_stage(TextureParams, folders.config), folders.samples / TEXTURES
+    size, chosen = texels_for(read_scene(folders.scene), read_meshes(folders.meshes / "meshes.npz"), samples, params)
     with atomic_folder(folders.resampled) as temporary:
         kept = folders.checkpoints / "resampled"
-        source = resample_store(folders.samples / "textures.arrow", temporary / "textures.arrow", size, kept)
+        source = resample_store(samples, temporary / TEXTURES, size, kept)
+        why = write_choice(temporary, chosen)
     if size > source.height:
         typer.echo(
             f"texture: warning: texture.resolution {size} is above sample.resolution {source.height}; "
             "enlarging adds texels but no detail",
             err=True,
         )
-    return f"{len(source.keys())} textures, {source.height} x {source.width} to {size} x {size}, in {folders.resampled}"
+    return (
+        f"{len(source.keys())} textures, {source.height} x {source.width} to {size} x {size}, "
+        f"in {folders.resampled}{why}"
+    )
 
 
 if __name__ == "__main__":

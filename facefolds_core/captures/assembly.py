@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 from facefolds_core.captures.agreement import AGREE, agreement
 from facefolds_core.captures.capture import Capture, check_image_sizes, complete_subset
 from facefolds_core.captures.developing import Negative, opacities, photos
-from facefolds_core.captures.given_mattes import given_mattes
 from facefolds_core.captures.images import fit_box
 from facefolds_core.captures.motion import head_motion, in_head
 from facefolds_core.captures.normalization import cull, normalizing_similarity, split_cameras
@@ -59,7 +57,6 @@ class Plan:
         scene: all of it but pixels and mesh.
         rows: its images, ordered by camera, then frame.
         vertices: (K, V, 3) float32 tracked mesh in the head's own frame, or None.
-        mattes: folder of mattes that the user names, or None.
         sound_start: seconds, where the first frame lies in the capture's sound; None without a sound that fits.
     """
 
@@ -68,7 +65,6 @@ class Plan:
     rows: tuple[Row, ...]
     vertices: NDArray[np.float32] | None
     sound_start: float | None = None
-    mattes: Path | None = None
 
 
 def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeParams, folder: Path) -> Plan:
@@ -116,8 +112,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         vertices = by_rows(len(world), lambda rows: in_head(normalised[rows], track, rows.start), np.float32)
         there = by_rows(len(world), lambda rows: normalised[rows], np.float32)
     check_sight(cameras, scene.frame_ids, there, capture.root)
-    given = None if subject.mattes is None else Path(subject.mattes)
-    return Plan(capture, scene, tuple(rows), vertices, sound, given)
+    return Plan(capture, scene, tuple(rows), vertices, sound)
 
 
 def _ball(radius: float, capture: Capture) -> float:
@@ -159,13 +154,6 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     with atomic_folder(scene.folder) as temporary:
         rows = progress(photos(capture, shown, width, height, params), desc="normalize", unit="image", total=len(shown))
         write_frames(temporary / "frames.arrow", (height, width, 3), rows)
-        if plan.mattes is not None:
-            # Named by hand: they stand above those of the capture, picture by picture.
-            rows = list(given_mattes(plan.mattes, scene))
-            named = {(camera, frame) for camera, frame, _ in rows}
-            rest = [one for one in opacity.pop("mattes") if one.key not in named]
-            rows = chain(rows, opacities(capture, rest, width, height))
-            write_frames(temporary / "mattes.arrow", (height, width, 1), rows)
         for name, wanted in opacity.items():
             if wanted:
                 rows = opacities(capture, wanted, width, height)

@@ -64,6 +64,7 @@ class Scene:
         folder: where it was read from.
         poses: the head's own frame -> world in each of the K frames; None where the head is taken to stand still.
         radius: of the ball about the origin that holds the subject, units; None where it is to be found.
+        mattes: file of mattes in place of the scene's own, none at all if it is not there; None: the scene's own.
     """
 
     subject: str
@@ -77,6 +78,7 @@ class Scene:
     folder: Path
     poses: Track | None = None
     radius: float | None = None
+    mattes: Path | None = None
 
     @property
     def width(self) -> int:
@@ -140,7 +142,7 @@ class Scene:
 
     def open_mattes(self) -> FrameStore | None:
         """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""
-        path = self.folder / "mattes.arrow"
+        path = self.folder / "mattes.arrow" if self.mattes is None else self.mattes
         return FrameStore(path) if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:

@@ -55,9 +55,9 @@ class Order:
 
 
 def decimate_layers(
-    surfaces: Sequence[Surface], grids: Grids, params: DecimateParams, progress: bool = True
+    surfaces: Sequence[Surface], grids: Grids, resolution: int, params: DecimateParams, progress: bool = True
 ) -> list[TexturedMesh]:
-    """Decimate all layers and give them texture coordinates.
+    """Decimate all layers to at most resolution x resolution vertices and give them texture coordinates.
 
     Raises:
         UserError: if there are not as many surfaces as sampled layers, or nothing is left of a layer; names it.
@@ -71,7 +71,7 @@ def decimate_layers(
         )
     meshes = []
     for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
-        coarse = decimate(surface, params.resolution**2, grids.chart, params.aggressiveness)
+        coarse = decimate(surface, resolution**2, grids.chart, params.aggressiveness)
         if len(coarse.faces) == 0:
             raise UserError(
                 "decimation left nothing of a layer",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
-from facefolds_core.export.collapse import decimate_sheets, decimated_ladder
+from facefolds_core.export.choosing import choose_meshes, choose_texels
+from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
@@ -26,10 +27,11 @@ from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.sheets import Gridded, grid_sheets
 from facefolds_core.export.stores import Grids, Sheets
+from facefolds_core.facts import Fact
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
-from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams
+from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
 from facefolds_core.progress import progress
 from facefolds_core.source_code import digest_of_packages
 
@@ -80,21 +82,53 @@ def surfaces_in(made: Gridded | list[Reconstruction]) -> Surfaces:
     return made.sheets if isinstance(made, Gridded) else [result.surface for result in made]
 
 
-def decimate(surfaces: Surfaces, grids: Grids, params: DecimateParams) -> list[TexturedMesh]:
-    """Every layer with at most R^m x R^m vertices, and texture coordinates."""
-    if isinstance(surfaces, Sheets):
-        return decimate_sheets(surfaces, params.resolution**2, params)
-    return decimate_layers(surfaces, grids, params)
+@dataclass(frozen=True)
+class Decimated:
+    """Attributes:
+    meshes: of all layers, outermost first.
+    coarser: R^m asked for -> the meshes of a coarser level, never finer than `meshes`.
+    why: how R^m was chosen; None where it was given.
+    """
+
+    meshes: list[TexturedMesh]
+    coarser: dict[int, list[TexturedMesh]]
+    why: Fact | None
 
 
-def decimate_levels(
+def decimate_all(
+    surfaces: Surfaces, grids: Grids, scene: Scene, samples: Path, params: DecimateParams, levels: Sequence[int]
+) -> Decimated:
+    """The meshes that ship, and those of the coarser levels of detail.
+
+    Args:
+        scene: whose photos decide where `resolution` is "auto".
+        samples: frame store of the textures as they were sampled.
+        levels: R^m of the coarser levels.
+    """
+    given = params.resolution
+    tried = params.auto.candidates if given == "auto" else (given,)
+    ladder = decimate(surfaces, grids, params, sorted({*tried, *levels}))
+    chosen, why = choose_meshes(scene, ladder, FrameStore(samples), params.auto) if given == "auto" else (given, None)
+    return Decimated(ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why)
+
+
+def texels_for(
+    scene: Scene, meshes: Sequence[TexturedMesh], samples: Path, params: TextureParams
+) -> tuple[int, Fact | None]:
+    """R^t, and how it was chosen; None where it was given. `samples`: see `decimate_all`."""
+    if params.resolution == "auto":
+        return choose_texels(scene, meshes, FrameStore(samples), params.auto)
+    return params.resolution, None
+
+
+def decimate(
     surfaces: Surfaces, grids: Grids, params: DecimateParams, resolutions: Sequence[int]
 ) -> dict[int, list[TexturedMesh]]:
-    """The same for coarser levels of detail: R^m -> the layers with at most so many squared vertices."""
+    """R^m -> every layer with at most R^m x R^m vertices, and texture coordinates; `params.resolution` is not read."""
     if isinstance(surfaces, Sheets):
-        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions], params) if resolutions else {}
+        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions], params)
         return {r: ladder[r**2] for r in resolutions}
-    return {r: decimate(surfaces, grids, params.model_copy(update={"resolution": r})) for r in resolutions}
+    return {r: decimate_layers(surfaces, grids, r, params) for r in resolutions}
 
 
 def bake(

@@ -6,6 +6,7 @@ below takes a number that somebody might tune from anywhere but a section (tests
 
 from facefolds_core.params.base import Section, merged, nested, value_at
 from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams, RegistrationParams
+from facefolds_core.params.choice import ChoiceParams, MeshChoiceParams, TextureChoiceParams
 from facefolds_core.params.compress import (
     AttentionParams,
     BetweenParams,
@@ -39,7 +40,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.matte import CutOutParams, MatteParams, VoteParams
+from facefolds_core.params.matte import CutOutParams, MatteParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -69,6 +70,7 @@ __all__ = [
     "BetweenParams",
     "CameraParams",
     "CaptureParams",
+    "ChoiceParams",
     "CodecName",
     "CollapseParams",
     "CompressParams",
@@ -87,6 +89,7 @@ __all__ = [
     "LevelParams",
     "LossParams",
     "MatteParams",
+    "MeshChoiceParams",
     "MeshCodec",
     "MeshParams",
     "MeterParams",
@@ -96,6 +99,7 @@ __all__ = [
     "MovingParams",
     "NormalizeParams",
     "Overrides",
+    "PlateParams",
     "Preset",
     "PruningParams",
     "ReconstructParams",
@@ -111,6 +115,7 @@ __all__ = [
     "StreamParams",
     "Subject",
     "SubjectParams",
+    "TextureChoiceParams",
     "TextureParams",
     "TrainParams",
     "TrainSection",

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
-from facefolds_core.params.matte import MatteParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -221,9 +220,6 @@ class ExplicitParams(Section):
 
     warnings: WarningParams = WarningParams()
     """When it is said that something is not well."""
-
-    mattes: MatteParams = MatteParams()
-    """How mattes are found where somebody asks for them."""
 
     cameras: CameraParams = CameraParams()
     """What single cameras do differently."""

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Count, Factor, Many, Natural, Section, Share, TextureSide, Weight
+from facefolds_core.params.choice import MeshChoiceParams, TextureChoiceParams
 
 Aggressiveness = Annotated[int, Field(ge=1, le=10)]
 
@@ -105,8 +106,12 @@ class RefitParams(Section):
 class DecimateParams(Section):
     """Fewer vertices where they are missed least."""
 
-    resolution: Annotated[int, Field(ge=8, le=2048)] = 64
-    """R^m; each layer keeps at most R^m x R^m vertices."""
+    resolution: Literal["auto"] | Annotated[int, Field(ge=8, le=2048)] = "auto"
+    """R^m, 8 to 2048; each layer keeps at most R^m x R^m vertices. "auto" is the least of `auto.candidates` that the
+    photos cannot tell from the best."""
+
+    auto: MeshChoiceParams = MeshChoiceParams()
+    """How `resolution: auto` is decided."""
 
     uv: Literal["nearest", "exact"] = "exact"
     """Of Poisson surfaces: "nearest" gives a vertex the texture coordinates of the nearest sample (the paper), "exact"
@@ -126,8 +131,12 @@ class DecimateParams(Section):
 class TextureParams(Section):
     """The layers' textures, as the model has them."""
 
-    resolution: TextureSide = 512
-    """R^t; texels a side of each layer's texture."""
+    resolution: Literal["auto"] | TextureSide = "auto"
+    """R^t, 8 to 4096; texels a side of each layer's texture. "auto" is the least of `auto.candidates` that the photos
+    cannot tell from the best."""
+
+    auto: TextureChoiceParams = TextureChoiceParams()
+    """How `resolution: auto` is decided."""
 
 
 class BakeParams(Section):

@@ -1,19 +1,19 @@
-"""`train.mattes`: where the subject is in each picture."""
+"""`matte`: where the subject is in each picture."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Length, Natural, Section, Share, Weight
+from facefolds_core.params.base import Count, Length, Natural, Pixels, Section, Share, Weight
 
 
 class CutOutParams(Section):
     """GrabCut (Rother et al. 2004, OpenCV's) in single pictures, begun from the opacity of the starting volume."""
 
     long_side: Annotated[int, Field(ge=32, le=4096)] = 384
-    """Pictures are reduced to this, pixels: the volume that the mattes serve is coarser still."""
+    """Pictures are reduced to this, pixels: what else is known of the outline is no finer."""
 
     inside: Share = 0.9
     """Where the volume is more opaque, and `erode` farther in, a pixel is the subject's for sure."""
@@ -29,6 +29,28 @@ class CutOutParams(Section):
 
     iterations: Count = 3
     """Of GrabCut."""
+
+
+class PlateParams(Section):
+    """Pictures beside their clean plates: what differs is the subject, and at its outline by how much it is opaque."""
+
+    blur: Pixels = 0.7
+    """Standard deviation by which both are blurred before they are compared, pixels: noise is no difference."""
+
+    different: Share = 0.05
+    """Largest difference of a colour, in [0, 1], from which on a pixel may be the subject's."""
+
+    least: Share = 0.05
+    """What is smaller than this share of the largest thing is a shadow or a reflection."""
+
+    outline: Natural = 3
+    """Pixels inside of the outline where opacity is found from colours, between plate and subject;"""
+
+    beyond: Natural = 5
+    """and outside of it: hair."""
+
+    contrast: Share = 0.08
+    """Difference between subject and plate under which colours say little of opacity: it is taken to be lower."""
 
 
 class VoteParams(Section):
@@ -56,10 +78,23 @@ class VoteParams(Section):
 
 
 class MatteParams(Section):
-    """How `facefolds mattes` cuts the subject out of the pictures. No training reads it."""
+    """Where the subject is in each picture: mattes to look at and to correct (`mattes` of a subject). They serve the
+    scores of cameras without masks, and the training if it is told so."""
+
+    method: Literal["none", "auto", "plates", "pictures"] = "none"
+    """Where the capture has no matte: "none" looks for none; "plates" takes what differs from the camera's clean plate;
+    "pictures" fits a starting volume and cuts the subject out of each picture (minutes); "auto" takes plates where
+    they are, else pictures."""
+
+    train: Literal["given", "all", "none"] = "given"
+    """Which are targets of the starting volume's opacity (`train.volume.matte_weight`): those that came with the
+    capture or that `mattes` of the subject names; all, those that were found, too; or none."""
+
+    plates: PlateParams = PlateParams()
+    """Of a picture with a clean plate."""
 
     cut_out: CutOutParams = CutOutParams()
-    """In each picture."""
+    """Of a picture by itself."""
 
     vote: VoteParams = VoteParams()
     """Of all pictures."""

@@ -10,3 +10,6 @@ EXPLICIT: dict[str, str] = {
     "lambda_solid": "losses.binarisation",
 }
 """Of `train`, model `explicit`; until 0.1."""
+
+MOVED: dict[str, str] = {"mattes": "matte"}
+"""Key of `train`, model `explicit` -> the section that has become of it."""

@@ -15,13 +15,15 @@ from facefolds_core.params.compress import CompressParams
 from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
-from facefolds_core.params.renamed import EXPLICIT
+from facefolds_core.params.matte import MatteParams
+from facefolds_core.params.renamed import EXPLICIT, MOVED
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 from facefolds_core.parsing import brief
 
 SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "capture": (CaptureParams,),
     "normalize": (NormalizeParams,),
+    "matte": (MatteParams,),
     "train": get_args(TrainParams),
     "sample": (SampleParams,),
     "reconstruct": (ReconstructParams,),
@@ -100,6 +102,8 @@ def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
     if kind is ExplicitParams and not folders and key in EXPLICIT:
         return expected, f"it is called `{EXPLICIT[key]}` now: write `{_yaml(EXPLICIT[key])}`"
+    if kind is ExplicitParams and not folders and key in MOVED:
+        return expected, f"it is a section of its own now: write `{MOVED[key]}: {{...}}` beside `train`"
     for other in SECTIONS["train"] if model and not folders else ():
         if key in {**other.model_fields, **(EXPLICIT if other is ExplicitParams else {})}:
             name = other.model_fields["model"].default

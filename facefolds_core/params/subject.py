@@ -47,6 +47,9 @@ class Overrides(Section):
     normalize: Raw = Field(default_factory=dict)
     """See `normalize`."""
 
+    matte: Raw = Field(default_factory=dict)
+    """See `matte`."""
+
     train: Raw = Field(default_factory=dict)
     """See `train`."""
 
@@ -106,8 +109,9 @@ class Subject(Overrides):
     modelled, and nothing larger is tried. null takes `train.volume.reach`, and more where that cuts the subject off."""
 
     mattes: str | None = None
-    """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png (`facefolds mattes` makes such); they
-    take the place of those that come with the capture. Relative paths start at the project's folder."""
+    """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png, as the stage `matte` leaves them in
+    data/SUBJECT/mattes; they take the place of those that come with the capture or are found, picture by picture, and
+    train unless `matte.train` is "none". Relative paths start at the project's folder."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

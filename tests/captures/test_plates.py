@@ -17,9 +17,8 @@ from facefolds_core.params import CaptureParams, NormalizeParams, Subject
 from tests.captures.fixtures import SEGMENT, pattern, save, write_multiface
 
 
-def normalized(root: Path, out: Path, mattes: Path | None = None) -> Scene:
-    named = None if mattes is None else str(mattes)
-    subject = Subject(source="multiface", path=str(root), holdout=("400003",), mattes=named)
+def normalized(root: Path, out: Path) -> Scene:
+    subject = Subject(source="multiface", path=str(root), holdout=("400003",))
     params = NormalizeParams(long_side=32, short_side=20)
     return write_plan(plan_scene(read_multiface(root, subject), "head", subject, params, out), params)
 
@@ -77,34 +76,3 @@ def test_the_actor_has_them_when_asked_and_they_agree_with_its_pictures(tmp_path
 def test_by_default_the_actor_has_none(tmp_path: Path) -> None:
     write_capture(tmp_path, CaptureParams(cameras=3, frames=1, height=16, width=16))
     assert not (tmp_path / "plates").exists() and not (tmp_path / "mattes").exists()
-
-
-def test_mattes_that_are_named_stand_above_the_captures(tmp_path: Path) -> None:
-    root, given = tmp_path / "capture", tmp_path / "given"
-    made = write_multiface(root)
-    for camera in made.cameras:
-        save(root / "mattes" / SEGMENT / camera.name / "000006.png", np.full((64, 40), 50, np.uint8))
-    save(given / "400001" / "000006.png", np.full((64, 40), 200, np.uint8))
-    save(given / "400002.png", np.full((32, 20), 150, np.uint8))  # for all frames, of another size
-    scene = normalized(root, tmp_path / "scene", given)
-    mattes = scene.open_mattes()
-    assert mattes is not None
-    values = {(scene.cameras[c].name, k): int(mattes.image(c, k)[5, 5, 0]) for c, k in mattes}
-    others = {(camera.name, 1): 50 for camera in made.cameras[2:]}
-    assert values == {("400001", 1): 200, **{("400002", k): 150 for k in range(3)}, **others}
-
-
-@pytest.mark.parametrize("place", ["nowhere", "empty"])
-def test_a_folder_without_mattes_is_refused(tmp_path: Path, place: str) -> None:
-    write_multiface(tmp_path / "capture")
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(UserError, match="no mattes"):
-        normalized(tmp_path / "capture", tmp_path / "scene", tmp_path / place)
-
-
-def test_a_named_matte_of_another_shape_is_refused(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "capture")
-    save(tmp_path / "given" / "400002.png", np.zeros((40, 64), np.uint8))
-    with pytest.raises(UserError, match="another shape") as caught:
-        normalized(tmp_path / "capture", tmp_path / "scene", tmp_path / "given")
-    assert "400002" in str(caught.value)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.config import read_level_resolutions, read_stage, read_subject, read_train
+from facefolds_core.config import read_level_resolutions, read_stage, read_subject, read_train, read_volume_source
 from facefolds_core.errors import UserError
 from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
 from facefolds_core.params_file import load_params, write_configs
@@ -68,6 +68,22 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("method", "changed"),
+    [("none", ["train.json"]), ("plates", ["train.json"]), ("auto", ["train.json", "volume.json"])],
+)
+def test_training_parameters_reach_mattes_only_where_they_are_needed(
+    tmp_path: Path, method: str, changed: list[str]
+) -> None:
+    written = []
+    for layers in (4, 5):
+        text = MINIMAL + f"train: {{layers: {layers}}}\nmatte: {{method: {method}}}\n"
+        params = load_params(params_file(tmp_path, text))
+        written.append({path.name: path.read_bytes() for path in write_configs(params, "a", tmp_path)})
+    assert [name for name in written[0] if written[0][name] != written[1][name]] == changed
+    assert read_volume_source(tmp_path).layers == (5 if "volume.json" in changed else 12)
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("subjects:\n  a: [\n", "line 3"),
@@ -78,6 +94,7 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
         (MINIMAL + "train: {lambda_veil: 0}\n", "losses.opacity"),
+        (MINIMAL + "train: {mattes: {vote: {share: 0.9}}}\n", "`matte: {...}` beside `train`"),
         ("subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {volume: {}}\n", "to the subjects"),
         (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),

@@ -52,8 +52,7 @@ def export(
     write_textures(folder / "samples.arrow", model, grids, progress=False)
     poisson = ReconstructParams(depth=6)
     surfaces = [reconstruct(gather_samples(grids, i, None), poisson, i).surface for i in range(grids.num_layers)]
-    params = DecimateParams(resolution=32, uv=uv)
-    meshes = decimate_layers(surfaces, grids, params, progress=False)
+    meshes = decimate_layers(surfaces, grids, 32, DecimateParams(uv=uv), progress=False)
     resample_store(folder / "samples.arrow", folder / "textures.arrow", size or resolution, progress=False)
     return Exported(meshes, FrameStore(folder / "textures.arrow"))
 

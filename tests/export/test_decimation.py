@@ -96,7 +96,7 @@ def test_exact_texture_coordinates_are_the_direction(grids: Grids) -> None:
 
 
 def test_layers_in_order_do_not_cross(grids: Grids, surfaces: list[Surface]) -> None:
-    order = layer_order(decimate_layers(surfaces, grids, DecimateParams(resolution=16), progress=False), CHART)
+    order = layer_order(decimate_layers(surfaces, grids, 16, DecimateParams(), progress=False), CHART)
     assert order.compared > 200
     assert order.crossed == 0
 
@@ -109,4 +109,4 @@ def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
 
 def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
     with pytest.raises(UserError, match="do not belong together"):
-        decimate_layers(surfaces * 2, grids, DecimateParams(), progress=False)
+        decimate_layers(surfaces * 2, grids, 16, DecimateParams(), progress=False)

@@ -22,6 +22,8 @@ def main() -> None:
     resolution = {
         name: json.loads((config / f"{name}.json").read_text())["resolution"] for name in ("decimate", "texture")
     }
+    auto = {"decimate": 64, "texture": 256}
+    resolution = {name: auto[name] if value == "auto" else value for name, value in resolution.items()}
     if stage == "texture" and resolution["texture"] == 13:
         sys.exit("texture: error: 13 is unlucky")
     stages = yaml.safe_load(Path("dvc.yaml").read_text().replace("${key}", subject))["stages"]

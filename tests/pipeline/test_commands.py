@@ -38,7 +38,7 @@ def facefolds(*words: str | Path) -> str:
     return done.output
 
 
-ELSEWHERE = ["vectors", "export-html", "submission", "run", "mattes"]
+ELSEWHERE = ["vectors", "export-html", "submission", "run"]
 
 
 def test_all_commands_are_here() -> None:

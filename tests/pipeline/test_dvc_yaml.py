@@ -14,6 +14,7 @@ STAGES = [
     "configure",
     "capture",
     "normalize",
+    "matte",
     "train",
     "sample",
     "reconstruct",

@@ -65,8 +65,7 @@ def grid(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     project = GridProject(project_root, root)
     project.run("dvc", "repro", "evaluate@actor")
     assert project.stages_run() == Counter(COMPUTING)
-    # The actor overrides `texture`, and an override beats the section.
-    values = "subjects.actor.texture.resolution=13,128"
+    values = "texture.resolution=13,128"
     project.run("dvc", "exp", "run", "--queue", "-S", values, "-S", "decimate.resolution=16", "evaluate@actor")
     project.run("dvc", "queue", "start", "-j", "2")
     end = time.monotonic() + 240
@@ -89,7 +88,7 @@ def test_a_failed_cell_does_not_lose_the_others(grid: tuple[list[Run], Counter[s
 
 def test_the_working_folder_has_a_row_too(grid: tuple[list[Run], Counter[str]]) -> None:
     own = [run for run in grid[0] if run.experiment == "workspace"]
-    assert [dict(run.params) for run in own] == [{"decimate.resolution": 64, "texture.resolution": 256}]
+    assert [dict(run.params) for run in own] == [{"decimate.resolution": "auto", "texture.resolution": "auto"}]
 
 
 def test_cached_stages_do_not_run_again(grid: tuple[list[Run], Counter[str]]) -> None:

@@ -15,7 +15,10 @@ from facefolds_core.sweeps.edit import set_for_subject
 @pytest.fixture
 def params(project_root: Path, tmp_path: Path) -> Path:
     path = tmp_path / "params.yaml"
-    path.write_text((project_root / "params.yaml").read_text())
+    place = "    path: facefolds_core/captures/actor\n"
+    text = (project_root / "params.yaml").read_text()
+    assert place in text
+    path.write_text(text.replace(place, f"{place}    texture: {{resolution: 256}} # its own\n"))
     return path
 
 

@@ -9,13 +9,12 @@ import numpy as np
 from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
-from facefolds_core.cli.mattes import write_mattes
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import CutOutParams, ExplicitParams, VoteParams
-from facefolds_core.pictures import open_picture
+from facefolds_core.params import CutOutParams, ExplicitParams, MatteParams, PlateParams, VoteParams
 from facefolds_core.training.mattes.cut_out import cut_out, opacity_in, reduced
-from facefolds_core.training.mattes.find import CutOut, find_mattes, wanted_pictures
-from facefolds_core.training.mattes.sheet import RED
+from facefolds_core.training.mattes.find import CutOut, from_pictures, wanted_pictures
+from facefolds_core.training.mattes.plates import from_plate
+from facefolds_core.training.mattes.sheet import RED, contact_sheet
 from facefolds_core.training.mattes.vote import agreed, outvoted
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
@@ -83,28 +82,55 @@ def test_pictures_are_reduced_never_enlarged() -> None:
     assert (reduced(camera, 96).height, reduced(camera, 96).width) == (48, 48)
 
 
-def test_what_is_outvoted_is_on_the_sheet_but_not_among_the_mattes(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path / "scene", size=16)
-    grey, matte = np.full((8, 8, 3), 99, np.uint8), np.ones((8, 8), np.uint8)
-    found = [CutOut(0, 0, grey, matte, 0.9, True), CutOut(1, 0, grey, matte, 0.3, False)]
-    write_mattes(tmp_path / "mattes", scene, found)
-    names = [scene.cameras[c].name for c in (0, 1)]
-    written = sorted(path.relative_to(tmp_path / "mattes").as_posix() for path in (tmp_path / "mattes").rglob("*.png"))
-    assert written == sorted(["mattes.png", f"{names[0]}/{scene.frame_ids[0]}.png"])
-    assert np.asarray(open_picture(tmp_path / "mattes" / written[0])).shape == (16, 16)
-    sheet = np.asarray(open_picture(tmp_path / "mattes" / "mattes.png")).astype(int)
-    assert (np.abs(sheet - np.array(RED)).sum(-1) < 30).any()
+def test_what_is_outvoted_has_a_red_frame_on_the_sheet(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, size=16)
+    grey, matte = np.full((8, 8, 3), 99, np.uint8), np.full((8, 8), 255, np.uint8)
+    good, bad = CutOut(0, 0, grey, matte, "picture", 0.9), CutOut(1, 0, grey, matte, "picture", 0.3, believed=False)
+
+    def red(*shown: CutOut) -> bool:
+        return bool((np.abs(contact_sheet(scene, shown).astype(int) - np.array(RED)).sum(-1) < 30).any())
+
+    assert red(good, bad) and not red(good, good)
+
+
+def _before_a_plate(opacity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A skin-coloured thing before a noisy, tiled room: picture and plate."""
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[: opacity.shape[0], : opacity.shape[1]]
+    room = np.where((x // 7 + y // 5)[..., None] % 2, (90, 140, 60), (40, 60, 120))
+    image = opacity[..., None] * np.array((200, 150, 120)) + (1 - opacity[..., None]) * room
+    noisy = [one + rng.integers(-3, 4, one.shape) for one in (image, room)]
+    return noisy[0].astype(np.uint8), noisy[1].astype(np.uint8)
+
+
+def test_beside_a_plate_opacity_is_found_along_the_outline() -> None:
+    y, x = np.mgrid[:64, :64]
+    opacity = np.clip((20 - np.hypot(x - 32, y - 32)) / 4 + 0.5, 0, 1)
+    found = from_plate(*_before_a_plate(opacity), PlateParams())
+    assert np.abs(found - opacity).max() < 0.15  # seen: 0.07
+
+
+def test_shadows_and_holes_beside_a_plate_are_none() -> None:
+    """A hole where the subject has the room's colour; a small thing that moved in the room."""
+    y, x = np.mgrid[:64, :64]
+    disc = np.hypot(x - 32, y - 32) < 20
+    image, plate = _before_a_plate((disc & (np.hypot(x - 32, y - 32) > 4) | (np.hypot(x - 5, y - 5) < 3)).astype(float))
+    found = from_plate(image, plate, PlateParams()) > 0.5
+    assert (found & disc).sum() / (found | disc).sum() > 0.97
+
+
+def test_a_picture_of_the_empty_room_has_no_subject() -> None:
+    assert not from_plate(*_before_a_plate(np.zeros((32, 32))), PlateParams()).any()
 
 
 def test_training_cameras_vote_about_all_pictures(tmp_path: Path) -> None:
     scene, ball = make_scene(tmp_path, size=64), _ball(0.33)
     volume = replace(ball, lower=ball.lower + np.array(SPHERE_CENTRE))
-    pictures = wanted_pictures(scene, volume)
+    pictures = wanted_pictures(scene, [volume.frame])
     held = scene.indices("holdout")
     assert {camera for camera, _ in pictures} == set(range(len(scene.cameras)))
     assert sorted(frame for camera, frame in pictures if camera == held[0]) == list(range(scene.num_frames))
     with tqdm(disable=True) as bar:
-        found = find_mattes(scene, volume, pictures, PARAMS, bar)
+        found = from_pictures(scene, volume, pictures, MatteParams(), bar)
     assert [(one.camera, one.frame) for one in found] == pictures
     assert any(one.believed and one.matte.any() and not one.matte.all() for one in found)
 

@@ -1,9 +1,11 @@
-"""Mattes of a scene from its pictures alone: the starting volume says roughly where the subject is, each picture says
-it to the pixel, and the pictures vote."""
+"""Mattes of a scene's pictures: beside clean plates, or from the pictures alone, where the starting volume says roughly
+where the subject is, each picture says it to the pixel, and the pictures vote."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -12,12 +14,17 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import MatteParams
 from facefolds_core.training.mattes.cut_out import cut_out, opacity_in, reduced
+from facefolds_core.training.mattes.plates import from_plate
 from facefolds_core.training.mattes.vote import agreed, outvoted
 from facefolds_core.training.volume.fit import Volume
 
 Image = NDArray[np.uint8]
+Source = Literal["capture", "named", "plate", "picture"]
+"""Whence a matte is: it came with the capture, the user has named it, or it was found."""
+Key = tuple[int, int]
+"""(camera, frame) in the scene."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +34,9 @@ class CutOut:
     Attributes:
         camera, frame: indices in the scene.
         image: (h, w, 3), reduced.
-        matte: (h, w) 1 where the subject is.
-        agreement: IoU with what the training cameras agree on.
+        matte: (h, w) opacity, 0..255.
+        source: whence it is.
+        agreement: IoU with what the training cameras agree on; None where none was asked.
         believed: whether it is not outvoted.
     """
 
@@ -36,33 +44,50 @@ class CutOut:
     frame: int
     image: Image
     matte: Image
-    agreement: float
-    believed: bool
+    source: Source
+    agreement: float | None = None
+    believed: bool = True
 
     def opacity(self, height: int, width: int) -> Image:
         """(height, width) 0..255, with edges as soft as the reduction was coarse."""
-        return np.asarray(cv2.resize(255 * self.matte, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
+        return np.asarray(cv2.resize(self.matte, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
-def wanted_pictures(scene: Scene, volume: Volume, frames: list[int] | None = None) -> list[tuple[int, int]]:
+def wanted_pictures(scene: Scene, frames: Sequence[int]) -> list[Key]:
     """(camera, frame) of the pictures that serve something: of training cameras those that the volume is fitted to,
     of the others all, by which they are scored.
 
     Args:
-        frames: of the volume; by default the one that it was fitted to.
+        frames: of the volume.
     """
-    store, fitted = scene.open_frames(), [volume.frame] if frames is None else frames
-    training = set(scene.indices("train"))
+    store, training = scene.open_frames(), set(scene.indices("train"))
     return [
         (camera, frame)
         for camera in range(len(scene.cameras))
-        for frame in (fitted if camera in training else range(scene.num_frames))
+        for frame in (frames if camera in training else range(scene.num_frames))
         if (camera, frame) in store
     ]
 
 
-def find_mattes(
-    scene: Scene, volume: Volume, pictures: list[tuple[int, int]], params: ExplicitParams, bar: tqdm
+def beside_plates(scene: Scene, pictures: Sequence[Key], params: MatteParams) -> list[CutOut]:
+    """Of those pictures whose cameras have a clean plate."""
+    plates, found = scene.open_plates(), list[CutOut]()
+    for index, frame in pictures:
+        if plates is not None and (index, 0) in plates:
+            image = small(scene, scene.open_frames().image(index, frame), params)
+            opacity = from_plate(image, small(scene, plates.image(index, 0), params), params.plates)
+            found.append(CutOut(index, frame, image, np.rint(255 * opacity).astype(np.uint8), "plate"))
+    return found
+
+
+def small(scene: Scene, image: Image, params: MatteParams) -> Image:
+    """A picture as it is cut out."""
+    camera = reduced(scene.cameras[0], params.cut_out.long_side)
+    return np.asarray(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def from_pictures(
+    scene: Scene, volume: Volume, pictures: Sequence[Key], params: MatteParams, bar: tqdm
 ) -> list[CutOut]:
     """Cut the subject out of each of `pictures`, and let those of training cameras vote.
 
@@ -70,21 +95,18 @@ def find_mattes(
         volume: with the subject alone in it.
         bar: advanced by one a picture.
     """
-    store, training, wanted = scene.open_frames(), set(scene.indices("train")), params.mattes
+    store, training = scene.open_frames(), set(scene.indices("train"))
     cameras, images, cut = list[Camera](), list[Image](), list[Image]()
     for index, frame in pictures:
-        camera = reduced(scene.camera_in_head(index, frame), wanted.cut_out.long_side)
-        size = (camera.width, camera.height)
-        image = np.asarray(cv2.resize(store.image(index, frame), size, interpolation=cv2.INTER_AREA), np.uint8)
-        cameras.append(camera)
-        images.append(image)
-        cut.append(cut_out(image, opacity_in(volume, camera), wanted.cut_out))
+        cameras.append(reduced(scene.camera_in_head(index, frame), params.cut_out.long_side))
+        images.append(small(scene, store.image(index, frame), params))
+        cut.append(cut_out(images[-1], opacity_in(volume, cameras[-1]), params.cut_out))
         bar.update()
     voters = [n for n, (index, frame) in enumerate(pictures) if index in training]
-    hull = agreed(volume, [cameras[n] for n in voters], [cut[n] for n in voters], wanted.vote)
-    mended, agreement = outvoted(hull, cameras, cut, wanted.vote)
-    least = wanted.vote.least * float(np.median(agreement)) if len(agreement) else 0.0
+    hull = agreed(volume, [cameras[n] for n in voters], [cut[n] for n in voters], params.vote)
+    mended, agreement = outvoted(hull, cameras, cut, params.vote)
+    least = params.vote.least * float(np.median(agreement)) if len(agreement) else 0.0
     return [
-        CutOut(*key, image, matte, float(share), bool(share >= least))
+        CutOut(*key, image, 255 * matte, "picture", float(share), bool(share >= least))
         for key, image, matte, share in zip(pictures, images, mended, agreement, strict=True)
     ]

@@ -37,11 +37,12 @@ def _tile(scene: Scene, one: CutOut) -> Image:
     height, width = one.matte.shape
     scale = SIDE / max(height, width)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    matte = one.matte[..., None].astype(np.float32)
+    matte = one.matte[..., None] / np.float32(255)
     image = one.image * matte + np.array(GREEN) * (1 - matte)
     small = cv2.resize(image.astype(np.uint8), size, interpolation=cv2.INTER_AREA)
     canvas = np.ascontiguousarray(small)
-    words = f"{scene.cameras[one.camera].name} {scene.frame_ids[one.frame]} {one.agreement:.2f}"
+    words = f"{scene.cameras[one.camera].name} {scene.frame_ids[one.frame]} {one.source}"
+    words += "" if one.agreement is None else f" {one.agreement:.2f}"
     cv2.putText(canvas, words, (4, size[1] - 6), cv2.FONT_HERSHEY_SIMPLEX, 0.33, WHITE, 1, cv2.LINE_AA)
     if not one.believed:
         cv2.rectangle(canvas, (1, 1), (size[0] - 2, size[1] - 2), RED, 3)

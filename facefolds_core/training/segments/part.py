@@ -16,7 +16,8 @@ from typing import Annotated
 import typer
 from tqdm import tqdm
 
-from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.captures.chosen_mattes import training_scene
+from facefolds_core.captures.scene import Scene
 from facefolds_core.config import read_train
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json, write_text
@@ -80,7 +81,7 @@ def command(
         params = read_train(folders.config)
         if not isinstance(params, ExplicitParams):
             raise UserError("a model without segments", place=f"train.model of {subject}", expected="explicit")
-        scene = read_scene(folders.scene)
+        scene = training_scene(folders)
         made = make_base(folders, scene, params) if part == BASE else make_segment(folders, scene, params, int(part))
         tqdm.write(f"train: {made}")
 

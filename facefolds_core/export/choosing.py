@@ -1,0 +1,156 @@
+"""`auto`: the least of several resolutions that the photos cannot tell from the best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.export.textures import resample
+from facefolds_core.facts import Fact, fact
+from facefolds_core.frame_store import FrameStore
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.params import ChoiceParams, MeshChoiceParams, TextureChoiceParams
+from facefolds_core.rendering import Hits, composite
+from facefolds_core.rendering.raster import cast_layers
+
+Texture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Look:
+    """A picture to compare with.
+
+    Attributes:
+        camera: in the head's own frame.
+        frame: index.
+        photo: (H, W, 3) in [0, 1].
+    """
+
+    camera: Camera
+    frame: int
+    photo: NDArray[np.float64]
+
+
+def looks_of(scene: Scene, params: ChoiceParams) -> tuple[Split, list[Look]]:
+    """Pictures of cameras and frames, evenly spread; those of cameras for validation, where there are any."""
+    split: Split = "validate" if "validate" in scene.splits else "train"
+    store = scene.open_frames()
+    looks = []
+    for camera in _spread(scene.indices(split), params.cameras):
+        for k in _spread([k for k in range(scene.num_frames) if (camera, k) in store], params.frames):
+            looks.append(Look(scene.camera_in_head(camera, k), k, store.image(camera, k) / 255.0))
+    return split, looks
+
+
+def _spread(items: Sequence[int], most: int) -> list[int]:
+    if not items:
+        return []
+    places = np.rint((np.arange(min(most, len(items))) + 0.5) * len(items) / min(most, len(items)) - 0.5)
+    return [items[int(place)] for place in places]
+
+
+Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Colours (1, M, 3) and alpha (1, M) of chosen pixels."""
+
+
+def _least(
+    what: str,
+    candidates: Sequence[int],
+    pictures: Callable[[int], list[Picture]],
+    photos: Sequence[NDArray[np.float64]],
+    params: ChoiceParams,
+) -> tuple[int, dict[str, Any]]:
+    """From the finest down to the first that is not good enough: the one before it, and what was measured.
+
+    Args:
+        pictures: of a candidate, one a look.
+        photos: (M, 3) of each look, at the same pixels.
+    """
+    finest, *coarser = sorted(candidates, reverse=True)
+    best = pictures(finest)
+    seen = [alpha[0] > params.opaque for _, alpha in best]
+
+    def decibels(found: Sequence[Picture], truth: Sequence[NDArray[Any]]) -> float:
+        parts = [(one[0][0] - other)[at] for one, other, at in zip(found, truth, seen, strict=True)]
+        error = float(np.mean(np.concatenate(parts, dtype=np.float64) ** 2)) if sum(map(len, parts)) else 0.0
+        return -10 * float(np.log10(max(error, 1e-10)))
+
+    chosen, psnr, fidelity = finest, {finest: decibels(best, photos)}, {finest: 100.0}
+    for c in coarser:
+        found = pictures(c)
+        psnr[c], fidelity[c] = decibels(found, photos), decibels(found, [rgb[0] for rgb, _ in best])
+        if max(psnr.values()) - psnr[c] > params.within or fidelity[c] < params.fidelity:
+            break
+        chosen = c
+    return chosen, {
+        "what": what,
+        "chosen": chosen,
+        "below": round(max(psnr.values()) - psnr[chosen], 3),
+        "to_finest": round(fidelity[chosen], 2),
+        "tried": sorted(psnr),
+        "psnr": [round(psnr[c], 3) for c in sorted(psnr)],
+        "fidelity": [round(fidelity[c], 2) for c in sorted(psnr)],
+    }
+
+
+def choose_meshes(
+    scene: Scene, ladder: Mapping[int, Sequence[TexturedMesh]], textures: FrameStore, params: MeshChoiceParams
+) -> tuple[int, Fact]:
+    """R^m: the least of `params.candidates` that is good enough, and why.
+
+    Args:
+        ladder: of each candidate the meshes of all layers.
+        textures: as they were sampled.
+    """
+    split, looks = looks_of(scene, params)
+    rng, finest = np.random.default_rng(0), ladder[max(params.candidates)]
+    pixels = [cast_layers(look.camera, finest).choose(rng, params.rays) for look in looks]
+    images = {look.frame: _images(textures, look.frame) for look in looks}
+
+    def pictures(candidate: int) -> list[Picture]:
+        return [
+            composite(cast_layers(look.camera, ladder[candidate]).at(at), images[look.frame])
+            for look, at in zip(looks, pixels, strict=True)
+        ]
+
+    photos = [look.photo.reshape(-1, 3)[at] for look, at in zip(looks, pixels, strict=True)]
+    chosen, found = _least("decimate.resolution", params.candidates, pictures, photos, params)
+    return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
+
+
+def choose_texels(
+    scene: Scene, meshes: Sequence[TexturedMesh], textures: FrameStore, params: TextureChoiceParams
+) -> tuple[int, Fact]:
+    """R^t: the least of `params.candidates` that is good enough, and why; none is finer than the samples.
+
+    Args:
+        meshes: of all layers.
+        textures: as they were sampled.
+    """
+    candidates = sorted({c for c in params.candidates if c < textures.height} | {textures.height})
+    split, looks = looks_of(scene, params)
+    rng, near, photos = np.random.default_rng(0), list[Hits](), list[NDArray[np.float64]]()
+    for look in looks:
+        hits = cast_layers(look.camera, meshes)
+        pixels = hits.choose(rng, params.rays)
+        near.append(hits.at(pixels))
+        photos.append(look.photo.reshape(-1, 3)[pixels])
+    images = {look.frame: _images(textures, look.frame) for look in looks}
+
+    def pictures(candidate: int) -> list[Picture]:
+        small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
+        return [composite(hits, small[look.frame]) for hits, look in zip(near, looks, strict=True)]
+
+    chosen, found = _least("texture.resolution", candidates, pictures, photos, params)
+    return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
+
+
+def _images(textures: FrameStore, frame: int) -> list[Texture]:
+    layers = sorted({layer for layer, _ in textures})
+    return [textures.image(layer, frame) for layer in layers]

@@ -1,0 +1,105 @@
+"""`auto` of R^m and R^t: the least that the photos cannot tell from the best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.export import steps
+from facefolds_core.export.choosing import choose_meshes, choose_texels, looks_of
+from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.params import MeshChoiceParams, TextureChoiceParams, TextureParams
+from facefolds_core.rendering import composite
+from facefolds_core.rendering.raster import cast_layers
+from tests.scenes import make_scene
+
+SIDE = 64
+
+
+def ball(n: int) -> TexturedMesh:
+    """The front half (+x) of a ball of radius 0.3 as n x n vertices; s and t along y and z."""
+    angles = np.linspace(-1.2, 1.2, n)
+    z, y = np.meshgrid(angles[::-1], angles, indexing="ij")
+    points = 0.3 * np.stack([np.cos(y) * np.cos(z), np.sin(y) * np.cos(z), np.sin(z)], -1)
+    st = np.stack([(y + 1.2) / 2.4, (1.2 - z) / 2.4], -1)
+    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+    faces = np.concatenate([np.stack([a, a + n, a + 1], -1), np.stack([a + 1, a + n, a + n + 1], -1)])
+    return TexturedMesh(
+        points.reshape(-1, 3).astype(np.float32), faces.astype(np.int32), st.reshape(-1, 2).astype(np.float32)
+    )
+
+
+def stripes(period: float) -> NDArray[np.uint8]:
+    """(SIDE, SIDE, 4) opaque, waves of so many texels."""
+    wave = 127.5 + 100 * np.sin(2 * np.pi * np.arange(SIDE) / period)
+    image = np.full((SIDE, SIDE, 4), 255, np.uint8)
+    image[..., :3] = np.rint(wave)[None, :, None]
+    return image
+
+
+@dataclass(frozen=True)
+class Filmed:
+    scene: Scene
+    textures: FrameStore
+
+
+def film(folder: Path, period: float, noise: float = 0.0) -> Filmed:
+    """Photos of the ball with waves of so many texels, and its texture; with noise on the photos (of 255)."""
+    scene, texture = make_scene(folder, cameras=5, size=96, frames=1), stripes(period)
+    write_frames(folder / "textures.arrow", (SIDE, SIDE, 4), [(0, 0, texture)])
+    rng = np.random.default_rng(1)
+    rows = []
+    for i, camera in enumerate(scene.cameras):
+        photo = 255 * composite(cast_layers(camera, [ball(64)]), [texture])[0]
+        rows.append((i, 0, np.rint(photo + rng.normal(0, noise, photo.shape)).clip(0, 255).astype(np.uint8)))
+    write_frames(folder / "frames.arrow", rows[0][2].shape, rows)
+    return Filmed(scene, FrameStore(folder / "textures.arrow"))
+
+
+TEXELS = TextureChoiceParams(candidates=(16, 32, 48, 64))
+
+
+@pytest.mark.parametrize("period, least", [(32.0, 32), (16.0, 48), (5.0, 64)])
+def test_textures_are_no_finer_than_what_they_show(tmp_path: Path, period: float, least: int) -> None:
+    filmed = film(tmp_path, period, noise=20.0)
+    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)[0] == least
+
+
+def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path) -> None:
+    filmed = film(tmp_path, 8.0, noise=60.0)
+    loose = TEXELS.model_copy(update={"fidelity": 0.0})
+    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, loose)[0] == 32
+    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)[0] == 64
+
+
+def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path) -> None:
+    filmed = film(tmp_path, 16.0, noise=20.0)
+    params = MeshChoiceParams(candidates=(8, 16, 32, 64), fidelity=35.0)
+    ladder = {n: [ball(n)] for n in (8, 16, 32, 64)}
+    chosen, why = choose_meshes(filmed.scene, ladder, filmed.textures, params)
+    flat = {n: [ball(4)] for n in (8, 16, 32)} | {64: [ball(64)]}
+    assert chosen == 32
+    assert choose_meshes(filmed.scene, flat, filmed.textures, params)[0] == 64
+    assert f"took {chosen} of" in str(why) and "split train" in str(why)
+
+
+def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path) -> None:
+    scene = film(tmp_path, 16.0).scene
+    params = TextureChoiceParams(cameras=3)
+    split, looks = looks_of(scene, params)
+    assert split == "train" and len(looks) == 3
+    checked = replace(scene, splits=("train", "validate", "holdout", "train", "train"))
+    split, looks = looks_of(checked, params)
+    assert split == "validate" and [look.camera.name for look in looks] == ["cam1"]
+
+
+def test_numbers_fix_both(tmp_path: Path) -> None:
+    filmed = film(tmp_path, 32.0)
+    size, why = steps.texels_for(filmed.scene, [ball(8)], filmed.textures.path, TextureParams(resolution=40))
+    assert (size, why) == (40, None)

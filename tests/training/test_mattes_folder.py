@@ -1,0 +1,120 @@
+"""data/SUBJECT/mattes: whose mattes are found, which train, which are scored by."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.captures.chosen_mattes import scored_scene, training_scene
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
+from facefolds_core.params import ExplicitParams, MatteParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.mattes.folder import make_mattes
+from tests.scenes import make_scene
+
+SIZE = 16
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> SubjectFolders:
+    return SubjectFolders(tmp_path / "me")
+
+
+@pytest.fixture
+def scene(folders: SubjectFolders) -> Scene:
+    """With a matte of 50 of the first camera's first frame, and a clean plate of its second camera."""
+    made = make_scene(folders.scene, size=SIZE)
+    write_frames(made.folder / "mattes.arrow", (SIZE, SIZE, 1), [(0, 0, _grey(50))])
+    write_frames(made.folder / "plates.arrow", (SIZE, SIZE, 3), [(1, 0, np.zeros((SIZE, SIZE, 3), np.uint8))])
+    return made
+
+
+def _grey(value: int, size: int = SIZE) -> np.ndarray:
+    return np.full((size, size, 1), value, np.uint8)
+
+
+def _name(folder: Path, scene: Scene, camera: int, frame: int | None, value: int, shape: tuple[int, int]) -> Path:
+    name = scene.cameras[camera].name
+    path = folder / (f"{name}.png" if frame is None else f"{name}/{scene.frame_ids[frame]}.png")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.full(shape, value, np.uint8)).save(path)
+    return folder
+
+
+def _make(scene: Scene, folders: SubjectFolders, named: Path | None = None, **params: str) -> None:
+    make_mattes(scene, folders.mattes, MatteParams.model_validate(params), ExplicitParams(), named)
+
+
+def _values(scene: Scene) -> dict[tuple[int, int], int]:
+    store = scene.open_mattes()
+    return {} if store is None else {key: int(store.image(*key)[5, 5, 0]) for key in store}
+
+
+def test_by_default_the_scenes_own_train_and_nothing_is_stored_twice(scene: Scene, folders: SubjectFolders) -> None:
+    assert _values(training_scene(folders)) == {(0, 0): 50}
+    _make(scene, folders)
+    assert _values(training_scene(folders)) == _values(scored_scene(folders)) == {(0, 0): 50}
+    assert sorted(path.name for path in folders.mattes.iterdir()) == ["mattes.json", "sheet.png", "training"]
+
+
+def test_a_scene_without_any_has_an_empty_folder(folders: SubjectFolders) -> None:
+    _make(make_scene(folders.scene, size=SIZE), folders)
+    assert sorted(path.name for path in folders.mattes.rglob("*")) == ["mattes.json", "training", "use.json"]
+    assert _values(training_scene(folders)) == _values(scored_scene(folders)) == {}
+
+
+def test_named_ones_stand_above_all_others_and_train(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
+    named = _name(tmp_path / "named", scene, 0, 0, 200, (SIZE, SIZE))
+    _name(named, scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # for all frames, of another size
+    _make(scene, folders, named)
+    wanted = {(0, 0): 200, **{(2, k): 150 for k in range(scene.num_frames)}}
+    assert _values(training_scene(folders)) == _values(scored_scene(folders)) == wanted
+
+
+@pytest.mark.parametrize("train", ["none", "given", "all"])
+def test_which_train(scene: Scene, folders: SubjectFolders, train: str) -> None:
+    _make(scene, folders, method="plates", train=train)
+    assert {camera for camera, _ in _values(scored_scene(folders))} == {0, 1}
+    trained = {camera for camera, _ in _values(training_scene(folders))}
+    assert trained == {"none": set(), "given": {0}, "all": {0, 1}}[train]
+
+
+def test_what_is_found_changes_nothing_that_training_reads(scene: Scene, folders: SubjectFolders) -> None:
+    """By DVC: `train` depends on this folder."""
+
+    def read() -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in (folders.mattes / "training").iterdir()}
+
+    _make(scene, folders)
+    before = read()
+    _make(scene, folders, method="plates")
+    assert read() == before
+
+
+def test_each_found_one_is_a_picture_to_correct(scene: Scene, folders: SubjectFolders) -> None:
+    _make(scene, folders, method="plates")
+    written = [path.relative_to(folders.mattes).as_posix() for path in folders.mattes.glob("*/*.png")]
+    told = json.loads((folders.mattes / "mattes.json").read_text())["pictures"]
+    assert sorted(written) == sorted(f"{one['camera']}/{one['frame']}.png" for one in told)
+    assert {one["source"] for one in told} == {"plate"}
+
+
+@pytest.mark.parametrize("place", ["nowhere", "empty"])
+def test_a_folder_without_mattes_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path, place: str) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="no mattes"):
+        _make(scene, folders, tmp_path / place)
+    assert not folders.mattes.exists()
+
+
+def test_a_named_one_of_another_shape_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
+    named = _name(tmp_path / "named", scene, 2, None, 0, (SIZE, SIZE // 2))
+    with pytest.raises(UserError, match="another shape") as caught:
+        _make(scene, folders, named)
+    assert scene.cameras[2].name in str(caught.value)
