@@ -35,6 +35,9 @@ class CaptureParams(Section):
     head_motion: Annotated[float, Field(ge=0, le=45)] = 0.0
     """Degrees by which the head turns to each side as it performs, with a nod and a lean of half as much."""
 
+    clutter: Share = 0.0
+    """Of her room's walls, 0 as painted, 1 tiles of random colours at full contrast: what is hard behind a head."""
+
     seed: Seed = 0
     """Of the procedural skin, freckles and hair."""
 

@@ -31,7 +31,7 @@ def frame_times(params: CaptureParams) -> NDArray[np.float64]:
 
 def options_of(params: CaptureParams) -> ActorOptions:
     """What the parameters say of the actor."""
-    return ActorOptions(head_motion=math.radians(params.head_motion))
+    return ActorOptions(head_motion=math.radians(params.head_motion), clutter=params.clutter)
 
 
 def frame_name(position: int) -> str:

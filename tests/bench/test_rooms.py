@@ -1,0 +1,60 @@
+"""Rooms: what is withheld, what is kept, what is not measured again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from bench import rooms
+from bench.results import Found, Store
+from bench.run import Project
+from facefolds_core.captures.actor import make_rig
+from facefolds_core.files import write_json
+from facefolds_core.params import CaptureParams
+from tests.bench.test_commands import invoke
+
+
+@pytest.mark.parametrize("count", [8, 12, 22])
+def test_cameras_that_are_left_are_spread_and_none_is_held_out(count: int) -> None:
+    left_out = rooms.aside(count)
+    rig = {camera.name: camera for camera in make_rig(CaptureParams()).cameras}
+    assert len(left_out) == 22 - count and not {"A011", "A023"} & set(left_out)
+    kept = [rig[name].centre[0] for name in rig if name not in {*left_out, "A011", "A023"}]
+    assert np.ptp(kept) > 1700  # mm: the outermost to both sides are kept
+
+
+def _measured(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """Stand-ins for stages and pictures; the subjects that were run."""
+    ran = list[dict[str, Any]]()
+
+    def stages(project: Project, *_: str) -> None:
+        ran.append(yaml.safe_load((project.root / "params.yaml").read_text())["subjects"]["actor"])
+        cost = {"mesh_bytes": 1000, "texture_bytes": 2000, "train_seconds": 3.0}
+        write_json(project.folders.metrics, {"asset": dict.fromkeys(rooms.FIGURES, 20.0), "cost": cost})
+
+    monkeypatch.setattr(Project, "run", stages)
+    monkeypatch.setattr(rooms, "read_asset", lambda _: None)
+    monkeypatch.setattr(rooms, "strip", lambda *_: np.zeros((4, 4, 3), np.uint8))
+    return ran
+
+
+def test_plates_are_withheld_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = _measured(monkeypatch)
+    for name in ("KRT", "plates"):
+        (tmp_path / "captures" / "studio" / name).mkdir(parents=True)
+    for name in ("studio", "studio, no plates"):
+        rooms.run(name, tmp_path, tmp_path / "captures")
+    assert [sorted(p.name for p in Path(subject["path"]).iterdir()) for subject in ran] == [["KRT", "plates"], ["KRT"]]
+
+
+def test_what_was_measured_is_not_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = _measured(monkeypatch)
+    for only in ("plain room", "plain room; clutter", "nowhere"):
+        said = invoke(rooms.main, str(tmp_path), "--only", only)
+    assert said.exit_code != 0 and "no such room" in said.output
+    assert [subject["capture"].get("clutter") for subject in ran] == [None, 1.0]
+    assert [one.room for one in Store(tmp_path / "rooms.json", "rooms", Found).read()] == ["plain room", "clutter"]
