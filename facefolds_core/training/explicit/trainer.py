@@ -54,7 +54,7 @@ class Trainer:
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses is not None)
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses)
         self.logged: list[tuple[int, float, int]] = []
         self.keep: Callable[[Trainer, Attempt], None] | None = None
 
