@@ -2,17 +2,19 @@
 
 python -m bench.takes FOLDER [--frames 60,240,960]
 
-The actor is filmed in small pictures, 40 frames a second. Each stage runs in a process of its own; two more fit
+The actor is filmed in small pictures, at a rate at which no two frames of her loop are alike: equal ones are
+trained once. Each stage runs in a process of its own; two more fit
 segments. Memory is anonymous memory, of the process and its children together, at most: pages of mapped files can be
 taken back at any time, and are not counted. The shortest take is made once before, so that nothing is compiled while it
-is measured. At the end one frame in the middle of the longest take is changed, and its stages run once more: what did
-not change is taken over.
+is measured. At the end one frame in the middle of the longest take is changed, and its stages run once more, with the
+key frames of the first run (`train.segments.named`): what did not change is taken over.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +23,18 @@ from typing import Annotated, Any
 import numpy as np
 import psutil
 import typer
+import yaml
 from PIL import Image
 
 from bench.run import Project
 from bench.tables import markdown
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import write_json
+from facefolds_core.files import read_json, write_json
 from facefolds_core.params import STAGE_SECTIONS, merged
 from facefolds_core.pictures import open_picture
+
+RATE = 40.0618
+"""Frames a second: 160.2472 a loop of 4 s."""
 
 WATCH = 0.1
 """Seconds between two looks at a stage's memory."""
@@ -95,7 +101,7 @@ def measure(folder: Path, frames: int) -> dict[str, Watched]:
     project = Project(folder / f"frames{frames}", "take")
     subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 6}}
     project.write(
-        merged({"subjects": {"take": subject}, **PARAMS}, {"capture": {"frames": frames, "seconds": frames / 40}})
+        merged({"subjects": {"take": subject}, **PARAMS}, {"capture": {"frames": frames, "seconds": frames / RATE}})
     )
     project.run("configure")
     found = {}
@@ -105,11 +111,12 @@ def measure(folder: Path, frames: int) -> dict[str, Watched]:
     return found
 
 
-def change_frame(project: Project) -> str:
-    """Move what all cameras show in one frame, in the middle of the take, by a pixel; returns its name."""
+def change_frame(project: Project, keys: Collection[str]) -> str:
+    """Move what all cameras show in one frame, in the middle of the take and not among `keys`, by a pixel; returns its
+    name."""
     pictures = sorted((project.folders.capture / "images").rglob("*.png"))
     names = sorted({path.stem for path in pictures})
-    name = names[len(names) // 2]
+    name = next(name for name in names[len(names) // 2 :] if name not in keys)
     for path in (path for path in pictures if path.stem == name):
         Image.fromarray(np.roll(np.asarray(open_picture(path)), 1, 1)).save(path)
     return name
@@ -118,7 +125,11 @@ def change_frame(project: Project) -> str:
 def again(folder: Path, frames: int, first: dict[str, Watched]) -> str:
     """A row a stage: processor time of the first run, and after a frame was changed."""
     project = Project(folder / f"frames{frames}", "take")
-    changed, rows = change_frame(project), []
+    keys = read_json(project.folders.model / "fit.json")["key_frames"]
+    params = yaml.safe_load((project.root / "params.yaml").read_text(encoding="utf-8"))
+    project.write(merged(params, {"train": {"segments": {"named": keys}}}))
+    project.run("configure")
+    changed, rows = change_frame(project, keys), []
     for stage in STAGE_SECTIONS[1:]:
         seconds = watched(project, stage).processor
         rows.append([stage, f"{first[stage].processor:.1f}", f"{seconds:.1f}"])

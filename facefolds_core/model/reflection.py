@@ -61,11 +61,13 @@ class Reflection(nn.Module):
         )
         return ReflectionMaps(window, gloss, offset, normals, environment)
 
-    def added(self, st: Tensor, directions: Tensor) -> Tensor:
-        """[P, 3] to be added to colours at st [P, 2] over the window, seen along unit directions [P, 3]."""
+    def added(self, st: Tensor, directions: Tensor, to_room: Tensor | None = None) -> Tensor:
+        """[P, 3] to be added to colours at st [P, 2] over the window, seen along unit directions [P, 3]; `to_room`
+        [3, 3] turns the head's axes to those of the room, which E is fixed to (None: they are the same)."""
         maps = torch.cat([self.gloss[..., None], self.offset, self.normals], -1)
         found = _sampled(maps, st)
-        light = _sampled(self.environment, sphere_position(reflected(directions, normalize(found[:, 4:], dim=-1))))
+        r = reflected(directions, normalize(found[:, 4:], dim=-1))
+        light = _sampled(self.environment, sphere_position(r if to_room is None else r @ to_room.T))
         return found[:, :1] * light - found[:, 1:4]
 
 

@@ -41,6 +41,9 @@ class ReflectionParams(Section):
     frames: Count = 3
     """Frames whose mean is looked at, at most: gloss does not follow expressions."""
 
+    moving_frames: Count = 8
+    """Of a head that turns, frames that are looked at one by one, at most: in each the light comes from elsewhere."""
+
     rays: Count = 300_000
     """Looked at in a fit, at most: some hundred for each unknown."""
 

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.sphere_uv import uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.model.grids import GridTextures
 
 Image = NDArray[np.float32]
 
@@ -24,10 +26,11 @@ class ModelView:
 
     Args:
         model: in evaluation mode.
-        camera: rays through its pixel centres.
+        camera: rays through its pixel centres, in the model's axes.
+        to_room: (3, 3) rotation from these to the axes of the room, which reflected light is fixed to; None for none.
     """
 
-    def __init__(self, model: RadianceManifolds, camera: Camera) -> None:
+    def __init__(self, model: RadianceManifolds, camera: Camera, to_room: NDArray[np.float64] | None = None) -> None:
         device = model.centre.device
         rays = [torch.tensor(np.reshape(part, (-1, 3)), dtype=torch.float32, device=device) for part in camera.rays()]
         crossings = model.crossings(*rays)
@@ -37,6 +40,7 @@ class ModelView:
         self._ray, self._layer = crossings.hit.nonzero(as_tuple=True)
         self._uv = model.chart.uv(crossings.points[self._ray, self._layer])[0]
         self._directions = rays[1]
+        self._to_room = None if to_room is None else torch.tensor(to_room, dtype=torch.float32, device=device)
 
     @torch.no_grad()
     def render(self, time: float) -> tuple[Image, Image, Image]:
@@ -62,10 +66,21 @@ class ModelView:
         pieces = zip(*(t.split(CROSSINGS_AT_ONCE) for t in (self._uv, self._layer, self._ray)), strict=True)
         for uv, layer, ray in pieces:
             times = torch.full((len(uv),), float(time), dtype=uv.dtype, device=uv.device)
-            shaded = self._model.textures.shade(uv, layer, times, self._directions[ray])
-            view = torch.zeros_like(shaded.alpha[:, None]) if shaded.added is None else shaded.added
+            textures, directions = self._model.textures, self._directions[ray]
+            turned = self._to_room is not None and isinstance(textures, GridTextures)
+            shaded = textures.shade(uv, layer, times, None if turned else directions)
+            added = self._turned(uv, directions) if turned else shaded.added
+            view = torch.zeros_like(shaded.alpha[:, None]) if added is None else added
             parts.append((shaded.rgb, view, shaded.alpha))
         return parts
+
+    def _turned(self, uv: Tensor, directions: Tensor) -> Tensor | None:
+        """[P, 3] of the reflection, its light turned with the room."""
+        textures = self._model.textures
+        assert isinstance(textures, GridTextures)
+        if textures.reflection is None:
+            return None
+        return textures.reflection.added(uv_to_st(uv, textures.window), directions, self._to_room)
 
     def _sum(self, colours: Tensor) -> Image:
         """Add up the crossings' colours [P, 3] of each pixel."""

@@ -52,7 +52,8 @@ class PosedView:
         camera = self._camera if self._poses is None else self._poses.camera(self._camera, frame)
         # Without gradients layers are crossed by compiled code: in each frame anew torch's own would take minutes.
         with nullcontext() if self._poses is None else torch.no_grad():
-            self.model = ModelView(self._model, camera)
+            to_room = None if self._poses is None else self._poses.at(frame).rotation
+            self.model = ModelView(self._model, camera, to_room)
 
     def _turn_asset(self, frame: int) -> None:
         time = frame * self._step

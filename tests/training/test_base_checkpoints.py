@@ -94,3 +94,17 @@ def test_a_damaged_checkpoint_is_none(
     with counted() as steps:
         assert make(scene, plan, tmp_path, **OFTEN) == expected
     assert len(steps) == STEPS
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_another_base_than_before_is_said(
+    before: int, whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A changed frame that is chosen as a key frame trains all others anew, too."""
+    scene, plan, _ = whole
+    for number in range(before):
+        (tmp_path / f"base-{number}").mkdir()
+    training = "facefolds_core.training.segments.loop.train_base"
+    with patch(training, side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
+        base_of(plan, scene, params(), tmp_path, tmp_path / "log")
+    assert ("train.segments.named" in capsys.readouterr().out) == bool(before)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 import pytest
 import torch
+from scipy.spatial.transform import Rotation
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
@@ -44,13 +47,27 @@ def _rays(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return rng.random((count, 2), np.float32), along.astype(np.float32)
 
 
-def test_compiled_reflection_is_that_of_the_model() -> None:
+def _looked(st: np.ndarray, along: np.ndarray, turns: np.ndarray | None = None) -> Seen:
+    """Opaque rays that show nothing."""
+    return Seen(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), np.zeros_like(along), turns)
+
+
+def _turns(count: int) -> np.ndarray:
+    """(count, 3, 3) of a head that nods and turns by up to 20 degrees."""
+    angles = np.random.default_rng(4).uniform(-0.35, 0.35, (count, 3))
+    return np.asarray(Rotation.from_euler("xyz", angles).as_matrix(), np.float32)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_compiled_reflection_is_that_of_the_model(turned: bool) -> None:
     """Turned-away normals included: there the direction goes on."""
-    maps = _random_maps(shape=(5, 7))
+    maps, turn = _random_maps(shape=(5, 7)), _turns(1)
     st, along = _rays(2000)
     along[::5] *= -1
-    expected = maps.model().added(torch.from_numpy(st), torch.from_numpy(along))
-    torch.testing.assert_close(torch.from_numpy(maps.added(st, along)), expected.detach(), atol=2e-5, rtol=0)
+    to_room = torch.from_numpy(turn[0]) if turned else None
+    expected = maps.model().added(torch.from_numpy(st), torch.from_numpy(along), to_room)
+    found = maps.added(_looked(st, along, np.repeat(turn, 2000, 0) if turned else None))
+    torch.testing.assert_close(torch.from_numpy(found), expected.detach(), atol=2e-5, rtol=0)
 
 
 def test_a_mirror_before_the_face_shows_what_is_behind_the_eye() -> None:
@@ -104,22 +121,22 @@ def _start(truth: Maps) -> Maps:
     return Maps(blank.gloss, blank.offset, truth.normals, blank.environment)
 
 
-def _seen(maps: Maps, strength: float, noise: float = 0.01) -> Seen:
+def _seen(maps: Maps, strength: float, noise: float = 0.01, turned: bool = False) -> Seen:
     """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
-    st, along = _rays(20_000)
-    rng = np.random.default_rng(2)
-    known = centred(maps, Seen(np.zeros(len(st), np.int32), along, st, np.ones(len(st), np.float32), along), PARAMS)
-    residual = strength * known.added(st, along) + noise * rng.standard_normal((len(st), 3)).astype(np.float32)
-    camera = (np.arange(len(st)) % 8).astype(np.int32)
-    return Seen(camera, along, st, np.ones(len(st), np.float32), residual.astype(np.float32))
+    looked = _looked(*_rays(20_000), _turns(20_000) if turned else None)
+    rng, count = np.random.default_rng(2), len(looked.st)
+    known = centred(maps, looked, PARAMS)
+    residual = strength * known.added(looked) + noise * rng.standard_normal((count, 3)).astype(np.float32)
+    return replace(looked, camera=(np.arange(count) % 8).astype(np.int32), residual=residual.astype(np.float32))
 
 
-def test_a_known_reflection_is_found() -> None:
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_known_reflection_is_found(turned: bool) -> None:
     truth = _random_maps(3)
-    seen = _seen(truth, 0.2)
+    seen = _seen(truth, 0.2, turned=turned)
     start = _start(truth)
     found = centred(fit_maps(seen, start, 12, PARAMS), seen, PARAMS)
-    left = seen.residual - found.added(seen.st, seen.directions)
+    left = seen.residual - found.added(seen)
     noise = 1e-4
     assert left.var() - noise < 0.1 * (seen.residual.var() - noise)  # seen: 0.07
     assert found.gloss.min() >= 0
@@ -130,7 +147,7 @@ def test_light_begins_at_nothing_and_the_sum_stays() -> None:
     lit = Maps(maps.gloss, maps.offset, maps.normals, maps.environment - np.float32(0.7))
     found = grounded(lit)
     assert found.environment.min() == 0
-    np.testing.assert_allclose(found.added(st, along), lit.added(st, along), atol=1e-5)
+    np.testing.assert_allclose(found.added(_looked(st, along)), lit.added(_looked(st, along)), atol=1e-5)
 
 
 @pytest.mark.parametrize("strength, helps", [(0.2, True), (0.0, False)])
@@ -139,6 +156,14 @@ def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool
     truth = _random_maps(3)
     start = _start(truth)
     assert (gain_on_cameras(_seen(truth, strength), start, PARAMS) >= PARAMS.min_gain) == helps
+
+
+def test_light_that_stays_with_the_room_is_not_taken_for_the_heads() -> None:
+    """Of a head that turns, a fit that lets the light turn with it explains less on cameras that it did not see."""
+    truth = _random_maps(3)
+    seen, start = _seen(truth, 0.2, turned=True), _start(truth)
+    gains = [gain_on_cameras(rays, start, PARAMS) for rays in (seen, replace(seen, turns=None))]
+    assert gains[0] > gains[1] + 1  # dB
 
 
 def test_the_fit_does_not_depend_on_threads() -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
+from facefolds_core.geometry.track import Track
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit.plan import Level
@@ -33,11 +34,15 @@ class GlossFit:
     Attributes:
         maps: as fitted last; None before the first fit, and where there is no reflection.
         on: whether there is one.
+
+    Args:
+        poses: of a head that turns, in the frames of the training. It has a reflection at the end alone (`begin`): that
+            of each ray is another one in each frame, and textures are trained without.
     """
 
-    def __init__(self, chart: Chart, window: Window, params: ReflectionParams, turns: bool) -> None:
-        self.chart, self.window, self.params = chart, window, params
-        self.on = params.enabled and not turns
+    def __init__(self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None) -> None:
+        self.chart, self.window, self.params, self.poses = chart, window, params, poses
+        self.on = params.enabled and (poses is None or params.begin == "end")
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
@@ -97,12 +102,26 @@ class GlossFit:
         return None if self.maps is None else self.maps.model()
 
     def _look(self, state: TextureState, source: Rays, images: Images) -> Seen:
+        if self.poses is not None:
+            return self._look_in_turns(state, source, images, self.poses)
         views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
         frames = sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.frames)})
         for frame in frames:
             state.look(views, images.frame(frame), frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames))
+
+    def _look_in_turns(self, state: TextureState, source: Rays, images: Images, poses: Track) -> Seen:
+        """Of some rays of each of some frames: in each one the room shines from elsewhere."""
+        found = []
+        for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.moving_frames)}):
+            views, _ = source.part(frame, 0, 1)
+            sums = np.zeros((len(views.pixel), 6), np.float32)
+            state.look(views, images.frame(frame), frame, sums)
+            turn = poses.at(frame).rotation
+            seen = Seen.of(views.camera, views.directions, sums, 1, np.asarray(turn, np.float32))
+            found.append(seen.part(np.flatnonzero(seen.opacity >= self.params.min_opacity)))
+        return Seen.together(found)
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
@@ -112,10 +131,11 @@ class GlossFit:
 
     def _shine(self, state: TextureState, seen: Seen) -> None:
         assert self.maps is not None
-        state.shine = self.maps.added(seen.st, seen.directions)
+        if self.poses is None:
+            state.shine = self.maps.added(seen)
 
 
 def _views(source: Rays) -> Views:
     """The rays of a head that stands still, the same in all frames."""
-    assert isinstance(source, StillRays)  # a head that turns has no reflection yet
+    assert isinstance(source, StillRays)
     return source.views

@@ -12,7 +12,8 @@ with. Whether there is any is asked of cameras that a fit did not see.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, texel_uv
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
-from facefolds_core.training.explicit.reflection_kernel import normal_equations, reflect, sample
+from facefolds_core.training.explicit.reflection_kernel import normal_equations, reflect, reflect_turned, sample
 
 Array = NDArray[np.float32]
 
@@ -36,11 +37,12 @@ class Seen:
 
     Attributes:
         camera: (P,).
-        directions: (P, 3) unit vectors, in the frame that the room is fixed to. (Where a head that moves is held still,
-            the room turns around it: its directions are turned back here, and in `Reflection.added`.)
+        directions: (P, 3) unit vectors in the head's frame.
         st: (P, 2) place of what shows.
         opacity: (P,).
         residual: (P, 3) photo minus rendering without reflections.
+        turns: (P, 3, 3) of each ray from the head's axes to those of the room, which the light is fixed to; None where
+            the head stands still.
     """
 
     camera: NDArray[np.int32]
@@ -48,13 +50,23 @@ class Seen:
     st: Array
     opacity: Array
     residual: Array
+    turns: Array | None = None
 
     @classmethod
-    def of(cls, camera: NDArray[np.int32], directions: Array, sums: Array, frames: int) -> Seen:
-        """From the sums (P, 6) of `reflection_kernel.look` over some frames."""
+    def of(
+        cls, camera: NDArray[np.int32], directions: Array, sums: Array, frames: int, turn: Array | None = None
+    ) -> Seen:
+        """From the sums (P, 6) of `reflection_kernel.look` over some frames; `turn`: (3, 3) of all its rays."""
         st = np.asarray(sums[:, 4:] / np.maximum(sums[:, 3:4], 1e-6), np.float32)
         mean = np.asarray(sums / frames, np.float32)
-        return cls(camera, directions, st, mean[:, 3], mean[:, :3])
+        turns = None if turn is None else np.repeat(turn[None].astype(np.float32), len(st), 0)
+        return cls(camera, directions, st, mean[:, 3], mean[:, :3], turns)
+
+    @classmethod
+    def together(cls, parts: Sequence[Seen]) -> Seen:
+        """The rays of several, which all have turns."""
+        names = [field.name for field in fields(cls)]
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
     def part(self, chosen: NDArray[Any]) -> Seen:
         return Seen(
@@ -63,6 +75,7 @@ class Seen:
             self.st[chosen],
             self.opacity[chosen],
             self.residual[chosen],
+            None if self.turns is None else self.turns[chosen],
         )
 
 
@@ -86,15 +99,19 @@ class Maps:
             *(np.full(s, v, np.float32) for s, v in (((h, w), 1), ((h, w, 3), 0), ((h, w, 3), 1), ((e, e, 3), 0)))
         )
 
-    def positions(self, st: Array, directions: Array) -> Array:
+    def positions(self, seen: Seen) -> Array:
         """(P, 2) in the environment."""
-        out = np.empty((len(st), 2), np.float32)
-        reflect(np.ascontiguousarray(st), np.ascontiguousarray(directions), self.normals, out)
+        out = np.empty((len(seen.st), 2), np.float32)
+        st, directions = np.ascontiguousarray(seen.st), np.ascontiguousarray(seen.directions)
+        if seen.turns is None:
+            reflect(st, directions, self.normals, out)
+        else:
+            reflect_turned(st, directions, np.ascontiguousarray(seen.turns), self.normals, out)
         return out
 
-    def added(self, st: Array, directions: Array) -> Array:
+    def added(self, seen: Seen) -> Array:
         """(P, 3), as `Reflection.added`."""
-        light = values_at(self.environment, self.positions(st, directions))
+        light, st = values_at(self.environment, self.positions(seen)), seen.st
         return np.asarray(values_at(self.gloss[..., None], st) * light - values_at(self.offset, st), np.float32)
 
     def model(self) -> Reflection:
@@ -130,7 +147,7 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> 
     """Gloss, offset and environment that explain the residuals; the normals are those of `start`."""
     o, clip = seen.opacity, params.max_residual
     wanted = seen.residual.clip(-clip, clip)
-    places = start.positions(seen.st, seen.directions)
+    places = start.positions(seen)
     gloss, offset, environment = start.gloss, start.offset, start.environment
     for _ in range(rounds):
         reflecting = o * values_at(gloss[..., None], seen.st)[:, 0]
@@ -157,9 +174,7 @@ def grounded(maps: Maps) -> Maps:
 
 def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
     """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
-    light = values_at(maps.environment, maps.positions(seen.st, seen.directions)) * values_at(
-        maps.gloss[..., None], seen.st
-    )
+    light = values_at(maps.environment, maps.positions(seen)) * values_at(maps.gloss[..., None], seen.st)
     weight = seen.opacity**2
     offset = _solve(seen.st, weight, weight[:, None] * light, maps.gloss.shape, params.gloss_smoothness)
     return replace(maps, offset=offset)
@@ -174,7 +189,7 @@ def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
             continue
         maps = fit_maps(seen.part(~out), start, params.first_rounds, params)
         unseen = seen.part(out)
-        added = unseen.opacity[:, None] * maps.added(unseen.st, unseen.directions)
+        added = unseen.opacity[:, None] * maps.added(unseen)
         clipped = unseen.residual.clip(-params.max_residual, params.max_residual).astype(np.float64)
         before += float((clipped**2).sum())
         after += float(((clipped - added) ** 2).sum())

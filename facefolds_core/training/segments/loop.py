@@ -189,6 +189,11 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
     place = folder / f"base-{plan.base}"
     if not place.exists():
         tqdm.write(f"train: the base of {len(plan.keys)} key frames first")
+        if any(other.is_dir() for other in folder.glob("base-*")):
+            tqdm.write(
+                "train: it is another one than before (other key frames, pictures, parameters or code), and all frames "
+                "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
+            )
         train_base(scene, list(plan.keys), params, place, log)
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)

@@ -1,0 +1,67 @@
+"""The reflection of a head that turns: its light stays with the room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.model import RadianceManifolds
+from facefolds_core.model.grids import GridTextures
+from facefolds_core.model.reflection import Reflection, ReflectionShape
+from facefolds_core.params import ExplicitParams, train_params
+from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.training.explicit.loop import fit_explicit
+from tests.geometry.test_track import about
+from tests.scenes import make_scene
+from tests.training.test_moving import TURNED, layers
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    return make_scene(tmp_path_factory.mktemp("moving") / "scene", size=24, surface_radius=0.33)
+
+
+def model() -> RadianceManifolds:
+    """Opaque layers that mirror a room which is light to the left alone."""
+    reflection = Reflection(ReflectionShape((2, 2), 4))
+    textures = GridTextures((-0.6, 0.6, -0.6, 0.6), (4, 4), 3, 1, reflection)
+    with torch.no_grad():
+        textures.layers[..., 3] = 5.0
+        reflection.gloss.fill_(0.5)
+        reflection.normals.copy_(torch.tensor([1.0, 0, 0]))
+        reflection.environment[:, 2:] = 1.0
+    return RadianceManifolds(layers(), textures).eval()
+
+
+def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
+    """A quarter turn to its left, and to its right: what it has before it is what the room has there."""
+    camera, turned = scene.cameras[scene.indices("train")[0]], about((0, 0, 1), 90)
+    pictures = [ModelView(model(), camera, to_room).render(0) for to_room in (None, np.eye(3), turned, turned.T)]
+    brightness = [float(picture[0].mean()) for picture in pictures]
+    np.testing.assert_array_equal(pictures[0][0], pictures[1][0])
+    assert brightness[2] > 2 * brightness[3]
+    assert all(np.array_equal(picture[1], pictures[0][1]) for picture in pictures)
+
+
+@pytest.mark.slow
+def test_it_is_looked_for(scene: Scene, tmp_path: Path) -> None:
+    given = {
+        "preset": "fast",
+        "device": "cpu",
+        "layers": 3,
+        "iterations": 30,
+        "volume": {"levels": [{"resolution": 16, "iterations": 20}]},
+        "geometry": {"rounds": [1.0], "round_iterations": 10},
+        "textures": {"steps_per_frame": 4},
+        "reflection": {"texels": 4, "environment_texels": 4},
+    }
+    params = train_params(given)
+    assert isinstance(params, ExplicitParams)
+    fit = fit_explicit(replace(scene, poses=TURNED), params, tmp_path / "log").fit
+    assert fit is not None
+    assert {"reflection", "no_reflection"} & {event["kind"] for event in fit["events"]}
