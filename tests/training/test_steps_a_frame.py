@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.plan import Epochs, plan
+from facefolds_core.training.explicit.state import TextureState
 
 
 def fitted() -> Fit:
@@ -56,3 +59,31 @@ def test_orders_differ_and_repeat_with_the_seed() -> None:
     assert orders[0] != orders[1]
     assert sorted(orders[0]) == sorted(orders[1]) == list(range(9))
     assert orders == [[again.next() for _ in range(9)] for _ in range(2)]
+
+
+@pytest.mark.parametrize(("iterations", "pace"), [(183, 1.0), (460, 1.0), (740, 0.5), (1860, 1 / 6)])
+def test_a_longer_training_goes_the_same_way_in_smaller_steps(iterations: int, pace: float) -> None:
+    *rounds, half, last = plan(fitted(), params().model_copy(update={"iterations": iterations}), 1)
+    assert all(level.pace == 1 for level in rounds)
+    assert half.pace == last.pace == pytest.approx(pace)
+
+
+def test_many_frames_are_trained_at_full_rate() -> None:
+    assert {level.pace for level in plan(fitted(), params(), 200)} == {1.0}
+    doubled = params().model_copy(update={"iterations": 8180})
+    assert plan(fitted(), doubled, 200)[-1].pace == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 4, 7])
+def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
+    level = replace(plan(fitted(), params(), 1)[-1], pace=1 / parts)
+    smoothed = [i for i in range(168 * parts) if level.smooths(i, 3)]
+    assert smoothed == [3 * parts * k for k in range(56)]
+
+
+def test_decay_and_backgrounds_go_at_the_level_s_pace() -> None:
+    given = params()
+    state = TextureState((4, 4), 2, 1, torch.zeros(2, 2, 4), torch.zeros(1, 4, 3), given)
+    assert (state.kept_of_frames, state.background_rate) == (np.float32(0.999), given.background.rate)
+    state.pace = 0.25
+    assert state.kept_of_frames == pytest.approx(0.999**0.25) and state.background_rate == given.background.rate / 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,8 @@ class Level:
         stride: of the pixels that are traced.
         geometry: halfwidths of the layers, in those of the fit.
         last: the learning rates fall along it.
+        pace: factor on all rates, and of steps between smoothings its inverse: below 1 where there are more steps than
+            the way at full rate takes.
     """
 
     texels: tuple[int, int]
@@ -28,6 +31,12 @@ class Level:
     stride: int
     geometry: float
     last: bool
+    pace: float = 1.0
+
+    def smooths(self, step: int, every: int) -> bool:
+        """Whether opacity is smoothed after a step: every so many, counted at full rate."""
+        done, before = math.floor(step * self.pace), math.floor((step - 1) * self.pace)
+        return done != before and done % every == 0
 
 
 class Epochs:
@@ -50,7 +59,11 @@ class Epochs:
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
-    """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame."""
+    """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame.
+
+    More steps than those at full rate are smaller ones: they go the same way more finely. Farther on, the layers would
+    begin to show each camera its own picture.
+    """
 
     def size(divisor: int) -> tuple[int, int]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
@@ -59,9 +72,10 @@ def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
     levels = [
         Level(size(4), geometry.round_iterations, geometry.round_stride, scale, False) for scale in geometry.rounds
     ]
-    rest = max(params.iterations, params.least_iterations) - geometry.round_iterations * len(levels)
-    rest = max(rest, params.textures.steps_per_frame * frames)
+    rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
+    rest = max(max(params.iterations, params.least_iterations) - rounds, least)
+    pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
     half = round(params.textures.half_share * rest)
-    levels.append(Level(size(2), half, 1, geometry.rounds[-1], False))
-    levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True))
+    levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
+    levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
     return levels

@@ -56,7 +56,10 @@ class TextureState:
         params: of the training.
         shine: (P, 3) what the reflection adds to each ray of the views; (0, 3) where there is none.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
+        pace: share of a step's decay and of a background's step that a step makes (`Level.pace`).
     """
+
+    pace = 1.0
 
     def __init__(
         self,
@@ -171,7 +174,7 @@ class TextureState:
             self.gradient.numpy().reshape(n, h, w, 4),
             weights.opacity,
             weights.binarisation,
-            self.params.background.rate,
+            self.background_rate,
             weights.min_alpha,
             self.params.textures.min_light,
         )
@@ -183,11 +186,21 @@ class TextureState:
             texture.numpy(),
             self.gradient.numpy(),
             rates,
-            np.float32(self.params.textures.frame_decay),
+            self.kept_of_frames,
             correct,
             decays(self.params.textures.betas),
         )
         return squares
+
+    @property
+    def background_rate(self) -> float:
+        """By which a pixel of a background moves, times its error."""
+        return self.params.background.rate * self.pace
+
+    @property
+    def kept_of_frames(self) -> np.float32:
+        """Factor by which the frames' parts shrink each step."""
+        return np.float32(self.params.textures.frame_decay**self.pace)
 
     def smooth_alpha(self, frame: int) -> None:
         """Replace the logits of alpha, static and of one frame, by their means over 3 x 3 texels; moments stay."""

@@ -121,7 +121,7 @@ class GpuTextureState(TextureState):
         textures = self.params.textures
         self._activate(away, frame)
         away.squares.copy_to_device(np.zeros(SUMS))
-        terms = (weights.opacity, weights.binarisation, self.params.background.rate, weights.min_alpha)
+        terms = (weights.opacity, weights.binarisation, self.background_rate, weights.min_alpha)
         kernels_gpu.shade.run(
             len(rays),
             *self._views(views),
@@ -143,7 +143,7 @@ class GpuTextureState(TextureState):
             away.texture,
             away.gradient,
             gpu.to_gpu(rates),
-            np.float32(textures.frame_decay),
+            self.kept_of_frames,
             gpu.to_gpu(correct),
             gpu.to_gpu(decays(textures.betas)),
         )

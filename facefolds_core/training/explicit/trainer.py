@@ -161,12 +161,13 @@ class Trainer:
         """What is left of a level's iterations; False if it diverges."""
         assert self.state is not None and self.views is not None
         stride = self._stride()
+        self.state.pace = level.pace
         coarse = at.level < len(self.params.geometry.rounds)
         weights, divergence = self._weights(coarse), self.params.divergence
         for i in range(at.step, level.iterations):
             frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
-            rates = self._rates(i / level.iterations if level.last else 0.0)
+            rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
             error = self.state.step(
                 views,
                 rays,
@@ -175,7 +176,7 @@ class Trainer:
                 weights,
                 rates,
             )
-            if not coarse and i % self.params.textures.smooth_every == 0:
+            if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
             if not at.heed(error, divergence.smoothing, divergence.error_ratio):
                 return False
@@ -211,9 +212,9 @@ class Trainer:
         texels = self.state.shape[0] * self.state.shape[1]
         return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
 
-    def _rates(self, progress: float) -> NDArray[np.float32]:
+    def _rates(self, pace: float, progress: float) -> NDArray[np.float32]:
         to = self.params.textures
-        rate = self.rate * (1 - (1 - to.final_rate) * progress)
+        rate = pace * self.rate * (1 - (1 - to.final_rate) * progress)
         rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
