@@ -115,13 +115,12 @@ class Cell(Entry):
 
 
 class Found(Entry):
-    """A room (bench/rooms.py): scores of its asset, bytes of meshes and video, seconds of training."""
+    """A room (bench/rooms.py): scores of its asset, bytes of meshes and video."""
 
     KEY = ("room",)
     room: str
     figures: Means = {}
     bytes: int = 0
-    seconds: float = 0.0
     commit: str = ""
 
 

@@ -45,8 +45,7 @@ def aside(count: int) -> list[str]:
 ROOMS: dict[str, tuple[str, dict[str, Any]]] = {
     "actor": ("", {"evaluate": {"fresh_views": 24}}),
     **{f"actor, seed {seed}": ("", {"train": {"seed": seed}}) for seed in (1, 2)},
-    "studio": ("studio", TWO),
-    "studio, no plates": ("studio", TWO),
+    **dict.fromkeys(("studio", "studio, no plates"), ("studio", TWO)),
     "fox": ("fox", {"source": "transforms", "front": "0019", "holdout": {"every": 7}}),
     "mugsy": ("mugsy", TWO),
     **{f"actor, {count} cameras": ("", {"validate": aside(count)}) for count in (12, 8)},
@@ -73,16 +72,14 @@ def run(name: str, folder: Path, captures: Path) -> Found:
     project.write(params)
     project.run("configure", *STAGE_SECTIONS)
     asset, metrics = read_asset(project.folders.asset), read_json(project.folders.metrics)
-    Image.fromarray(strip(asset, range(-80, 81, 20), COLOURS, (130, 165), 20.0)).save(
-        folder / f"{project.root.name}.jpg"
-    )
-    fresh, cost = metrics.get("fresh_views"), metrics["cost"]
-    angles = (
-        {"fresh": fresh["asset"]["psnr_subject"], "far": fresh["bands"][-1]["psnr_subject"]["asset"]} if fresh else {}
-    )
-    figures = {name: metrics["asset"][name] for name in FIGURES} | angles
-    size, seconds, made = cost["mesh_bytes"] + cost["texture_bytes"], cost["train_seconds"], commit_name()
-    return Found(room=name, figures=figures, bytes=size, seconds=seconds, commit=made, date=now())
+    picture = Image.fromarray(strip(asset, range(-80, 81, 20), COLOURS, (130, 165), 20.0))
+    picture.save(folder / f"{project.root.name}.jpg")
+    figures, fresh, cost = {n: metrics["asset"][n] for n in FIGURES}, metrics.get("fresh_views"), metrics["cost"]
+    if fresh:
+        far = fresh["bands"][-1]["psnr_subject"]["asset"]
+        figures |= {"fresh": fresh["asset"]["psnr_subject"], "far": far}
+    size = cost["mesh_bytes"] + cost["texture_bytes"]
+    return Found(room=name, figures=figures, bytes=size, commit=commit_name(), date=now())
 
 
 def table(found: Mapping[str, Found]) -> str:

@@ -43,11 +43,11 @@ def subject_jobs(params: Params, root: Path, subjects: Sequence[str], stage: str
 
 
 def links_of(params: Params, root: Path, subject: str) -> tuple[tuple[str, str], ...]:
-    """Its capture, where a relative path leads to it and it is no part of the code."""
-    path = Path(params.subject(subject).path)
-    if path.is_absolute() or path.parts[:1] in [(name,) for name in CODE]:
-        return ()
-    return ((str(path), str((root / path).resolve())),)
+    """Its capture and the mattes that it names, where relative paths lead to them and they are no part of the code."""
+    own = params.subject(subject)
+    paths = [Path(one) for one in (own.path, own.mattes) if one is not None]
+    outside = [path for path in paths if not path.is_absolute() and path.parts[:1] not in [(name,) for name in CODE]]
+    return tuple((str(path), str((root / path).resolve())) for path in outside)
 
 
 def read_grid(path: Path) -> list[dict[str, Any]]:

@@ -33,7 +33,7 @@ def _measured(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
     def stages(project: Project, *_: str) -> None:
         ran.append(yaml.safe_load((project.root / "params.yaml").read_text())["subjects"]["actor"])
-        cost = {"mesh_bytes": 1000, "texture_bytes": 2000, "train_seconds": 3.0}
+        cost = {"mesh_bytes": 1000, "texture_bytes": 2000}
         write_json(project.folders.metrics, {"asset": dict.fromkeys(rooms.FIGURES, 20.0), "cost": cost})
 
     monkeypatch.setattr(Project, "run", stages)
