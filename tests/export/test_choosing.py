@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,17 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export import steps
 from facefolds_core.export.choosing import choose_meshes, choose_texels, looks_of
+from facefolds_core.export.sampling import sample_grids
+from facefolds_core.export.sheets import grid_sheets
+from facefolds_core.facts import fact
+from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import MeshChoiceParams, TextureChoiceParams, TextureParams
+from facefolds_core.params import DecimateParams, MeshChoiceParams, TextureChoiceParams, TextureParams
 from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
+from stages.common import write_choice
+from tests.ellipsoids import Ellipsoids
 from tests.scenes import make_scene
 
 SIDE = 64
@@ -103,3 +110,24 @@ def test_numbers_fix_both(tmp_path: Path) -> None:
     filmed = film(tmp_path, 32.0)
     size, why = steps.texels_for(filmed.scene, [ball(8)], filmed.textures.path, TextureParams(resolution=40))
     assert (size, why) == (40, None)
+
+
+def test_coarser_levels_are_never_finer_than_the_full_one(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, cameras=3, size=40, frames=1)
+    grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
+    write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
+    given: dict[str, Any] = {"resolution": "auto", "auto": {"candidates": [8, 16], "within": 50.0, "fidelity": 0.0}}
+    params = DecimateParams.model_validate(given)
+    sheets = grid_sheets(grids, None).sheets
+    made = steps.decimate_all(sheets, grids, scene, tmp_path / "samples.arrow", params, [6, 12])
+    assert made.why is not None and made.why.values["chosen"] == 8
+    assert len(made.meshes[0].vertices) <= 64
+    assert made.coarser[12] is made.meshes and len(made.coarser[6][0].vertices) <= 36
+
+
+def test_what_was_chosen_is_said_and_kept(tmp_path: Path) -> None:
+    values = {"tried": [8], "below": 0.0, "to_finest": 50.0, "views": 1, "split": "train"}
+    why = fact("resolution_chosen", what="texture.resolution", chosen=8, **values)
+    assert "texture.resolution: auto took 8" in write_choice(tmp_path, why)
+    assert read_json(tmp_path / "choice.json")["chosen"] == 8
+    assert write_choice(tmp_path / "none", None) == "" and not (tmp_path / "none").exists()

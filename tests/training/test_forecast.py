@@ -10,6 +10,7 @@ import pytest
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast
 from tests.scenes import look_at_origin, make_scene
@@ -42,6 +43,13 @@ def test_memory_does_not_grow_with_the_take_and_time_and_disk_do(scene: Scene) -
     assert long.memory == short.memory
     assert 8 < long.disk / short.disk < 16
     assert 8 < long.seconds / short.seconds < 17
+
+
+def test_a_head_that_turns_has_finer_texels(scene: Scene) -> None:
+    still = take(scene, 960, 600)
+    turning = replace(still, poses=Track.of([np.eye(3)] * 960, np.zeros((960, 3))))
+    finer = params().textures.pixels_per_texel / params().moving.pixels_per_texel
+    assert forecast(turning, params()).seconds / forecast(still, params()).seconds > 0.8 * finer**2
 
 
 def test_what_cannot_fit_is_refused_with_numbers(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import psutil
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.fit import pixels_of_texel
 from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.patience import check_space
 
@@ -43,7 +44,8 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
         left: frames that are still to be fitted to a base that is there; None where there is none.
     """
     segments = params.segments
-    texels = round(segments.texels_per_pixel * scene.width * scene.height)
+    finer = (params.textures.pixels_per_texel / pixels_of_texel(scene, params)) ** 2
+    texels = round(segments.texels_per_pixel * finer * scene.width * scene.height)
     most = int(segments.memory_megabytes * 1e6 / (segments.texel_bytes * texels))
     frames = scene.num_frames
     at_once = frames <= min(segments.joint_frames, most) and left is None
