@@ -82,7 +82,7 @@ WORDS = {
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
-    "{gain:g} times as dense (train.start.fog_gain), and backgrounds stay what the room shows",
+    "{gain:g} times as dense (train.start.fog_gain)",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",

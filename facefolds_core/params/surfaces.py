@@ -52,7 +52,7 @@ class StartParams(Section):
     """Fog is taken to be so many times as dense: its middle lies deep within the subject, and where few cameras look it
     is thin. 1 leaves it."""
 
-    beside_opacity: Share = 0.1
+    beside_opacity: Share = 0.3
     """Directions in which the volume is less opaque lie beside the subject: what was painted there is room, and is made
     transparent at the end."""
 

@@ -26,7 +26,7 @@ def shading(late: bool, shining: bool) -> Problem:
     texture[..., 3] *= rng.choice(np.array([0.002, 0.2, 0.9], np.float32), (*SHAPE, LAYERS))
     weights = (losses.opacity * losses.late_opacity, losses.binarisation) if late else (losses.opacity, 0.0)
     faint = textures.min_alpha if late else 0.0
-    terms = tuple(np.float32(x) for x in (*weights, FAST.background.rate, faint))
+    terms = tuple(np.float32(x) for x in (*weights, 0.5, faint))
     arguments = {
         "codes": codes,
         "camera": rng.integers(0, 2, RAYS).astype(np.int32),

@@ -37,7 +37,7 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
 
 
 FAST = ExplicitParams()
-OPACITY, LATE, RATE = FAST.losses.opacity, FAST.losses.late_opacity, FAST.background.rate
+OPACITY, LATE, RATE = FAST.losses.opacity, FAST.losses.late_opacity, 0.5
 LIGHT = FAST.textures.min_light
 SETTINGS = {
     "rounds of geometry": (OPACITY, 0.0, RATE, 0.0, LIGHT),
