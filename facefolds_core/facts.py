@@ -103,7 +103,7 @@ WORDS = {
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
     "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
     "one training's cannot be compared with another's. Give masks of the scored cameras, or find mattes: "
-    "`matte: {method: auto}` in params.yaml (docs/guide/subjects.md)",
+    "`matte: {{method: auto}}` in params.yaml (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 import pytest
@@ -46,3 +47,14 @@ def test_every_kind_is_used_and_every_use_is_a_kind(project_root: Path) -> None:
                 used |= {c.value for c in ast.walk(node.args[0]) if isinstance(c, ast.Constant)}
     in_old_scenes = {"front_guessed"}
     assert used | {"krt_is_scaled", "krt_is_of_full_size"} | in_old_scenes == set(WORDS)
+
+
+def test_what_words_name_is_given_by_every_use(project_root: Path) -> None:
+    """Braces that are meant literally are fields, too, unless they are doubled."""
+    fields = {kind: {name for _, name, _, _ in Formatter().parse(text) if name} for kind, text in WORDS.items()}
+    for path in (project_root / "facefolds_core").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "fact":
+                given = {keyword.arg for keyword in node.keywords}
+                if isinstance(node.args[0], ast.Constant) and None not in given:
+                    assert fields[node.args[0].value] <= given, f"{path.name}: {node.args[0].value}"
