@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -51,7 +52,10 @@ def test_every_kind_is_used_and_every_use_is_a_kind(project_root: Path) -> None:
 
 def test_what_words_name_is_given_by_every_use(project_root: Path) -> None:
     """Braces that are meant literally are fields, too, unless they are doubled."""
-    fields = {kind: {name for _, name, _, _ in Formatter().parse(text) if name} for kind, text in WORDS.items()}
+    fields = {
+        kind: {re.split(r"[.\[]", name)[0] for _, name, _, _ in Formatter().parse(text) if name}
+        for kind, text in WORDS.items()
+    }
     for path in (project_root / "facefolds_core").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "fact":
