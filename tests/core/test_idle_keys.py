@@ -12,10 +12,8 @@ def lines(folder: Path, text: str) -> list[str]:
     return idle_keys(load_params(folder / "params.yaml"))
 
 
-def test_the_projects_own_file_has_one(project_root: Path) -> None:
-    assert idle_keys(load_params(project_root / "params.yaml")) == [
-        "texture.resolution: 512 is used by no subject: overridden by subjects.actor.texture.resolution"
-    ]
+def test_the_projects_own_file_has_none(project_root: Path) -> None:
+    assert idle_keys(load_params(project_root / "params.yaml")) == []
 
 
 def test_a_key_that_one_subject_uses_is_not_idle(tmp_path: Path) -> None:
