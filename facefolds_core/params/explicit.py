@@ -114,10 +114,10 @@ class BackgroundParams(Section):
     moving_frames: Count = 12
     """The same of a head that turns: each frame uncovers another part of the room, and costs a look at the volume."""
 
-    rate: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """A pixel moves by this, times the cube of the transmittance, times its error, each time it is met. 0: it stays
-    what the plate, the picture beside the subject, or the room behind it showed. Backgrounds that learn take up of the
-    subject what each camera sees through it at first: with 0.5 `mugsy` lost 0.6 dB, `moving` 0.6, `fox` 0.2."""
+    rate: Annotated[float, Field(ge=0, le=1)] = 0.1
+    """A pixel moves by this, times the cube of the transmittance, times its error, each time it is met. Fast
+    ones take up of the subject what each camera sees through it at first: with 0.5 `mugsy` lost 0.6 dB, `moving` 0.6,
+    `fox` 0.2 against 0. With 0 the layers are painted with the room beside the subject."""
 
 
 class MovingParams(Section):
@@ -156,6 +156,16 @@ class PruningParams(Section):
     """Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several,
     some `rays_per_texel` a texel; all of them over the frames) are made transparent. A ray reads four a layer: its
     colour changes by no more than N / 255, and that only if all of them are just below."""
+
+    room_gain: Weight = 0.001
+    """Directions in which the layers show the training pictures by less than this better than the bare background does
+    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none."""
+
+    room_frames: Count = 3
+    """Frames that are looked at for that,"""
+
+    room_texels: Count = 4
+    """in squares of so many texels a side."""
 
     speck_opacity: Share = 0.3
     """Of all layers together, in any frame: patches of texels that are more opaque are compared by size,"""

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 
-from facefolds_core.params import PruningParams
-from facefolds_core.training.explicit.clearing import specks
+from facefolds_core.hit_codes import encode
+from facefolds_core.params import ExplicitParams, PruningParams
+from facefolds_core.training.explicit.clearing import painted_room, specks
+from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.views import Shown, Views
 
 PARAMS = PruningParams()
 
@@ -51,3 +55,31 @@ def test_all_can_be_kept() -> None:
     opacity[30:34, 50:52] = 0.8
     apart, count = specks(opacity, PARAMS.model_copy(update={"speck_share": 0.0}))
     assert count == 0 and not apart.any()
+
+
+class OneRay:
+    """A ray through the centre of each of 32 x 32 texels of one layer."""
+
+    def part(self, frame: int, phase: int, parts: int) -> tuple[Views, np.ndarray]:
+        t, s = (np.mgrid[0:32, 0:32].reshape(2, -1) + 0.5) / 32
+        codes = encode(np.stack([s, t], -1))[:, None].astype(np.uint16)
+        rays = np.arange(1024)
+        views = Views(codes, np.zeros(1024, np.int32), rays.astype(np.int32), np.zeros((1024, 3), np.float32))
+        return views, rays
+
+    count = 1024
+
+
+def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> None:
+    """A room of grey 0.2; on the right half stands something of 0.6. All texels are opaque and show the picture."""
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})
+    picture = np.where(np.arange(1024) % 32 < 16, 0.2, 0.6)
+    background = torch.full((1, 1024, 3), 0.2)
+    state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), background, params)
+    state.colour[0] = torch.from_numpy(picture).float()[:, None]
+    state.layers[0, ..., 3] = 8.0
+    shown = Shown(np.rint(255 * picture)[None, :, None].repeat(3, 2).astype(np.uint8))
+    poor = painted_room(state, OneRay(), shown, 1, params.pruning).view(32, 32)
+    assert poor[:, :8].all() and not poor[:, 16:].any()
+    kept = params.pruning.model_copy(update={"room_gain": 0.0})
+    assert not painted_room(state, OneRay(), shown, 1, kept).any()

@@ -10,18 +10,20 @@ from scipy import ndimage
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import ExplicitParams, PruningParams
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Rays
+from facefolds_core.training.explicit.views import Pictures, Rays
 
 
-def clear_texels(state: TextureState, rays: Rays, passes: int, params: ExplicitParams) -> list[Fact]:
+def clear_texels(state: TextureState, rays: Rays, images: Pictures, passes: int, params: ExplicitParams) -> list[Fact]:
     """Make them transparent; what is to be said of it.
 
     Args:
         rays: of the training cameras, looked at in `passes` parts.
+        images: of the same.
     """
     least, found = params.pruning.texel_opacity, list[Fact]()
     hidden = state.contributions(rays, passes) < least
     hidden |= state.beside(params.start.beside_opacity)
+    hidden |= painted_room(state, rays, images, passes, params.pruning)
     state.hide(hidden)
     apart, count = specks(_opacity(state), params.pruning)
     if count:
@@ -31,6 +33,38 @@ def clear_texels(state: TextureState, rays: Rays, passes: int, params: ExplicitP
         found.append(fact("specks_cleared", count=count, share=params.pruning.speck_share))
     found.append(fact("texels_cleared", share=float(hidden.float().mean()), least=least))
     return found
+
+
+def painted_room(state: TextureState, rays: Rays, images: Pictures, passes: int, params: PruningParams) -> torch.Tensor:
+    """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background.
+
+    A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
+    black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show over the
+    background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`.
+    """
+    (h, w), size = state.shape, params.room_texels
+    if params.room_gain == 0:
+        return torch.zeros(h * w, 1, dtype=torch.bool)
+    rows, columns = -(-h // size), -(-w // size)
+    gain, mass = np.zeros(rows * columns), np.zeros(rows * columns)
+    background = state.background.cpu().numpy()
+    for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, params.room_frames)}):
+        views, chosen = rays.part(frame, 0, passes)
+        picture = images.frame(frame)
+        seen = np.zeros((len(views.pixel), 6), np.float32)
+        state.look(views, picture, frame, seen)
+        seen, camera, pixel = seen[chosen], views.camera[chosen], views.pixel[chosen]
+        bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
+        better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
+        opacity = seen[:, 3]
+        place = seen[:, 4:] / np.maximum(opacity, 1e-6)[:, None]
+        cell = (place[:, 1] * h / size).astype(int).clip(0, rows - 1) * columns
+        cell += (place[:, 0] * w / size).astype(int).clip(0, columns - 1)
+        np.add.at(gain, cell, better * opacity)
+        np.add.at(mass, cell, opacity)
+    blurred = [ndimage.gaussian_filter(x.reshape(rows, columns), 1.0, mode="nearest") for x in (gain, mass)]
+    poor = blurred[0] < params.room_gain * blurred[1]
+    return torch.from_numpy(np.kron(poor, np.ones((size, size), bool))[:h, :w].reshape(-1, 1))
 
 
 def _opacity(state: TextureState) -> NDArray[np.float32]:

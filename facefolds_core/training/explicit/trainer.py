@@ -224,7 +224,7 @@ class Trainer:
         state, n = self.state, self.params.layers
         state.forget_moments()
         assert self.views is not None
-        self.events += clear_texels(state, self.views, self._stride(), self.params)
+        self.events += clear_texels(state, self.views, self.images, self._stride(), self.params)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
