@@ -9,6 +9,7 @@ import numpy as np
 from facefolds_core.facts import Fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.loop import for_notes
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
@@ -106,6 +107,16 @@ def test_fog_is_taken_to_be_denser_and_a_solid_head_is_left() -> None:
     ahead = np.zeros((1, 2))  # from the ball's centre
     middle, surface = (profile(v, Chart((0.0, 0.0, 0.0)), ahead, 0.3).radius[0] for v in (fog, dense))
     assert middle < surface - 0.03 and surface > 0.2 - 2 * VOXEL
+
+
+def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> None:
+    notes: list[Fact] = []
+    assert for_notes(PARAMS, notes) is PARAMS
+    _clear_of_fog(_volume((_ball(0.2, 0.0, 0.0, 0.0), float(np.log(np.expm1(0.1))))), PARAMS.start, notes)
+    found = for_notes(PARAMS, notes)
+    assert found.background.rate == 0 < PARAMS.background.rate
+    assert found.pruning.room_gain == 0 < PARAMS.pruning.room_gain
+    assert found.losses == PARAMS.losses
 
 
 def test_a_denser_volume_has_so_many_times_the_optical_depth() -> None:

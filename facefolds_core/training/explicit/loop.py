@@ -4,6 +4,7 @@ crossings. A short take simply starts again where it was interrupted; the base o
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.facts import Fact
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
@@ -52,6 +54,19 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
             learning rates.
     """
     return fit_with_surroundings(scene, params, log, place)[0]
+
+
+def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
+    """The parameters of the layers' training after what the volume's said.
+
+    Where the subject was fog, backgrounds stay what the room shows (`background.rate` 0): those that learn would take
+    up what is as pale as what stands behind it. Nothing is cleared for looking like the room there either.
+    """
+    if not any(note.kind == "fog" for note in notes):
+        return params
+    background = params.background.model_copy(update={"rate": 0.0})
+    pruning = params.pruning.model_copy(update={"room_gain": 0.0})
+    return params.model_copy(update={"background": background, "pruning": pruning})
 
 
 @dataclass(frozen=True)
@@ -95,7 +110,7 @@ def fit_with_surroundings(
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        trainer = Trainer(cameras, params, fit, volume, device)
+        trainer = Trainer(cameras, for_notes(params, found), fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params, scene.num_frames)
         bar.total = bar.n + sum(level.iterations for level in levels)
