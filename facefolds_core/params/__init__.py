@@ -40,6 +40,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
+from facefolds_core.params.few_cameras import FewCameraParams
 from facefolds_core.params.matte import CutOutParams, MatteParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
@@ -81,6 +82,7 @@ __all__ = [
     "EnvironmentParams",
     "EvaluateParams",
     "ExplicitParams",
+    "FewCameraParams",
     "FrameRange",
     "GeometryParams",
     "GlbParams",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.few_cameras import FewCameraParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -244,6 +245,9 @@ class ExplicitParams(Section):
 
     cameras: CameraParams = CameraParams()
     """What single cameras do differently."""
+
+    few_cameras: FewCameraParams = FewCameraParams()
+    """What is otherwise with few of them."""
 
     start: StartParams = StartParams()
     """What the layers take from the volume."""

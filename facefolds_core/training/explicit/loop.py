@@ -27,6 +27,7 @@ from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
+from facefolds_core.training.few_cameras import for_cameras
 from facefolds_core.training.log import open_log
 from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report
@@ -98,19 +99,20 @@ def fit_with_surroundings(
     device = choose(params.device)
     checkpoints = None if kept is None else Checkpoints(kept, params.segments)
     began = time.perf_counter()
+    used, _ = for_cameras(params, len(scene.indices("train")))
     with open_log(log) as live:
         bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
-        volume, found = find_subject(scene, params, bar)
+        volume, found = find_subject(scene, used, bar)
         cameras = choose_cameras(scene, volume.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        fit = fit_scene(cameras.scene, volume, params)
+        fit = fit_scene(cameras.scene, volume, used)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        trainer = Trainer(cameras, for_notes(params, found), fit, volume, device)
+        trainer = Trainer(cameras, for_notes(used, found), fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params, scene.num_frames)
         bar.total = bar.n + sum(level.iterations for level in levels)
