@@ -11,7 +11,8 @@ from facefolds_core.params.base import Count, Length, Natural, Pixels, Section, 
 
 class FewCameraParams(Section):
     """Between few cameras hardly anything is determined: the starting volume becomes haze and lumps that show each
-    camera its own picture. Against that these values hold where they are the stricter ones."""
+    camera its own picture. Against that these values hold where they are the stricter ones, and only where each camera
+    has a clean plate: without, a price on opacity takes the subject for what stands behind it (`mugsy`)."""
 
     at_most: Natural = 10
     """Training cameras that are few; 0 is none ever."""

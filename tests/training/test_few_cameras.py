@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from facefolds_core.frame_store import write_frames
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.few_cameras import for_cameras
+from facefolds_core.training.few_cameras import for_cameras, for_scene
+from tests.scenes import make_scene
 
 PARAMS = ExplicitParams()
 
@@ -33,3 +38,13 @@ def test_stricter_values_of_the_user_stay() -> None:
 
 def test_one_or_two_cameras_are_not_asked_for_more_than_there_are() -> None:
     assert for_cameras(PARAMS, 2)[0] == PARAMS
+
+
+def test_without_a_plate_of_each_camera_nothing_differs(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, cameras=6, size=8)
+    assert for_scene(PARAMS, scene) == (PARAMS, ())
+    plate, train = np.zeros((scene.height, scene.width, 3), np.uint8), scene.indices("train")
+    write_frames(scene.folder / "plates.arrow", plate.shape, [(camera, 0, plate) for camera in train[1:]])
+    assert for_scene(PARAMS, scene) == (PARAMS, ())
+    write_frames(scene.folder / "plates.arrow", plate.shape, [(camera, 0, plate) for camera in train])
+    assert for_scene(PARAMS, scene) == for_cameras(PARAMS, len(train)) != (PARAMS, ())
