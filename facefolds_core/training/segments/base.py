@@ -122,11 +122,17 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
     return digest.hexdigest()[:16]
 
 
-def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
+def train_base(
+    scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
+) -> None:
     """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
-    folder, whole or not at all; the checkpoint stays (`forget_begun`)."""
-    kept = folder.with_name(f"{BEGUN}{folder.name}")
-    forget_begun(folder.parent, kept.name)
+    folder, whole or not at all; the checkpoint stays (`forget_begun`).
+
+    Args:
+        begun: folder of the checkpoint, of this subject alone; by default the base's.
+    """
+    kept = (folder.parent if begun is None else begun) / f"{BEGUN}{folder.name}"
+    forget_begun(kept.parent, kept.name)
     # The frames are fitted without a reflection, which is added to what they then show.
     reflection = params.reflection.model_copy(update={"begin": "end"})
     params = params.model_copy(update={"reflection": reflection})
@@ -160,7 +166,7 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
 
 
 def forget_begun(folder: Path, but: str = "") -> None:
-    """Delete the checkpoints of bases in the folder of a take, but for the one of this name."""
+    """Delete the checkpoints of a take's bases in a folder, but for the one of this name."""
     for other in folder.glob(f"{BEGUN}*"):
         if other.name != but:
             shutil.rmtree(other, ignore_errors=True)
