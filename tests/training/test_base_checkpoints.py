@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pytest
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.model.tensor_files import write_tensors
+from facefolds_core.training import patience
 from facefolds_core.training.explicit.checkpoints import STATE
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.segments.loop import base_of
@@ -41,9 +46,9 @@ def counted(most: int = 1000) -> Iterator[list[int]]:
         yield done
 
 
-def make(scene: Scene, plan: TakePlan, folder: Path, **segments: object) -> dict[str, bytes]:
+def make(scene: Scene, plan: TakePlan, folder: Path, begun: Path | None = None, **segments: object) -> dict[str, bytes]:
     """Train the base; its files, but for the times."""
-    base = base_of(plan, scene, params(**segments), folder, folder / "log")
+    base = base_of(plan, scene, params(**segments), folder, folder / "log", begun)
     files = [path for path in sorted(base.folder.rglob("*")) if path.is_file() and path.name != "training.json"]
     return {str(path.relative_to(base.folder)): path.read_bytes() for path in files}
 
@@ -73,6 +78,20 @@ def test_a_base_that_is_cut_off_goes_on_where_it_was(
     assert [path.name for path in tmp_path.glob("begun-*")] == []
 
 
+def test_another_machine_goes_on_from_a_folder_that_is_shared(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, expected = whole
+    shared = tmp_path / "shared"
+    with counted(most=15), pytest.raises(KeyboardInterrupt):
+        make(scene, plan, tmp_path / "lost", shared, **OFTEN)
+    shutil.rmtree(tmp_path / "lost")
+    with counted() as left:
+        assert make(scene, plan, tmp_path / "other", shared, **OFTEN) == expected
+    assert len(left) == STEPS - 15
+    assert list(shared.glob("begun-*")) == []
+
+
 def test_it_is_not_written_more_often_than_asked(
     whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
 ) -> None:
@@ -94,6 +113,38 @@ def test_a_damaged_checkpoint_is_none(
     with counted() as steps:
         assert make(scene, plan, tmp_path, **OFTEN) == expected
     assert len(steps) == STEPS
+
+
+def test_it_makes_room_for_the_base_where_the_disk_is_full(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, expected = whole
+    tries: list[bool] = []
+
+    def write(*arguments: Any) -> None:
+        tries.append(any(tmp_path.glob("begun-*")))
+        assert len(tries) < 3
+        if tries[-1]:
+            raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path))
+        write_tensors(*arguments)
+
+    with patch("facefolds_core.training.segments.base.write_tensors", write), patch.object(patience, "EVERY", 0.0):
+        assert make(scene, plan, tmp_path, **OFTEN) == expected
+    assert tries == [True, False]
+
+
+def test_none_stays_beside_a_base_that_is_there(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    """It was killed after it had written the base."""
+    scene, plan, files = whole
+    for name, content in files.items():
+        path = tmp_path / f"base-{plan.base}" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    (tmp_path / f"begun-base-{plan.base}").mkdir()
+    assert make(scene, plan, tmp_path) == files
+    assert not any(tmp_path.glob("begun-*"))
 
 
 @pytest.mark.parametrize("before", [0, 1])

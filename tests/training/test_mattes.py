@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
@@ -109,6 +110,17 @@ def test_beside_a_plate_opacity_is_found_along_the_outline() -> None:
     assert np.abs(found - opacity).max() < 0.15  # seen: 0.07
 
 
+@pytest.mark.parametrize("given", [{"outline": 0}, {"contrast": 0.0}, {"beyond": 0}])
+def test_beside_a_plate_no_limit_is_too_low(given: dict[str, float]) -> None:
+    """A black square before a grey room that has a black thing beside it."""
+    plate = np.full((40, 40, 3), 100, np.uint8)
+    plate[12:16, 31:] = 0
+    image = plate.copy()
+    image[10:30, 10:30] = 0
+    opacity = from_plate(image, plate, PlateParams.model_validate(given))
+    assert opacity[10:30, 10:30].min() == 1 and opacity[:, 31:].max() == 0
+
+
 def test_shadows_and_holes_beside_a_plate_are_none() -> None:
     """A hole where the subject has the room's colour; a small thing that moved in the room."""
     y, x = np.mgrid[:64, :64]
@@ -143,3 +155,17 @@ def test_what_stands_in_the_heads_shadow_is_no_subject() -> None:
     mended, agreement = outvoted(agreed(ball, cameras, pictures, VoteParams()), cameras, pictures, VoteParams())
     assert not mended[0][:, :6].any()
     assert agreement.argmin() == 0
+
+
+@pytest.mark.parametrize("known", [0, 2, 6])
+def test_pictures_of_other_cameras_have_mattes_though_few_vote(tmp_path: Path, known: int) -> None:
+    """Training cameras whose mattes are known vote; where there are too few of them nobody does."""
+    scene, ball = make_scene(tmp_path, size=64), _ball(0.33)
+    ball = replace(ball, lower=ball.lower + np.array(SPHERE_CENTRE))
+    sure = {(c, 0): np.uint8(255) * (opacity_in(ball, scene.cameras[c]) > 0.5) for c in scene.indices("train")[:known]}
+    with tqdm(total=1, disable=True) as bar:
+        held_out = [(scene.splits.index("holdout"), 0)]
+        (found,) = from_pictures(scene, ball, held_out, MatteParams(), bar, sure)
+    true, here = opacity_in(ball, scene.cameras[found.camera]) > 0.5, found.matte > 127
+    assert (true & here).sum() / (true | here).sum() > 0.8
+    assert found.believed and (found.agreement is None) == (known < 3)
