@@ -40,7 +40,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.matte import CutOutParams, MatteParams, PlateParams, VoteParams
+from facefolds_core.params.matte import CutOutParams, MatteParams, OutlineParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -98,6 +98,7 @@ __all__ = [
     "MotionParams",
     "MovingParams",
     "NormalizeParams",
+    "OutlineParams",
     "Overrides",
     "PlateParams",
     "Preset",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.matte import OutlineParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -167,6 +168,17 @@ class PruningParams(Section):
     room_texels: Count = 4
     """in squares of so many texels a side."""
 
+    beside_gain: Weight = 0.01
+    """The same, where the paint is seen on pixels that do not show the subject (`outlines`): there it may look less
+    like the room. 0: none."""
+
+    beside_share: Share = 0.5
+    """Such are pixels of which the subject covers less than this, on average,"""
+
+    beside_cameras: Count = 24
+    """in the pictures of so many training cameras, of the starting volume's frame: their mattes where there are some,
+    else what differs from their clean plates, else what is cut out of them."""
+
     speck_opacity: Share = 0.3
     """Of all layers together, in any frame: patches of texels that are more opaque are compared by size,"""
 
@@ -271,6 +283,9 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
+
+    outlines: OutlineParams = OutlineParams()
+    """Where the subject is in a training picture, for `pruning.beside_gain`."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""
