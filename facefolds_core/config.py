@@ -62,13 +62,15 @@ def read_level_resolutions(folder: Path) -> tuple[int, ...]:
 
 
 class VolumeSource(Section):
-    """`volume.json`: what `matte` needs to know of `train`, where it fits a starting volume; else null, so that changes
-    of `train` do not rerun it."""
+    """`volume.json`: what `matte` needs to know of `train`. All of it where a starting volume is fitted; beside plates
+    what says to which frames `train` fits its own; null where none is looked for. Other changes of `train` do not
+    rerun it."""
 
     train: TrainSection | None
 
 
 def read_volume_source(folder: Path) -> ExplicitParams:
-    """The training whose starting volume `matte` fits: of other models than `explicit` that of its defaults."""
+    """The training whose starting volume `matte` fits or serves: of other models than `explicit` that of its
+    defaults."""
     train = _read(TypeAdapter(VolumeSource), folder / "volume.json").train
     return train if isinstance(train, ExplicitParams) else ExplicitParams(seed=0 if train is None else train.seed)

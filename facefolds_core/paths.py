@@ -161,8 +161,8 @@ def subject_of_dvc_stage(stage: str, dvc_stage: str) -> str:
     return check_subject_name(name)
 
 
-def check_path_text(path: str, name: str, file: str | Path) -> None:
-    """Args: a subject's `path`, its name, and the file that has them.
+def check_path_text(path: str, name: str, file: str | Path, key: str = "path") -> None:
+    """Args: a path that a subject gives, its name, the file that has them, and the subject's key.
 
     Raises:
         UserError: if it is no path of this machine: DVC would fetch an address, and programs take `-x` for an option.
@@ -178,10 +178,10 @@ def check_path_text(path: str, name: str, file: str | Path) -> None:
         raise UserError(
             "not a path",
             file=file,
-            place=f"subjects.{name}.path",
+            place=f"subjects.{name}.{key}",
             expected=wrong,
             found=brief(path),
-            remedy="write the folder that holds the capture",
+            remedy=f"write the folder that holds the {'capture' if key == 'path' else key}",
         )
 
 
@@ -192,8 +192,17 @@ def check_capture_place(path: str, folders: SubjectFolders) -> Path:
         UserError: if it is no path of this machine, or leads (through links, too) into the subject's own folder or to
             one that holds it: there the stages would replace what they are to read.
     """
-    check_path_text(path, folders.root.name, "params.yaml")
-    place = f"subjects.{folders.root.name}.path in params.yaml"
+    return _check_place(path, folders, "path", "a capture")
+
+
+def check_mattes_place(path: str, folders: SubjectFolders) -> Path:
+    """The same of the folder of mattes that a subject names: DVC deletes a stage's outputs before the stage runs."""
+    return _check_place(path, folders, "mattes", "mattes of your own")
+
+
+def _check_place(path: str, folders: SubjectFolders, key: str, what: str) -> Path:
+    check_path_text(path, folders.root.name, "params.yaml", key)
+    place = f"subjects.{folders.root.name}.{key} in params.yaml"
     try:
         there = Path(path).resolve()
         own = (folders.root.resolve(), folders.capture.resolve())
@@ -203,10 +212,10 @@ def check_capture_place(path: str, folders: SubjectFolders) -> Path:
         ) from None
     if there in own[0].parents or any(there.is_relative_to(folder) for folder in own):
         raise UserError(
-            "a capture where the stages write",
+            f"{what} where the stages write",
             file=path,
             place=place,
             expected=f"a folder that neither lies in {folders.root} nor holds it",
-            remedy="move the capture to a place of its own, and correct `path`; nothing was touched",
+            remedy=f"move {what} to a folder apart, and correct `{key}`; nothing was touched",
         )
     return Path(path)

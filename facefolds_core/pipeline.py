@@ -12,6 +12,7 @@ The stages (stages/*.py) call the same functions on files.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -70,13 +71,18 @@ def train(scene: Scene, params: TrainParams | None = None, scratch: str | Path |
 
 
 def export_asset(
-    model: RadianceManifolds, scene: Scene, folder: str | Path, params: ExportParams | None = None
+    model: RadianceManifolds,
+    scene: Scene,
+    folder: str | Path,
+    params: ExportParams | None = None,
+    key_frames: Sequence[int] | None = None,
 ) -> Asset:
     """Make the asset of a model: sample, reconstruct, decimate, texture, bake, compress.
 
     Args:
         folder: of the asset; written whole or not at all.
         params: of the steps; by default as they stand in the sections' defaults.
+        key_frames: of a take that was trained in segments, for `sample.opacity: key_frames`.
 
     Returns:
         the asset, as read from its files.
@@ -91,7 +97,7 @@ def export_asset(
         for place in (sampled, resampled, baked):
             place.mkdir()
         views = scene.views_of("train", params.sample.auto_window.moving_views)
-        grids = steps.sample_model(model, views, params.sample, sampled)
+        grids = steps.sample_model(model, views, params.sample, sampled, keys=key_frames)
         surfaces = steps.surfaces_in(steps.reconstruct(grids, params.reconstruct))
         stores = (sampled / steps.TEXTURES, resampled / steps.TEXTURES)
         wanted = sorted({level.mesh_resolution for level in params.compress.levels})

@@ -1,4 +1,4 @@
-"""Videos that are encoded part by part: each a closed group of pictures, by itself, on cores side by side.
+"""Videos that are encoded part by part: each a closed group of pictures, by itself.
 
 A part that was encoded of the same before is taken over, from this run or an earlier one: in a long take of which some
 frames changed, only their parts are encoded. Then packets are copied into one file; nothing is encoded twice.
@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -27,8 +28,13 @@ from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
 from facefolds_core.files import atomic_file
 
-PICTURES_AHEAD = 64
-"""That an encoder holds, about: x264's slow presets look 40 to 60 ahead."""
+ENCODER_BYTES = 200
+"""A pixel that an encoder takes, about: x264's preset slow looks 50 pictures ahead, and keeps 4 bytes a pixel of each.
+Measured, 512 x 512 to 1536 x 2048; longer parts take no more."""
+PADDING = 64
+"""Pixels that x264 adds to each side of a picture, both ends together."""
+PICTURES_AHEAD = 2
+"""That are made on a thread of their own while one is encoded."""
 
 
 @dataclass
@@ -39,12 +45,14 @@ class Parts:
         folder: of the files, named by what they are made of.
         common: digest of the code that makes pictures.
         memory: bytes for the encoders that run side by side; one always does.
+        most: so many run side by side; 0: as many as there are cores and memory for.
         used: names of those that this run asked for.
     """
 
     folder: Path
     common: bytes
     memory: int
+    most: int = 1
     used: set[str] = field(default_factory=set)
 
     def path(self, digest: str, codec: Codec) -> Path:
@@ -55,8 +63,8 @@ class Parts:
 
     def encoders(self, size: tuple[int, int]) -> int:
         """How many run side by side on pictures of `size`."""
-        each = PICTURES_AHEAD * size[0] * size[1] * 3 // 2
-        return max(1, min(os.cpu_count() or 1, self.memory // each))
+        each = ENCODER_BYTES * (size[0] + PADDING) * (size[1] + PADDING)
+        return max(1, min(self.most or os.cpu_count() or 1, self.memory // each))
 
     def tidy(self) -> None:
         """Remove the parts that this run did not ask for."""
@@ -123,7 +131,7 @@ def encode_parts(
         found = parts.path(filmed.digest(parts, frames, codec, options), codec)
         if not found.exists():
             with atomic_file(found) as temporary:
-                pictures = map(filmed.picture, frames)
+                pictures = _ahead(filmed.picture, frames)
                 encode_video(temporary, pictures, filmed.size, filmed.rate, codec, options, filmed.regions)
         return found
 
@@ -133,6 +141,18 @@ def encode_parts(
         shutil.copyfile(files[0], path)
     else:
         _join(path, files, filmed.rate, codec)
+
+
+def _ahead(make: Callable[[int], Picture], frames: Iterable[int]) -> Iterator[Picture]:
+    """Pictures in their order; the next ones are made meanwhile."""
+    with ThreadPoolExecutor(1) as pool:
+        waiting = deque[Future[Picture]]()
+        for k in frames:
+            waiting.append(pool.submit(make, k))
+            if len(waiting) > PICTURES_AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
 
 
 def _join(path: Path, files: Sequence[Path], rate: Fraction, codec: Codec) -> None:

@@ -55,9 +55,9 @@ def given_mattes(folder: Path, scene: Scene) -> Iterator[tuple[int, int, Image]]
 
 
 def _files(folder: Path, scene: Scene) -> Iterator[tuple[tuple[int, int], Path]]:
-    for index, camera in enumerate(scene.cameras):
-        for frame, name in enumerate(scene.frame_ids):
-            for path in (folder / camera.name / f"{name}.png", folder / f"{camera.name}.png"):
-                if path.is_file():
-                    yield (index, frame), path
-                    break
+    for index, frame in scene.open_frames():  # held-out cameras may lack some
+        camera, name = scene.cameras[index].name, scene.frame_ids[frame]
+        for path in (folder / camera / f"{name}.png", folder / f"{camera}.png"):
+            if path.is_file():
+                yield (index, frame), path
+                break

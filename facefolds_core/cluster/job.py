@@ -132,7 +132,7 @@ def do(job: Job, run: str) -> Outcome:
         files: dict[str, str] = {}
         if job.part and not status:
             tell("Running stage 'train'")
-            status, said, files = _make_part(shell, place, job, pull)
+            status, said, files = _make_part(shell, place, job, pull, project.begun(job.subject))
             log += said
         metrics = root / "data" / job.subject / "metrics.json"
         return Outcome(
@@ -164,10 +164,17 @@ def repro(dvc: Callable[..., tuple[int, str]], *commands: Sequence[str]) -> tupl
     return status, log
 
 
-def _make_part(shell: _Shell, place: Path, job: Job, push: bool) -> tuple[int, str, dict[str, str]]:
-    """Exit status, what was said, and `Outcome.files`."""
-    module = "facefolds_core.training.segments.part"
-    status, log = shell.python(module, "--subject", job.subject, "--part", job.part)
+def _make_part(shell: _Shell, place: Path, job: Job, push: bool, begun: Path) -> tuple[int, str, dict[str, str]]:
+    """Exit status, what was said, and `Outcome.files`.
+
+    Args:
+        push: the cache is not shared.
+        begun: folder of a base's checkpoint, in a shared cache.
+    """
+    module, words = "facefolds_core.training.segments.part", ["--subject", job.subject, "--part", job.part]
+    if job.part == BASE and not push:
+        words += ["--begun", str(begun)]
+    status, log = shell.python(module, *words)
     if status:
         return status, log, {}
     made = made_by(place, job.part)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -35,6 +36,7 @@ class Project(WorkerPlugin):
         mark: name of a file in it; who sees that shares the cache.
         remotes: of DVC's settings, with whole addresses.
         remote: DVC's default remote, through which results travel: where the cache is not shared, or `always`.
+        owner: of what lies in the cache beside DVC's own: the project's folder, as a digest.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Project(WorkerPlugin):
     remotes: Mapping[str, Mapping[str, str]]
     remote: str | None
     always: bool
+    owner: str = ""
     scratch: Path | None = field(default=None, compare=False)
 
     def setup(self, worker: Any) -> None:
@@ -58,6 +61,11 @@ class Project(WorkerPlugin):
     def code(self) -> Path:
         assert self.scratch is not None
         return self.scratch / f"code-{self.name}"
+
+    def begun(self, subject: str) -> Path:
+        """Where the base of a subject's take leaves its checkpoint, in a cache that is shared: another worker goes on
+        from there when this one is lost."""
+        return self.cache / "begun" / self.owner / subject
 
     def unfold(
         self, place: Path, links: Mapping[str, str], params: str | None, lock: str, linked: bool = False
@@ -152,4 +160,5 @@ def snapshot(root: Path, run: str, always: bool) -> Project:
         remotes=remotes,
         remote=remote,
         always=always,
+        owner=hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:16],
     )

@@ -23,9 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.export.hold_kernel import add_weights, hold
+from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
+from facefolds_core.source_code import digest_of_packages
 
 _USUAL = BakeParams()
 
@@ -73,6 +75,7 @@ def held_rows(
     folder: Path,
     memory: int,
     window: int = _USUAL.hold_window,
+    kept: KeptFrames | None = None,
     progress: bool = True,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """All textures, held: part by part, and in each layer by layer.
@@ -80,21 +83,46 @@ def held_rows(
     Args:
         folder: where all frames of one layer and window lie meanwhile, if `memory` (bytes) cannot hold them.
         window: frames that are held together.
+        kept: of an earlier run; parts that would be the same are taken over.
 
     Yields:
         (layer, frame, (S, S, 4) uint8).
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
     made = parts(len(frames), window)
+    shown = {frames[own.start]: [frames[k] for k in around] for own, around in made}
+    common = digest_of({"weights": weights, "price": price, "code": digest_of_packages("export")})
+    digests = _Digests(textures, layers)
+
+    def digest(own: Sequence[int]) -> str:
+        around = shown[own[0]]
+        said = [around.index(own[0]), len(own), *(digests.of(frame) for frame in around)]
+        return digest_of({"common": common, "frames": said}).hex()
+
+    def make(own: Sequence[int], layer: int) -> Iterator[NDArray[np.uint8]]:
+        around = shown[own[0]]
+        first = around.index(own[0])
+        held = _held_layer(textures, layer, around, weights[layer], price, folder, memory)
+        yield from (image for position, image in enumerate(held) if first <= position < first + len(own))
+
+    earlier = KeptFrames(None) if kept is None else kept
     with progress_bar(total=len(made) * len(layers), desc="hold", unit="layer", disable=not progress) as bar:
-        for own, around in made:
-            for layer in layers:
-                shown = [frames[k] for k in around]
-                held = _held_layer(textures, layer, shown, weights[layer], price, folder, memory)
-                for position, image in enumerate(held, around.start):
-                    if position in own:
-                        yield layer, frames[position], image
-                bar.update()
+        groups = [[frames[k] for k in own] for own, _ in made]
+        yield from earlier.groups(groups, layers, digest, make, lambda: bar.update())
+
+
+class _Digests:
+    """Of frames of a store, each looked at once."""
+
+    def __init__(self, textures: FrameStore, layers: Sequence[int]) -> None:
+        self._textures, self._layers = textures, layers
+        self._known: dict[int, str] = {}
+
+    def of(self, frame: int) -> str:
+        if frame not in self._known:
+            images = (self._textures.image(layer, frame) for layer in self._layers)
+            self._known[frame] = digest_of_frame(b"", images)
+        return self._known[frame]
 
 
 def _held_layer(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -83,6 +83,44 @@ class KeptFrames:
             for layer, image in enumerate(make(frame) if images is None else images):
                 yield layer, frame, image
             done()
+
+    def groups(
+        self,
+        groups: Iterable[Sequence[int]],
+        layers: Sequence[int],
+        digest: Callable[[Sequence[int]], str],
+        make: Callable[[Sequence[int], int], Iterable[Image]],
+        done: Callable[[], object],
+    ) -> Iterator[tuple[int, int, Image]]:
+        """All images of frames that are made together, group by group, and in each layer by layer.
+
+        Args:
+            groups: frames of each.
+            layers: N.
+            digest: of what a group is made of; not asked for where nothing is kept.
+            make: makes the images of a group's frames in one layer, (S, S, 4) each.
+            done: called after each layer of a group.
+        """
+        for frames in groups:
+            names = [f"{digest(frames)} {k}" for k in range(len(frames))] if self.folder is not None else []
+            self._made |= dict(zip(frames, names, strict=False))
+            known = [self._known[name] for name in names if name in self._known]
+            for layer in layers:
+                images = self._layer(known, layer) if names and len(known) == len(names) else None
+                for frame, image in zip(frames, make(frames, layer) if images is None else images, strict=True):
+                    yield layer, frame, image
+                done()
+
+    def _layer(self, frames: Sequence[int], layer: int) -> Iterator[Image] | None:
+        """A layer's images; None if one is missing or damaged."""
+        assert self._store is not None
+        store = self._store
+        try:
+            for frame in frames:
+                store.image(layer, frame)
+        except UserError:
+            return None
+        return (store.image(layer, frame) for frame in frames)
 
     def _images(self, frame: int, layers: int) -> list[Image] | None:
         assert self._store is not None

@@ -5,7 +5,7 @@ Only the model's own interface is used (`protocol.LayeredModel`), so that any mo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -205,23 +205,30 @@ def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[
 
 
 def write_textures(
-    path: Path, model: LayeredModel, grids: Grids, kept: Path | None = None, progress: bool = True
+    path: Path,
+    model: LayeredModel,
+    grids: Grids,
+    kept: Path | None = None,
+    among: Collection[int] | None = None,
+    progress: bool = True,
 ) -> NDArray[np.uint8]:
     """Write all texture images to a layered frame store (camera := layer), holding one frame's in memory.
 
     Args:
         kept: folder of an earlier run's; of a model without texels of its own nothing is taken over, since to ask it
             is what takes the time.
+        among: frames whose alpha is looked at; all by default.
 
     Returns:
-        (N, R, R) largest alpha of any frame.
+        (N, R, R) largest alpha of any of those frames.
     """
     opacity = np.zeros(grids.valid.shape, np.uint8)
     earlier = KeptFrames(None if model.texel_grid() is None else kept)
 
     def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
         for layer, frame, image in texture_rows(model, grids, earlier, progress):
-            np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
+            if among is None or frame in among:
+                np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
             yield layer, frame, image
 
     write_frames(path, (grids.resolution, grids.resolution, 4), rows(), packed=True)

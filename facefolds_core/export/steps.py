@@ -55,20 +55,27 @@ def check_frames(model: LayeredModel, scene: Scene, file: Path | None = None) ->
 
 
 def sample_model(
-    model: LayeredModel, cameras: Sequence[Camera], params: SampleParams, folder: Path, kept: Path | None = None
+    model: LayeredModel,
+    cameras: Sequence[Camera],
+    params: SampleParams,
+    folder: Path,
+    kept: Path | None = None,
+    keys: Sequence[int] | None = None,
 ) -> Grids:
     """N grids of R x R points and normals; the textures of all frames go to `folder`/textures.arrow.
 
     Args:
         cameras: for training: they decide what the window must hold.
         kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
+        keys: the key frames of a take in segments, for `params.opacity`; None where all frames were trained at once.
     """
     from facefolds_core.export.sampling import sample_grids, write_textures
     from facefolds_core.export.window import visible_window
 
-    window = visible_window(model, cameras, params.auto_window) if params.window == "auto" else model.window
+    among = keys if params.opacity == "key_frames" else None
+    window = visible_window(model, cameras, params.auto_window, among) if params.window == "auto" else model.window
     grids = sample_grids(model, params.resolution, window)
-    opacity = write_textures(folder / TEXTURES, model, grids, kept)
+    opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
 
 
@@ -147,7 +154,8 @@ def bake(
         cameras: for training.
         samples, textures: frame stores of the textures as they were sampled, and at the size that ships. They are let
             go before the texels are held.
-        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
+        kept: folder of what an earlier run made, from which frames are taken over that would be the same, and beside it
+            what was held; or None.
 
     Returns:
         of how many rays they are a fit; 0 if they were left as they are.
@@ -165,8 +173,11 @@ def bake(
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
         weights = texel_weights(rays, baked, len(cameras), params)
-        rows = held_rows(baked, weights, params.hold, folder, params.hold_megabytes << 20, params.hold_window)
+        memory = params.hold_megabytes << 20
+        earlier = KeptFrames(None if kept is None else kept.with_name(f"{kept.name}_held"))
+        rows = held_rows(baked, weights, params.hold, folder, memory, params.hold_window, earlier)
         write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
+        earlier.keep(path)
         baked.path.unlink()
     return len(rays)
 

@@ -24,17 +24,24 @@ from facefolds_core.params import AutoWindowParams
 _USUAL = AutoWindowParams()
 
 
-def visible_window(model: LayeredModel, cameras: Sequence[Camera], params: AutoWindowParams = _USUAL) -> Window:
+def visible_window(
+    model: LayeredModel,
+    cameras: Sequence[Camera],
+    params: AutoWindowParams = _USUAL,
+    among: Sequence[int] | None = None,
+) -> Window:
     """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `max_change`.
 
     Args:
         model: looked at without its view branch, in its first, middle and last frame.
         cameras: the training cameras.
+        among: frames of which those are the first, the middle and the last; all by default.
 
     Returns:
         the window, cut to the model's; the model's if it is transparent everywhere.
     """
-    frames = sorted({round(f) for f in np.linspace(0, model.num_frames - 1, params.frames)})
+    known = range(model.num_frames) if among is None else sorted(among)
+    frames = sorted({known[round(f)] for f in np.linspace(0, len(known) - 1, params.frames)})
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for camera in cameras:
         stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / params.rays_per_camera)))

@@ -133,7 +133,8 @@ def kept_parts(kept: Path | None, scratch: Path, params: CompressParams) -> Iter
     """Encoded parts in `kept`, of which those that this run needs stay; or in a folder of `scratch` that goes."""
     common = digest_of_packages("asset", "packaging", "export").encode()
     with TemporaryDirectory(dir=scratch, prefix=".parts-") if kept is None else nullcontext(kept) as folder:
-        parts = Parts(Path(folder), common, params.stream.megabytes << 20)
+        stream = params.stream
+        parts = Parts(Path(folder), common, stream.megabytes << 20, stream.encoders)
         yield parts
         parts.tidy()
 

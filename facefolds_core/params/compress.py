@@ -140,8 +140,13 @@ class StreamParams(Section):
     segment_seconds: Annotated[float, Field(ge=0.1, le=60)] = 2.0
     """Of a segment, rounded to whole frames: short ones switch and seek faster, long ones are smaller."""
 
+    encoders: Natural = 1
+    """Segments that are encoded at once, each with the memory of an encoder, 200 bytes a pixel of the picture (0.8 GB
+    of 4 megapixels). 1: a long take needs no more than a short one. 0: as many as there are cores and `megabytes` for.
+    The result does not depend on it."""
+
     megabytes: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
-    """Memory for encoders: segments are encoded side by side, as many as it holds."""
+    """Memory for encoders, if there are several."""
 
 
 class BetweenParams(Section):

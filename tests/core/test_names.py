@@ -12,6 +12,7 @@ from facefolds_core.files import write_json
 from facefolds_core.paths import (
     SubjectFolders,
     check_capture_place,
+    check_mattes_place,
     check_path_text,
     check_subject_name,
     subject_folders,
@@ -19,6 +20,7 @@ from facefolds_core.paths import (
 )
 from stages.capture import capture
 from stages.common import run_stage
+from stages.configure import configure
 from tests.hostile.damage import fingerprint
 
 # Those of tests/pipeline/test_names.py, and more.
@@ -117,6 +119,26 @@ def test_a_users_capture_is_never_replaced(place: str, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="where the stages write"):
         capture(folders)
     assert fingerprint(tmp_path) == before
+
+
+@pytest.mark.parametrize("place", ["data/anna/mattes", "data/anna", "data", "link"])
+def test_mattes_that_a_user_names_are_never_a_stage_s_own(place: str, tmp_path: Path) -> None:
+    """DVC deletes the stage's folder before the stage reads it."""
+    folders = subject_folders(tmp_path / "data", "anna")
+    folders.mattes.mkdir(parents=True)
+    (tmp_path / "link").symlink_to(folders.mattes)
+    with pytest.raises(UserError, match=r"subjects\.anna\.mattes") as caught:
+        check_mattes_place(str(tmp_path / place), folders)
+    assert "where the stages write" in str(caught.value)
+    for other in ("mine", "data/actor/mattes"):
+        assert check_mattes_place(str(tmp_path / other), folders) == tmp_path / other
+
+
+def test_configure_looks_at_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "params.yaml").write_text("subjects:\n  anna: {source: actor, path: x, mattes: data/anna/mattes}\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=r"subjects\.anna\.mattes"):
+        configure(Path("data"))
 
 
 def test_a_capture_of_another_subject_may_be_read(tmp_path: Path) -> None:

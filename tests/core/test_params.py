@@ -83,6 +83,18 @@ def test_training_parameters_reach_mattes_only_where_they_are_needed(
     assert read_volume_source(tmp_path).layers == (5 if "volume.json" in changed else 12)
 
 
+@pytest.mark.parametrize("method", ["auto", "plates", "pictures"])
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_mattes_are_found_of_the_frames_that_train(tmp_path: Path, method: str, preset: str) -> None:
+    """A starting volume is fitted to some frames, of long takes to those of key frames."""
+    own = "moving: {volume_frames: 9}, segments: {key_frames: 7}" if preset == "fast" else "seed: 3"
+    text = MINIMAL + f"train: {{preset: {preset}, {own}}}\nmatte: {{method: {method}}}\n"
+    write_configs(load_params(params_file(tmp_path, text)), "a", tmp_path)
+    start = read_volume_source(tmp_path)
+    found = (start.moving.volume_frames, start.segments.key_frames, start.seed)
+    assert found == ((9, 7, 0) if preset == "fast" else (5, 24, 3))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -94,6 +106,7 @@ def test_training_parameters_reach_mattes_only_where_they_are_needed(
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
         (MINIMAL + "train: {lambda_veil: 0}\n", "losses.opacity"),
+        ("subjects:\n  a: {source: actor, path: x, mattes: ~/mine}\n", "subjects.a.mattes"),
         (MINIMAL + "train: {mattes: {vote: {share: 0.9}}}\n", "`matte: {...}` beside `train`"),
         ("subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {volume: {}}\n", "to the subjects"),
         (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),

@@ -10,7 +10,8 @@ from scipy.optimize import lsq_linear
 
 from facefolds_core.export.bake_kernel import render
 from facefolds_core.export.hold import held_rows, parts, texel_weights
-from facefolds_core.export.hold_kernel import add_weights, steady
+from facefolds_core.export.hold_kernel import add_weights, hold, steady
+from facefolds_core.export.kept import KeptFrames
 from facefolds_core.frame_store import FrameStore, write_frames
 
 
@@ -94,11 +95,16 @@ def test_each_frame_is_held_once_among_those_around_it(count: int, window: int) 
         assert around.stop == min(count, own.stop + margin)
 
 
-def held(images: np.ndarray, folder: Path, window: int) -> np.ndarray:
+def held(
+    images: np.ndarray, folder: Path, window: int, kept: KeptFrames | None = None, weight: float = 0.2
+) -> np.ndarray:
     """One layer of images (K, 8, 8, 4)."""
     write_frames(folder / "t.arrow", (8, 8, 4), ((0, k, one) for k, one in enumerate(images)))
-    weights, store = np.full((1, 8, 8, 2), 0.2, np.float32), FrameStore(folder / "t.arrow")
-    rows = held_rows(store, weights, 1.0, folder, 1 << 20, window, progress=False)
+    weights, store = np.full((1, 8, 8, 2), weight, np.float32), FrameStore(folder / "t.arrow")
+    rows = list(held_rows(store, weights, 1.0, folder, 1 << 20, window, kept, progress=False))
+    if kept is not None:
+        write_frames(folder / "held.arrow", (8, 8, 4), rows, packed=True)
+        kept.keep(folder / "held.arrow")
     return np.stack([image for _, _, image in rows])
 
 
@@ -118,3 +124,28 @@ def test_what_keeps_still_hardly_moves_where_windows_meet(tmp_path: Path) -> Non
     steps = np.abs(np.diff(held(images, tmp_path, 32).astype(int), axis=0))
     assert np.abs(np.diff(images.astype(int), axis=0)).mean() > 2
     assert steps[15::16].mean() < 0.5  # of codes; seen 0.3
+
+
+def test_parts_that_would_be_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = list[int]()
+
+    def counted(block: np.ndarray, weights: np.ndarray, price: float) -> None:
+        made.append(len(block))
+        hold(block, weights, price)
+
+    monkeypatch.setattr("facefolds_core.export.hold.hold", counted)
+    images = np.random.default_rng(5).integers(100, 104, (64, 8, 8, 4)).astype(np.uint8)
+    other = images.copy()
+    other[40] += 50
+
+    def runs(shown: np.ndarray, weight: float = 0.2) -> int:
+        made.clear()
+        found = held(shown, tmp_path, 16, KeptFrames(tmp_path / "kept"), weight)
+        count = len(made)
+        assert np.array_equal(found, held(shown, tmp_path, 16, weight=weight))
+        return count
+
+    assert runs(images) == 8
+    assert runs(images) == 0
+    assert runs(other) == 2  # frame 40 is the first of a part, and looked at by the part before
+    assert runs(other, weight=0.3) == 8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -77,3 +78,38 @@ def test_what_is_damaged_is_made_anew(name: str, tmp_path: Path) -> None:
 def test_a_digest_tells_values_apart(value: object) -> None:
     assert digest_of({"a": value}) == digest_of({"a": value})
     assert digest_of({"a": value}) != digest_of({"a": np.array([1.5, 2.5])})
+
+
+def grouped(folder: Path, changed: int | None = None) -> tuple[list[tuple[int, int]], list[Image]]:
+    """(first frame, layer) of what is made, and all images; each group of two frames is made of all its frames."""
+    store, kept, made = source(folder / "in.arrow", changed), KeptFrames(folder / "kept"), list[tuple[int, int]]()
+
+    def make(frames: Sequence[int], layer: int) -> list[Image]:
+        made.append((frames[0], layer))
+        return [255 - store.image(layer, frame) for frame in frames]
+
+    def digest(frames: Sequence[int]) -> str:
+        return digest_of_frame(b"", (store.image(n, k) for n in range(LAYERS) for k in frames))
+
+    rows = kept.groups([[0, 1], [2]], range(LAYERS), digest, make, lambda: None)
+    write_frames(folder / "out.arrow", (8, 8, 4), rows, packed=True)
+    kept.keep(folder / "out.arrow")
+    out = FrameStore(folder / "out.arrow")
+    return made, [out.image(n, k) for k in range(FRAMES) for n in range(LAYERS)]
+
+
+def test_groups_are_taken_over_whole(tmp_path: Path) -> None:
+    made, images = grouped(tmp_path)
+    assert made == [(0, 0), (0, 1), (2, 0), (2, 1)]
+    again, same = grouped(tmp_path)
+    assert again == []
+    assert np.array_equal(images, same)
+    assert grouped(tmp_path, changed=1)[0] == [(0, 0), (0, 1)]
+
+
+def test_a_damaged_group_is_made_anew(tmp_path: Path) -> None:
+    _, images = grouped(tmp_path)
+    (tmp_path / "kept" / STORE).write_bytes(b"")
+    made, same = grouped(tmp_path)
+    assert len(made) == 4
+    assert np.array_equal(images, same)

@@ -171,3 +171,24 @@ def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeyp
     assert (tmp_path / "changed").read_bytes() == (tmp_path / "whole").read_bytes()
     kept = write_textures(tmp_path / "changed", OfTexels(changed=2), grids, tmp_path / "kept", progress=False)
     assert np.array_equal(kept, opacity)
+
+
+class Flashing(OfTexels):
+    """More opaque in one frame."""
+
+    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
+        rgb, alpha = super().texture(uv, layer, time)
+        return rgb, alpha * (1.0 if time == self.changed else 0.5)
+
+
+def test_a_layer_shows_where_the_frames_asked_for_do(tmp_path: Path) -> None:
+    model = Flashing(changed=2)
+    grids = sample_grids(model, 8, WINDOW, progress=False)
+    by_all, by_others, by_one = (
+        write_textures(tmp_path / "t.arrow", model, grids, among=among, progress=False)
+        for among in (None, [0, 1, 3], [2])
+    )
+    without = write_textures(tmp_path / "t.arrow", Flashing(), grids, progress=False)
+    assert np.array_equal(by_others, without)
+    assert np.array_equal(by_one, by_all)
+    assert not np.array_equal(by_others, by_all)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from torch import Tensor
 
 from facefolds_core.export.window import removed_weight, visible_window
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
 from facefolds_core.params import AutoWindowParams
-from tests.ellipsoids import Ellipsoids
+from tests.ellipsoids import Composited, Ellipsoids
 from tests.scenes import look_at_origin
 
 RIG = [look_at_origin(f"cam{i}", azimuth, 10 * (-1) ** i, 120) for i, azimuth in enumerate((-40, -15, 15, 40))]
@@ -37,3 +38,18 @@ def test_an_invisible_model_keeps_the_whole_hemisphere() -> None:
 def test_no_window_is_larger_than_the_models(patch: float) -> None:
     own = (-0.1, 0.2, -0.15, 0.25)
     assert visible_window(Ellipsoids(patch=patch, window=own), RIG[:2]) == own
+
+
+def test_only_frames_asked_for_are_looked_at() -> None:
+    asked = set[float]()
+
+    class Listening(Ellipsoids):
+        def render(self, origins: Tensor, directions: Tensor, time: float, view_effects: bool) -> Composited:
+            asked.add(time)
+            return super().render(origins, directions, time, view_effects)
+
+    visible_window(Listening(num_frames=20), RIG[:1])
+    assert asked == {0, 10, 19}
+    asked.clear()
+    visible_window(Listening(num_frames=20), RIG[:1], among=[17, 3, 5, 8, 4])
+    assert asked == {3, 5, 17}

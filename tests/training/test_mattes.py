@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tqdm import tqdm
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
@@ -107,6 +108,17 @@ def test_beside_a_plate_opacity_is_found_along_the_outline() -> None:
     opacity = np.clip((20 - np.hypot(x - 32, y - 32)) / 4 + 0.5, 0, 1)
     found = from_plate(*_before_a_plate(opacity), PlateParams())
     assert np.abs(found - opacity).max() < 0.15  # seen: 0.07
+
+
+@pytest.mark.parametrize("given", [{"outline": 0}, {"contrast": 0.0}, {"beyond": 0}])
+def test_beside_a_plate_no_limit_is_too_low(given: dict[str, float]) -> None:
+    """A black square before a grey room that has a black thing beside it."""
+    plate = np.full((40, 40, 3), 100, np.uint8)
+    plate[12:16, 31:] = 0
+    image = plate.copy()
+    image[10:30, 10:30] = 0
+    opacity = from_plate(image, plate, PlateParams.model_validate(given))
+    assert opacity[10:30, 10:30].min() == 1 and opacity[:, 31:].max() == 0
 
 
 def test_shadows_and_holes_beside_a_plate_are_none() -> None:

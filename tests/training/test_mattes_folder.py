@@ -10,12 +10,16 @@ import pytest
 from PIL import Image
 
 from facefolds_core.captures.chosen_mattes import scored_scene, training_scene
+from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
 from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.training.mattes.folder import make_mattes
+from facefolds_core.training.photos import posed_photos
+from facefolds_core.training.segments.plan import plan_take
+from facefolds_core.training.volume.fit import volume_frames
 from tests.scenes import make_scene
 
 SIZE = 16
@@ -75,6 +79,31 @@ def test_named_ones_stand_above_all_others_and_train(scene: Scene, folders: Subj
     _make(scene, folders, named)
     wanted = {(0, 0): 200, **{(2, k): 150 for k in range(scene.num_frames)}}
     assert _values(training_scene(folders)) == _values(scored_scene(folders)) == wanted
+
+
+def test_named_ones_of_pictures_that_are_not_there_are_none(folders: SubjectFolders, tmp_path: Path) -> None:
+    """A held-out camera may lack frames."""
+    scene = make_scene(folders.scene, size=SIZE)
+    store, lacking = scene.open_frames(), (scene.splits.index("holdout"), 1)
+    rows = [(*key, store.image(*key).copy()) for key in store if key != lacking]
+    del store
+    write_frames(scene.folder / "frames.arrow", (SIZE, SIZE, 3), rows)
+    named = _name(tmp_path / "named", scene, lacking[0], None, 150, (SIZE, SIZE))
+    _make(scene, folders, named)
+    assert _values(scored_scene(folders)) == {(lacking[0], 0): 150}
+
+
+@pytest.mark.parametrize("frames", [1, 6])
+def test_the_base_of_a_long_take_trains_with_them(folders: SubjectFolders, frames: int) -> None:
+    """Its starting volume is fitted to one of the key frames, not to the frame in the middle of the take."""
+    scene, black = make_scene(folders.scene, size=SIZE, frames=frames), np.zeros((SIZE, SIZE, 3), np.uint8)
+    write_frames(scene.folder / "plates.arrow", black.shape, [(c, 0, black) for c in range(len(scene.cameras))])
+    start = ExplicitParams.model_validate({"segments": {"joint_frames": 0, "key_frames": 2}})
+    make_mattes(scene, folders.mattes, MatteParams(method="plates", train="all"), start, None)
+    trained = training_scene(folders)
+    base = part_of(trained, plan_take(trained, start, 2).keys)
+    seen = posed_photos(base, base.indices("train"), volume_frames(base, start))
+    assert len(seen) == 6 and all(view.photo.matte is not None for view in seen)
 
 
 @pytest.mark.parametrize("train", ["none", "given", "all"])

@@ -26,6 +26,7 @@ from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.progress import progress
 from facefolds_core.training.mattes.find import CutOut, Key, beside_plates, from_pictures, small, wanted_pictures
 from facefolds_core.training.mattes.sheet import MOST, contact_sheet
+from facefolds_core.training.segments.plan import trained_at_once
 from facefolds_core.training.volume.fit import iterations, volume_frames
 from facefolds_core.training.volume.search import find_subject
 
@@ -88,14 +89,16 @@ def _found(
     """Mattes of the pictures that serve something and have none."""
     if params.method == "none":
         return [], ()
-    missing = [key for key in wanted_pictures(scene, volume_frames(scene, start)) if key not in set(known)]
+    trained, numbers = trained_at_once(scene, start)
+    frames = [numbers[k] for k in volume_frames(trained, start)]
+    missing = [key for key in wanted_pictures(scene, frames) if key not in set(known)]
     found = [] if params.method == "pictures" else beside_plates(scene, missing, params)
     done = {(one.camera, one.frame) for one in found}
     missing = [key for key in missing if key not in done]
     if params.method == "plates" or not missing:
         return found, ()
     with progress(total=iterations(start.volume) + len(missing), desc="matte", unit="it") as bar:
-        volume, notes = find_subject(scene, start, bar)
+        volume, notes = find_subject(trained, start, bar)
         return [*found, *from_pictures(scene, volume, missing, params, bar)], notes
 
 

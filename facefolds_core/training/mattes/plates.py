@@ -42,11 +42,12 @@ def _soft(image: Image, plate: Image, subject: Image, params: PlateParams) -> Ar
     if not inside.any():
         return subject.astype(np.float32)
     colours, room = image.astype(np.float32) / 255, plate.astype(np.float32) / 255
-    blur = 0.5 * params.outline
+    blur = 0.5 * max(1, params.outline)
     weight = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), blur)[..., None]
     own = cv2.GaussianBlur(colours * inside[..., None], (0, 0), blur) / np.maximum(weight, 1e-3)
     nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
     across = own[tuple(nearest)] - room
-    opacity = ((colours - room) * across).sum(-1) / np.maximum((across**2).sum(-1), 3 * params.contrast**2)
+    least = max(3 * params.contrast**2, 1e-12)  # where both are the same colour nothing is divided by 0
+    opacity = ((colours - room) * across).sum(-1) / np.maximum((across**2).sum(-1), least)
     opacity = np.where(grown(subject, params.beyond) > 0, np.clip(opacity, 0, 1), 0)
     return np.where(inside, 1, opacity).astype(np.float32)

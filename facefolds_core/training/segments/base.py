@@ -121,11 +121,18 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
     return digest.hexdigest()[:16]
 
 
-def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
+def train_base(
+    scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
+) -> None:
     """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
-    folder, whole or not at all."""
-    kept = folder.with_name(f"{BEGUN}{folder.name}")
-    for other in folder.parent.glob(f"{BEGUN}*"):
+    folder, whole or not at all.
+
+    Args:
+        begun: folder of the checkpoint, of this subject alone; by default the base's.
+    """
+    begun = folder.parent if begun is None else begun
+    kept = begun / f"{BEGUN}{folder.name}"
+    for other in begun.glob(f"{BEGUN}*"):
         if other != kept:
             shutil.rmtree(other)
     # The frames are fitted without a reflection, which is added to what they then show.

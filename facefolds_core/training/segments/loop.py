@@ -184,8 +184,10 @@ class _SegmentLog:
         return sum(has)
 
 
-def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, log: Path) -> Base:
-    """The base of a take, trained if it is not in `folder`, and the log of its training."""
+def base_of(
+    plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
+) -> Base:
+    """The base of a take, trained if it is not in `folder`, and the log of its training. `begun`: see `train_base`."""
     place = folder / f"base-{plan.base}"
     if not place.exists():
         tqdm.write(f"train: the base of {len(plan.keys)} key frames first")
@@ -194,7 +196,7 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
                 "train: it is another one than before (other key frames, pictures, parameters or code), and all frames "
                 "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
             )
-        train_base(scene, list(plan.keys), params, place, log)
+        train_base(scene, list(plan.keys), params, place, log, begun)
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)

@@ -33,8 +33,8 @@ from facefolds_core.training.segments.names import BASE, PLAN
 from facefolds_core.training.segments.plan import Segment, plan_take
 
 
-def make_base(folders: SubjectFolders, scene: Scene, params: ExplicitParams) -> str:
-    """Plan the take and train its base; says what was made."""
+def make_base(folders: SubjectFolders, scene: Scene, params: ExplicitParams, begun: Path | None = None) -> str:
+    """Plan the take and train its base; says what was made. `begun`: see `train_base`."""
     place = folders.checkpoints / "take"
     told = forecast(scene, params)
     check_forecast(told, params, place)
@@ -42,7 +42,7 @@ def make_base(folders: SubjectFolders, scene: Scene, params: ExplicitParams) -> 
         write_text(place / PLAN, json.dumps({"segments": []}))
         return f"{scene.num_frames} frames {told}: there are no segments"
     plan = plan_take(scene, params, told.key_frames)
-    base_of(plan, scene, params, place, folders.training_log)
+    base_of(plan, scene, params, place, folders.training_log, begun)
     cache = SegmentCache(place)
     segments = [{**asdict(segment), "file": cache.path(segment.names).name} for segment in plan.segments]
     found = {"base": plan.base, "folder": f"base-{plan.base}", "keys": plan.keys, "segments": segments}
@@ -73,6 +73,7 @@ def command(
     subject: Annotated[str, typer.Option(help="Name in params.yaml.")],
     part: Annotated[str, typer.Option(help="base, or the number of a segment, from 0 on.")],
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
+    begun: Annotated[Path | None, typer.Option(help="Folder of the base's checkpoint; by default beside it.")] = None,
 ) -> None:
     """Train a part of a take."""
     with report_user_errors("train"):
@@ -82,7 +83,10 @@ def command(
         if not isinstance(params, ExplicitParams):
             raise UserError("a model without segments", place=f"train.model of {subject}", expected="explicit")
         scene = training_scene(folders)
-        made = make_base(folders, scene, params) if part == BASE else make_segment(folders, scene, params, int(part))
+        if part == BASE:
+            made = make_base(folders, scene, params, begun)
+        else:
+            made = make_segment(folders, scene, params, int(part))
         tqdm.write(f"train: {made}")
 
 
