@@ -152,7 +152,7 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
     scene = trained[0]
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     apart = [
-        np.linalg.norm(c.project(np.zeros(3))[0] - c.project(1e-4 * c.R[0])[0]) for c in cameras
+        np.linalg.norm(c.project(np.zeros(3))[0] - c.project(1e-4 * c.rotation[0])[0]) for c in cameras
     ]  # pixels, of a step to the camera's right
     assert fit.pixel_size(scene) == pytest.approx(1e-4 / float(np.median(apart)), rel=0.02)
 
