@@ -101,9 +101,9 @@ WORDS = {
     "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
     "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
-    "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
-    "one training's cannot be compared with another's. Give masks of the scored cameras, or find mattes: "
-    "`matte: {{method: auto}}` in params.yaml (docs/guide/subjects.md)",
+    "matte_is_found": "warning: no masks, and not of all scored pictures mattes: scores are taken where the model "
+    "itself is opaque, so that one training's cannot be compared with another's. Give masks of the scored cameras, or "
+    "find mattes: `matte: {{method: auto}}` in params.yaml, and name those that it leaves out (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }

@@ -60,7 +60,7 @@ class VoteParams(Section):
     """Of the pictures that see a voxel; the rest may be wrong."""
 
     min_views: Count = 3
-    """Voxels that fewer pictures see are nobody's."""
+    """Voxels that fewer pictures see are nobody's; where there are fewer in all, none votes."""
 
     body_depth: Weight = 0.1
     """Optical depth of a voxel of the starting volume from which on it belongs to the subject's body,"""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
-from facefolds_core.training.mattes.find import beside_plates, from_pictures
+from facefolds_core.training.mattes.find import beside_plates, from_pictures, small
 from facefolds_core.training.volume.fit import Volume
 
 
@@ -52,9 +52,11 @@ def silhouettes(scene: Scene, volume: Volume, params: ExplicitParams) -> Silhoue
     found = beside_plates(scene, rest, params.outlines)
     plain = {(one.camera, one.frame) for one in found}
     rest = [key for key in rest if key not in plain]
-    if len(rest) >= params.outlines.vote.min_views:
+    if rest and len(pictures) >= params.outlines.vote.min_views:
+        sure = {key: small(scene, mattes.image(*key), params.outlines) for key in known if mattes is not None}
+        sure |= {(one.camera, one.frame): one.matte for one in found}
         with progress(total=len(rest), desc="outlines", unit="picture") as bar:
-            found += from_pictures(scene, volume, rest, params.outlines, bar)
+            found += from_pictures(scene, volume, rest, params.outlines, bar, sure)
     known |= {
         (one.camera, one.frame): one.opacity(scene.height, scene.width).reshape(-1) for one in found if one.believed
     }
