@@ -73,7 +73,7 @@ def test_a_matte_of_another_frame_is_none_of_this_one(scene: Scene) -> None:
 def test_some_cameras_are_enough(scene: Scene) -> None:
     found = _found(scene, pruning={"beside_cameras": 4})
     assert found is not None
-    assert found.row[0] >= 0 and found.row[-1] >= 0 and (found.row >= 0).sum() == 4
+    assert found.row[0] >= 0 and (found.row[[1, 4]] < 0).all()  # 0, 2, 3 and 5 are looked at
 
 
 def test_pictures_that_are_too_few_to_vote_say_nothing(scene: Scene) -> None:
