@@ -79,6 +79,8 @@ WORDS = {
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
+    "few_cameras": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of them "
+    "sees is empty, layers lie closer and move more smoothly",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "

@@ -27,6 +27,7 @@ from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
+from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.log import open_log
 from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report
@@ -100,13 +101,14 @@ def fit_with_surroundings(
     device = choose(params.device)
     checkpoints = None if kept is None else Checkpoints(kept, params.segments)
     began = time.perf_counter()
+    used, _ = for_scene(params, scene)
     with open_log(log) as live:
         bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
-        volume, found = find_subject(scene, params, bar)
+        volume, found = find_subject(scene, used, bar)
         cameras = choose_cameras(scene, volume.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        own = for_notes(params, found)
+        own = for_notes(used, found)
         fit = fit_scene(cameras.scene, volume, own)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
