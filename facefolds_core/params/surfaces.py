@@ -109,9 +109,9 @@ class GeometryParams(Section):
     max_halfwidth: Length = 0.015
     """No layers lie farther from their middle than this, units, however blurred the volume is,"""
 
-    max_halfwidth_pixels: Factor | None = 8.0
+    max_halfwidth_pixels: Factor = 8.0
     """nor than so many pixels of the median training camera (but `halfwidth` they may): what lies farther apart shows
-    each camera its own picture. In fog, and with null, `max_halfwidth` alone counts."""
+    each camera its own picture. In fog `max_halfwidth` alone counts."""
 
     min_radius: Annotated[float, Field(ge=0.02, le=10)] = 0.08
     """No layer's middle comes nearer to c, units: the search for crossings takes strides of less than half of that."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -142,7 +143,7 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
 def test_layers_are_no_more_than_so_many_pixels_wide(pixel: float, most: float) -> None:
     params = GEOMETRY.model_copy(update={"halfwidth": 0.006, "max_halfwidth": 0.015, "max_halfwidth_pixels": 8.0})
     assert fit.greatest_halfwidth(params, pixel) == pytest.approx(most)
-    anyhow = params.model_copy(update={"max_halfwidth_pixels": None})
+    anyhow = params.model_copy(update={"max_halfwidth_pixels": math.inf})
     assert fit.greatest_halfwidth(anyhow, pixel) == pytest.approx(0.015)
 
 

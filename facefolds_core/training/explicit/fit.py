@@ -159,8 +159,7 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
 
 def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
     """Units; `pixel`: of the median camera at the subject, units."""
-    pixels = params.max_halfwidth_pixels
-    return max(params.halfwidth, params.max_halfwidth if pixels is None else min(params.max_halfwidth, pixels * pixel))
+    return max(params.halfwidth, min(params.max_halfwidth, params.max_halfwidth_pixels * pixel))
 
 
 def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:

@@ -3,6 +3,7 @@ crossings. A short take simply starts again where it was interrupted; the base o
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,7 +69,7 @@ def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
         return params
     background = params.background.model_copy(update={"rate": 0.0})
     pruning = params.pruning.model_copy(update={"room_gain": 0.0, "beside_gain": 0.0})
-    geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": None})
+    geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": math.inf})
     return params.model_copy(update={"background": background, "pruning": pruning, "geometry": geometry})
 
 
