@@ -79,6 +79,8 @@ WORDS = {
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
+    "few_cameras": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of them "
+    "sees is empty, layers lie closer and move more smoothly",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
@@ -101,9 +103,9 @@ WORDS = {
     "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
     "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
-    "matte_is_found": "warning: neither masks nor mattes: scores are taken where the model itself is opaque, so that "
-    "one training's cannot be compared with another's. Give masks of the scored cameras, or find mattes: "
-    "`matte: {{method: auto}}` in params.yaml (docs/guide/subjects.md)",
+    "matte_is_found": "warning: no masks, and not of all scored pictures mattes: scores are taken where the model "
+    "itself is opaque, so that one training's cannot be compared with another's. Give masks of the scored cameras, or "
+    "find mattes: `matte: {{method: auto}}` in params.yaml, and name those that it leaves out (docs/guide/subjects.md)",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }

@@ -66,7 +66,8 @@ def _least(
     photos: Sequence[NDArray[np.float64]],
     params: ChoiceParams,
 ) -> tuple[int, dict[str, Any]]:
-    """From the finest down to the first that is not good enough: the one before it, and what was measured.
+    """From the finest down to the first that is not good enough: the one before it, and what was measured. The finest
+    where no pixel counts.
 
     Args:
         pictures: of a candidate, one a look.
@@ -75,6 +76,8 @@ def _least(
     finest, *coarser = sorted(candidates, reverse=True)
     best = pictures(finest)
     seen = [alpha[0] > params.opaque for _, alpha in best]
+    if not any(at.any() for at in seen):  # nothing says that less would do
+        coarser = []
 
     def decibels(found: Sequence[Picture], truth: Sequence[NDArray[Any]]) -> float:
         parts = [(one[0][0] - other)[at] for one, other, at in zip(found, truth, seen, strict=True)]

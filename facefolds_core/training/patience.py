@@ -23,6 +23,11 @@ EVERY = 5.0
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
+def is_full(error: OSError) -> bool:
+    """Whether there is no room on the disk, or a quota is used up."""
+    return error.errno in _FULL
+
+
 def patiently(write: Callable[[], T]) -> T:
     """Call `write`; while the disk is full, say so once and call it again, for SECONDS at most.
 
@@ -37,7 +42,7 @@ def patiently(write: Callable[[], T]) -> T:
         try:
             return write()
         except OSError as error:
-            if error.errno not in _FULL or time.monotonic() >= deadline:
+            if not is_full(error) or time.monotonic() >= deadline:
                 raise
             if not told:
                 sys.stderr.write(

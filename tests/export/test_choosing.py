@@ -96,6 +96,23 @@ def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path) -> None:
     assert f"took {chosen} of" in str(why) and "split train" in str(why)
 
 
+@pytest.mark.parametrize("unseen", ["nothing is opaque", "no photo is there"])
+def test_where_nothing_can_be_compared_the_finest_is_taken(tmp_path: Path, unseen: str) -> None:
+    filmed = film(tmp_path, 32.0)
+    if unseen == "nothing is opaque":
+        glass = stripes(32.0)
+        glass[..., 3] = 120
+        write_frames(tmp_path / "glass.arrow", glass.shape, [(0, 0, glass)])
+        filmed = Filmed(filmed.scene, FrameStore(tmp_path / "glass.arrow"))
+    else:
+        splits = tuple("validate" if i == 0 else split for i, split in enumerate(filmed.scene.splits))
+        rows = [(i, 0, filmed.scene.open_frames().image(i, 0).copy()) for i in range(1, 5)]
+        write_frames(filmed.scene.folder / "frames.arrow", rows[0][2].shape, rows)
+        filmed = Filmed(replace(filmed.scene, splits=splits), filmed.textures)
+    chosen, why = choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)
+    assert chosen == 64 and why.values["tried"] == [64]
+
+
 def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path) -> None:
     scene = film(tmp_path, 16.0).scene
     params = TextureChoiceParams(cameras=3)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import pytest
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.model.tensor_files import write_tensors
+from facefolds_core.training import patience
 from facefolds_core.training.explicit.checkpoints import STATE
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.segments.loop import base_of
@@ -109,6 +113,38 @@ def test_a_damaged_checkpoint_is_none(
     with counted() as steps:
         assert make(scene, plan, tmp_path, **OFTEN) == expected
     assert len(steps) == STEPS
+
+
+def test_it_makes_room_for_the_base_where_the_disk_is_full(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    scene, plan, expected = whole
+    tries: list[bool] = []
+
+    def write(*arguments: Any) -> None:
+        tries.append(any(tmp_path.glob("begun-*")))
+        assert len(tries) < 3
+        if tries[-1]:
+            raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path))
+        write_tensors(*arguments)
+
+    with patch("facefolds_core.training.segments.base.write_tensors", write), patch.object(patience, "EVERY", 0.0):
+        assert make(scene, plan, tmp_path, **OFTEN) == expected
+    assert tries == [True, False]
+
+
+def test_none_stays_beside_a_base_that_is_there(
+    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    """It was killed after it had written the base."""
+    scene, plan, files = whole
+    for name, content in files.items():
+        path = tmp_path / f"base-{plan.base}" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    (tmp_path / f"begun-base-{plan.base}").mkdir()
+    assert make(scene, plan, tmp_path) == files
+    assert not any(tmp_path.glob("begun-*"))
 
 
 @pytest.mark.parametrize("before", [0, 1])

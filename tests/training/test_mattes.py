@@ -155,3 +155,17 @@ def test_what_stands_in_the_heads_shadow_is_no_subject() -> None:
     mended, agreement = outvoted(agreed(ball, cameras, pictures, VoteParams()), cameras, pictures, VoteParams())
     assert not mended[0][:, :6].any()
     assert agreement.argmin() == 0
+
+
+@pytest.mark.parametrize("known", [0, 2, 6])
+def test_pictures_of_other_cameras_have_mattes_though_few_vote(tmp_path: Path, known: int) -> None:
+    """Training cameras whose mattes are known vote; where there are too few of them nobody does."""
+    scene, ball = make_scene(tmp_path, size=64), _ball(0.33)
+    ball = replace(ball, lower=ball.lower + np.array(SPHERE_CENTRE))
+    sure = {(c, 0): np.uint8(255) * (opacity_in(ball, scene.cameras[c]) > 0.5) for c in scene.indices("train")[:known]}
+    with tqdm(total=1, disable=True) as bar:
+        held_out = [(scene.splits.index("holdout"), 0)]
+        (found,) = from_pictures(scene, ball, held_out, MatteParams(), bar, sure)
+    true, here = opacity_in(ball, scene.cameras[found.camera]) > 0.5, found.matte > 127
+    assert (true & here).sum() / (true | here).sum() > 0.8
+    assert found.believed and (found.agreement is None) == (known < 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
 from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.training.mattes.find import CutOut
 from facefolds_core.training.mattes.folder import make_mattes
 from facefolds_core.training.photos import posed_photos
 from facefolds_core.training.segments.plan import plan_take
@@ -91,6 +93,29 @@ def test_named_ones_of_pictures_that_are_not_there_are_none(folders: SubjectFold
     named = _name(tmp_path / "named", scene, lacking[0], None, 150, (SIZE, SIZE))
     _make(scene, folders, named)
     assert _values(scored_scene(folders)) == {(lacking[0], 0): 150}
+
+
+@pytest.mark.parametrize("beside_plates", [False, True])
+def test_what_is_known_of_training_cameras_votes(
+    scene: Scene, folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch, beside_plates: bool
+) -> None:
+    """Mattes of the capture, those found beside plates; nothing of other frames or of held-out cameras."""
+    asked: list[tuple[set[tuple[int, int]], set[tuple[int, int]]]] = []
+
+    def found(scene: Scene, volume: None, missing: Any, params: Any, bar: Any, sure: Any) -> list[CutOut]:
+        assert all(matte.shape == (SIZE, SIZE) for matte in sure.values())
+        asked.append((set(missing), set(sure)))
+        return []
+
+    monkeypatch.setattr("facefolds_core.training.mattes.folder.find_subject", lambda *_: (None, ()))
+    monkeypatch.setattr("facefolds_core.training.mattes.folder.from_pictures", found)
+    own = [(c, k, _grey(50)) for c in (0, 3, 4) for k in range(scene.num_frames)]
+    write_frames(scene.folder / "mattes.arrow", (SIZE, SIZE, 1), own)
+    _make(scene, folders, method="auto" if beside_plates else "pictures")
+    assert scene.splits[3] == "holdout" and scene.num_frames == 2
+    plate = {(1, 1)} if beside_plates else set()
+    rest = {(c, 1) for c in (1, 2, 5, 6)} - plate
+    assert asked == [(rest, {(0, 1), (4, 1)} | plate)]
 
 
 @pytest.mark.parametrize("frames", [1, 6])

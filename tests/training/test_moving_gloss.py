@@ -13,12 +13,13 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.reflection import Reflection, ReflectionShape
-from facefolds_core.params import ExplicitParams, train_params
+from facefolds_core.params import ReflectionParams
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.loop import fit_explicit
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
 from tests.training.test_moving import TURNED, layers
+from tests.training.test_segments import params
 
 
 @pytest.fixture(scope="module")
@@ -50,18 +51,8 @@ def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
 
 @pytest.mark.slow
 def test_it_is_looked_for(scene: Scene, tmp_path: Path) -> None:
-    given = {
-        "preset": "fast",
-        "device": "cpu",
-        "layers": 3,
-        "iterations": 30,
-        "volume": {"levels": [{"resolution": 16, "iterations": 20}]},
-        "geometry": {"rounds": [1.0], "round_iterations": 10},
-        "textures": {"steps_per_frame": 4},
-        "reflection": {"texels": 4, "environment_texels": 4},
-    }
-    params = train_params(given)
-    assert isinstance(params, ExplicitParams)
-    fit = fit_explicit(replace(scene, poses=TURNED), params, tmp_path / "log").fit
+    reflection = ReflectionParams(texels=4, environment_texels=4)
+    given = params().model_copy(update={"reflection": reflection})
+    fit = fit_explicit(replace(scene, poses=TURNED), given, tmp_path / "log").fit
     assert fit is not None
     assert {"reflection", "no_reflection"} & {event["kind"] for event in fit["events"]}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -72,10 +71,6 @@ class Checkpoints:
         bar.write(f"train: goes on from step {at.step} of {levels[at.level].iterations} of level {at.level + 1}")
         return at
 
-    def forget(self) -> None:
-        """Delete it."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-
     def _wait(self, took: float) -> None:
         """Until the next one, after one that took so many seconds."""
         self._next = time.perf_counter() + max(
@@ -129,7 +124,6 @@ class Checkpoints:
         state = trainer.take_up(levels[level], background)
         for name, values in grids.items():
             torch.as_tensor(getattr(state, name)).numpy()[:] = values
-        self.before = float(about["seconds"])
         self.before = float(about["seconds"])
         return Attempt(level, saved, Epochs(len(state.steps), random, left), tries, step, best, recent)
 

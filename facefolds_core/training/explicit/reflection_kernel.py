@@ -64,32 +64,34 @@ def _value(image, i, j, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
+@inlined
+def _mirrored(st, directions, normals, p):  # type: ignore[no-untyped-def]
+    """Direction in which ray p goes on where it meets the surface; of unit length."""
+    j, b = _texel(st[p, 0], normals.shape[1])
+    i, a = _texel(st[p, 1], normals.shape[0])
+    x, y, z = (_value(normals, i, j, 0, a, b), _value(normals, i, j, 1, a, b), _value(normals, i, j, 2, a, b))
+    dx, dy, dz = directions[p, 0], directions[p, 1], directions[p, 2]
+    along = 2 * min(dx * x + dy * y + dz * z, np.float32(0.0)) / (x * x + y * y + z * z)
+    return dx - along * x, dy - along * y, dz - along * z
+
+
 @kernel(parallel=True)
 def reflect(st, directions, normals, out):  # type: ignore[no-untyped-def]
     """out (P, 2): where in the environment what reflects at st (P, 2), seen along directions (P, 3), lies.
 
     normals (h, w, 3). All float32."""
     for p in prange(st.shape[0]):
-        j, b = _texel(st[p, 0], normals.shape[1])
-        i, a = _texel(st[p, 1], normals.shape[0])
-        x, y, z = (_value(normals, i, j, 0, a, b), _value(normals, i, j, 1, a, b), _value(normals, i, j, 2, a, b))
-        dx, dy, dz = directions[p, 0], directions[p, 1], directions[p, 2]
-        along = 2 * min(dx * x + dy * y + dz * z, np.float32(0.0)) / (x * x + y * y + z * z)
-        scale = np.float32(0.5) / np.sqrt(max(2 * (1 + dx - along * x), np.float32(1e-6)))
-        out[p, 0] = np.float32(0.5) + scale * (dy - along * y)
-        out[p, 1] = np.float32(0.5) - scale * (dz - along * z)
+        front, left, up = _mirrored(st, directions, normals, p)
+        scale = np.float32(0.5) / np.sqrt(max(2 * (1 + front), np.float32(1e-6)))
+        out[p, 0] = np.float32(0.5) + scale * left
+        out[p, 1] = np.float32(0.5) - scale * up
 
 
 @kernel(parallel=True)
 def reflect_turned(st, directions, turns, normals, out):  # type: ignore[no-untyped-def]
     """As `reflect`, with turns (P, 3, 3) of each ray from its axes to those that the environment is fixed to."""
     for p in prange(st.shape[0]):
-        j, b = _texel(st[p, 0], normals.shape[1])
-        i, a = _texel(st[p, 1], normals.shape[0])
-        x, y, z = (_value(normals, i, j, 0, a, b), _value(normals, i, j, 1, a, b), _value(normals, i, j, 2, a, b))
-        dx, dy, dz = directions[p, 0], directions[p, 1], directions[p, 2]
-        along = 2 * min(dx * x + dy * y + dz * z, np.float32(0.0)) / (x * x + y * y + z * z)
-        rx, ry, rz = dx - along * x, dy - along * y, dz - along * z
+        rx, ry, rz = _mirrored(st, directions, normals, p)
         front = turns[p, 0, 0] * rx + turns[p, 0, 1] * ry + turns[p, 0, 2] * rz
         left = turns[p, 1, 0] * rx + turns[p, 1, 1] * ry + turns[p, 1, 2] * rz
         up = turns[p, 2, 0] * rx + turns[p, 2, 1] * ry + turns[p, 2, 2] * rz

@@ -3,7 +3,7 @@ where the subject is, each picture says it to the pixel, and the pictures vote."
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import MatteParams
+from facefolds_core.params import OutlineParams
 from facefolds_core.training.mattes.cut_out import cut_out, opacity_in, reduced
 from facefolds_core.training.mattes.plates import from_plate
 from facefolds_core.training.mattes.vote import agreed, outvoted
@@ -69,7 +69,7 @@ def wanted_pictures(scene: Scene, frames: Sequence[int]) -> list[Key]:
     ]
 
 
-def beside_plates(scene: Scene, pictures: Sequence[Key], params: MatteParams) -> list[CutOut]:
+def beside_plates(scene: Scene, pictures: Sequence[Key], params: OutlineParams) -> list[CutOut]:
     """Of those pictures whose cameras have a clean plate."""
     plates, found = scene.open_plates(), list[CutOut]()
     for index, frame in pictures:
@@ -80,33 +80,49 @@ def beside_plates(scene: Scene, pictures: Sequence[Key], params: MatteParams) ->
     return found
 
 
-def small(scene: Scene, image: Image, params: MatteParams) -> Image:
+def small(scene: Scene, image: Image, params: OutlineParams) -> Image:
     """A picture as it is cut out."""
     camera = reduced(scene.cameras[0], params.cut_out.long_side)
     return np.asarray(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def from_pictures(
-    scene: Scene, volume: Volume, pictures: Sequence[Key], params: MatteParams, bar: tqdm
+    scene: Scene,
+    volume: Volume,
+    pictures: Sequence[Key],
+    params: OutlineParams,
+    bar: tqdm,
+    sure: Mapping[Key, Image] | None = None,
 ) -> list[CutOut]:
-    """Cut the subject out of each of `pictures`, and let those of training cameras vote.
+    """Cut the subject out of each of `pictures`, and let those of training cameras vote; fewer than see a voxel for it
+    to be anybody's do not.
 
     Args:
         volume: with the subject alone in it.
         bar: advanced by one a picture.
+        sure: mattes of other pictures, which vote, too: reduced, (h, w) 0..255.
     """
     store, training = scene.open_frames(), set(scene.indices("train"))
     cameras, images, cut = list[Camera](), list[Image](), list[Image]()
     for index, frame in pictures:
-        cameras.append(reduced(scene.camera_in_head(index, frame), params.cut_out.long_side))
+        cameras.append(_camera(scene, (index, frame), params))
         images.append(small(scene, store.image(index, frame), params))
         cut.append(cut_out(images[-1], opacity_in(volume, cameras[-1]), params.cut_out))
         bar.update()
-    voters = [n for n, (index, frame) in enumerate(pictures) if index in training]
-    hull = agreed(volume, [cameras[n] for n in voters], [cut[n] for n in voters], params.vote)
+    voters = [(cameras[n], cut[n]) for n, (index, frame) in enumerate(pictures) if index in training]
+    voters += [(_camera(scene, key, params), (matte > 127).astype(np.uint8)) for key, matte in (sure or {}).items()]
+    if len(voters) < params.vote.min_views:
+        found = zip(pictures, images, cut, strict=True)
+        return [CutOut(*key, image, 255 * matte, "picture") for key, image, matte in found]
+    hull = agreed(volume, [camera for camera, _ in voters], [matte for _, matte in voters], params.vote)
     mended, agreement = outvoted(hull, cameras, cut, params.vote)
     least = params.vote.least * float(np.median(agreement)) if len(agreement) else 0.0
     return [
         CutOut(*key, image, 255 * matte, "picture", float(share), bool(share >= least))
         for key, image, matte, share in zip(pictures, images, mended, agreement, strict=True)
     ]
+
+
+def _camera(scene: Scene, key: Key, params: OutlineParams) -> Camera:
+    """Of a picture as it is cut out."""
+    return reduced(scene.camera_in_head(*key), params.cut_out.long_side)

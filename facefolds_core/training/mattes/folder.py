@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ def make_mattes(
     store, own = scene.open_frames(), scene.open_mattes()
     given: dict[Key, Image] = {} if own is None else {key: own.image(*key) for key in own}  # mapped, not read
     by_hand = {} if named is None else {(c, k): image for c, k, image in given_mattes(named, scene)}
-    found, notes = _found(scene, [*given, *by_hand], params, start)
+    found, notes = _found(scene, {**given, **by_hand}, params, start)
     opacity = {
         (one.camera, one.frame): one.opacity(scene.height, scene.width)[..., None] for one in found if one.believed
     }
@@ -84,14 +84,15 @@ def _some_given(scene: Scene, given: Mapping[Key, Image], params: MatteParams) -
 
 
 def _found(
-    scene: Scene, known: Iterable[Key], params: MatteParams, start: ExplicitParams
+    scene: Scene, known: Mapping[Key, Image], params: MatteParams, start: ExplicitParams
 ) -> tuple[list[CutOut], tuple[Fact, ...]]:
     """Mattes of the pictures that serve something and have none."""
     if params.method == "none":
         return [], ()
     trained, numbers = trained_at_once(scene, start)
     frames = [numbers[k] for k in volume_frames(trained, start)]
-    missing = [key for key in wanted_pictures(scene, frames) if key not in set(known)]
+    wanted, training = wanted_pictures(scene, frames), set(scene.indices("train"))
+    missing = [key for key in wanted if key not in known]
     found = [] if params.method == "pictures" else beside_plates(scene, missing, params)
     done = {(one.camera, one.frame) for one in found}
     missing = [key for key in missing if key not in done]
@@ -99,7 +100,9 @@ def _found(
         return found, ()
     with progress(total=iterations(start.volume) + len(missing), desc="matte", unit="it") as bar:
         volume, notes = find_subject(trained, start, bar)
-        return [*found, *from_pictures(scene, volume, missing, params, bar)], notes
+        sure = {key: small(scene, known[key], params) for key in wanted if key in known and key[0] in training}
+        sure |= {(one.camera, one.frame): one.matte for one in found if one.camera in training}
+        return [*found, *from_pictures(scene, volume, missing, params, bar, sure)], notes
 
 
 def _store(path: Path, scene: Scene, opacity: Mapping[Key, Image]) -> None:

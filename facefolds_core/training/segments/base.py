@@ -26,7 +26,8 @@ from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
-from facefolds_core.training.patience import patiently
+from facefolds_core.training.patience import is_full, patiently
+from facefolds_core.training.trained import Trained
 
 LOG = "log"
 """Folder in a base's: dvclive's files of its training."""
@@ -125,38 +126,50 @@ def train_base(
     scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
 ) -> None:
     """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
-    folder, whole or not at all.
+    folder, whole or not at all; the checkpoint stays (`forget_begun`).
 
     Args:
         begun: folder of the checkpoint, of this subject alone; by default the base's.
     """
-    begun = folder.parent if begun is None else begun
-    kept = begun / f"{BEGUN}{folder.name}"
-    for other in begun.glob(f"{BEGUN}*"):
-        if other != kept:
-            shutil.rmtree(other)
+    kept = (folder.parent if begun is None else begun) / f"{BEGUN}{folder.name}"
+    forget_begun(kept.parent, kept.name)
     # The frames are fitted without a reflection, which is added to what they then show.
     reflection = params.reflection.model_copy(update={"begin": "end"})
     params = params.model_copy(update={"reflection": reflection})
     trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder, kept)
 
     def write() -> None:
-        with atomic_folder(folder) as temporary:
-            trained.save(temporary / "model")
-            for path in (temporary / "model").iterdir():
-                path.replace(temporary / path.name)
-            (temporary / "model").rmdir()
-            tensors = {
-                "background": torch.from_numpy(found.background),
-                "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
-            }
-            # One entry: safetensors writes several in any order, and equal bases are to be equal files.
-            about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
-            write_tensors(temporary / "surroundings.safetensors", tensors, about)
-            shutil.copytree(log, temporary / LOG)
+        try:
+            _write_base(trained, found, folder, log)
+        except OSError as error:
+            if is_full(error):  # its own room may be what is lacking
+                shutil.rmtree(kept, ignore_errors=True)
+            raise
 
     patiently(write)
-    shutil.rmtree(kept, ignore_errors=True)
+
+
+def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) -> None:
+    with atomic_folder(folder) as temporary:
+        trained.save(temporary / "model")
+        for path in (temporary / "model").iterdir():
+            path.replace(temporary / path.name)
+        (temporary / "model").rmdir()
+        tensors = {
+            "background": torch.from_numpy(found.background),
+            "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
+        }
+        # One entry: safetensors writes several in any order, and equal bases are to be equal files.
+        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
+        write_tensors(temporary / "surroundings.safetensors", tensors, about)
+        shutil.copytree(log, temporary / LOG)
+
+
+def forget_begun(folder: Path, but: str = "") -> None:
+    """Delete the checkpoints of a take's bases in a folder, but for the one of this name."""
+    for other in folder.glob(f"{BEGUN}*"):
+        if other.name != but:
+            shutil.rmtree(other, ignore_errors=True)
 
 
 def read_base(folder: Path, fingerprint: str) -> Base:

@@ -30,7 +30,7 @@ from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
 from facefolds_core.training.report import TrainingReport, make_report
-from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
+from facefolds_core.training.segments.base import LOG, Base, forget_begun, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
 from facefolds_core.training.segments.fitting import fit_segment
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
@@ -197,6 +197,7 @@ def base_of(
                 "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
             )
         train_base(scene, list(plan.keys), params, place, log, begun)
+    forget_begun(begun or folder)  # here: a kill may have come after the base was written
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)

@@ -12,6 +12,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, StartParams
+from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.volume.fit import Volume, VolumeFit
 from facefolds_core.training.volume.outline import thickness, visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
@@ -27,8 +28,8 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     Raises:
         UserError: see `VolumeFit`.
     """
-    params = in_ball(scene.radius, params)
-    plain, notes = VolumeFit(scene, params, outer=False), list[Fact]()
+    params, few = for_scene(in_ball(scene.radius, params), scene)
+    plain, notes = VolumeFit(scene, params, outer=False), list(few)
     plain.run(0, bar)
     # With mattes the room is known where the subject is not: an outer zone would take up the subject.
     cut_out = all(view.photo.matte is not None for view in plain.views)

@@ -1,0 +1,40 @@
+"""`train.few_cameras`: what a training of few cameras does otherwise."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import model_validator
+
+from facefolds_core.params.base import Count, Length, Natural, Pixels, Section, Weight
+
+
+class FewCameraParams(Section):
+    """Between few cameras hardly anything is determined: the starting volume becomes haze and lumps that show each
+    camera its own picture. Against that these values hold where they are the stricter ones, and only where each camera
+    has a clean plate: without, a price on opacity takes the subject for what stands behind it (`mugsy`)."""
+
+    at_most: Natural = 10
+    """Training cameras that are few; 0 is none ever."""
+
+    views: Count = 2
+    """Cameras that must see a voxel (`volume.min_view_share`, in cameras): of eight, a tenth is less than one."""
+
+    shared_views: Count = 5
+    """Cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in cameras)."""
+
+    opacity_weight: Weight = 0.003
+    """At least, of `volume.opacity_weight`: haze beside the subject costs more."""
+
+    max_halfwidth: Length = 0.008
+    """At most, of `geometry.max_halfwidth`, units: such a volume is blurred everywhere, and layers as far apart as it
+    is thick each show another camera's picture."""
+
+    blur: Pixels = 12.0
+    """At least, of `geometry.blur`, nodes: rounds of geometry make lumps of what single cameras want."""
+
+    @model_validator(mode="after")
+    def _shared_is_more(self) -> Self:
+        if self.shared_views <= self.views:
+            raise ValueError("shared_views must be larger than views")
+        return self
