@@ -7,7 +7,8 @@ trained once. Each stage runs in a process of its own; two more fit
 segments. Memory is anonymous memory, of the process and its children together, at most: pages of mapped files can be
 taken back at any time, and are not counted. The shortest take is made once before, so that nothing is compiled while it
 is measured. At the end one frame in the middle of the longest take is changed, and its stages run once more, with the
-key frames of the first run (`train.segments.named`): what did not change is taken over.
+key frames of the first run (`train.segments.named`): what did not change is taken over. Meshes are made by the key
+frames, and attention is a segment's own, so that the change stays where it is.
 """
 
 from __future__ import annotations
@@ -43,12 +44,12 @@ PARAMS: dict[str, Any] = {
     "capture": {"cameras": 6, "height": 64, "width": 48},
     "normalize": {},
     "train": {"preset": "fast", "segments": {"key_frames": 16, "processes": 2}},
-    "sample": {"resolution": 128},
+    "sample": {"resolution": 128, "opacity": "key_frames"},
     "reconstruct": {},
     "decimate": {"resolution": 24},
     "texture": {"resolution": 128},
     "bake": {},
-    "compress": {},
+    "compress": {"attention": {"of": "segment"}},
     "evaluate": {},
 }
 """params.yaml but for the subject."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.codecs import Codec
-from facefolds_core.asset.regions import Region
+from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
 from facefolds_core.files import atomic_file
 
@@ -83,7 +83,7 @@ class Filmed:
         size: (width, height).
         rate: frames a second.
         made: all else that the pictures depend on, in words.
-        regions: coded finer or coarser, in all of them.
+        regions: coded finer or coarser.
     """
 
     picture: Callable[[int], Picture]
@@ -91,14 +91,14 @@ class Filmed:
     size: tuple[int, int]
     rate: Fraction
     made: str
-    regions: tuple[Region, ...] = ()
+    regions: Regions = nowhere
 
     def digest(self, parts: Parts, frames: range, codec: Codec, options: dict[str, str]) -> str:
         """Of what a part's file depends on."""
         libraries = sorted(av.library_versions.items())
         said = (
             self.made,
-            self.regions,
+            tuple(self.regions(frames)),
             self.size,
             self.rate,
             codec.name,
@@ -132,7 +132,8 @@ def encode_parts(
         if not found.exists():
             with atomic_file(found) as temporary:
                 pictures = _ahead(filmed.picture, frames)
-                encode_video(temporary, pictures, filmed.size, filmed.rate, codec, options, filmed.regions)
+                regions = filmed.regions(frames)
+                encode_video(temporary, pictures, filmed.size, filmed.rate, codec, options, regions)
         return found
 
     with ThreadPoolExecutor(parts.encoders(filmed.size)) as pool:

@@ -33,7 +33,7 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.parts import Filmed, Parts, encode_parts
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.regions import Region
+from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
 from facefolds_core.files import atomic_folder, file_sha256
@@ -175,22 +175,22 @@ class LevelContent:
         params: VideoSettings,
         crf: int,
         frames: int | None = None,
-        regions: Sequence[Region] = (),
+        regions: Regions = nowhere,
     ) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
-        regions = regions if codec.regions else ()
+        regions = regions if codec.regions else nowhere
         size, options = (layout.width, layout.height), codec.options(params, crf)
         if self.parts is None:
             pictures = (pack_frame(self.frame(index), layout) for index in range(count))
-            encode_video(path, pictures, size, self.rate, codec, options, regions)
+            encode_video(path, pictures, size, self.rate, codec, options, regions(range(count)))
             return
         step = self.part_frames if self.part_frames and frames is None else count
         borders = [*range(0, count, step), count]
         options = codec.of_part(options) if self.part_frames else options
         encode_parts(path, self._filmed(regions), borders, codec, options, self.parts)
 
-    def _filmed(self, regions: Sequence[Region]) -> Filmed:
+    def _filmed(self, regions: Regions) -> Filmed:
         layout, textures = self.layout, self.originals or self.textures
         used = [layer.source for layer in self.layers]
         side = self.textures.image(used[0], 0).shape[0]
@@ -201,7 +201,7 @@ class LevelContent:
             size=(layout.width, layout.height),
             rate=self.rate,
             made=made,
-            regions=tuple(regions),
+            regions=regions,
         )
 
 
@@ -212,7 +212,7 @@ def write_level(
     params: AssetSettings,
     crfs: Mapping[CodecName, int] | None = None,
     shared: Level | None = None,
-    regions: Sequence[Region] = (),
+    regions: Regions = nowhere,
 ) -> Level:
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 

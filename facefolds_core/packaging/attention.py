@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.packing import MACROBLOCK, AtlasLayout
-from facefolds_core.asset.regions import QUANTISERS, Region
+from facefolds_core.asset.regions import QUANTISERS, Region, Regions, nowhere
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging.views import spread
@@ -29,28 +30,54 @@ Weights = NDArray[np.float64]
 """(rows, columns), mean W of the texels of each macroblock of the picture."""
 
 
-def regions_of(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> list[Region]:
-    """The regions of a level's picture; none without cameras, or where all is to be coded alike.
+def regions_of(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Regions:
+    """The regions of a level's pictures; none without cameras, or where all is to be coded alike.
 
     Args:
         cameras: for training, in the head's own frame.
     """
     if params.strength == 0 or not cameras:
-        return []
-    return merged(offsets(block_weights(content, cameras, params), params))
+        return nowhere
+    lock, known = Lock(), dict[tuple[int, ...], tuple[Region, ...]]()
+    views = list[_View]()
+
+    def of(frames: range) -> Sequence[Region]:
+        chosen = tuple(spread(content.frames, params.frames))
+        if params.of == "segment" and content.part_frames:
+            chosen = (frames[len(frames) // 2],)
+        with lock:
+            if not views:
+                views.extend(_views(content, cameras, params))
+            if chosen not in known:
+                known[chosen] = tuple(merged(offsets(_block_weights(content, views, chosen), params)))
+            return known[chosen]
+
+    return of
 
 
-def block_weights(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Weights:
-    """W of each macroblock: the greatest over some frames, of the sum over the pixels of some cameras."""
-    layout = content.layout
+_View = tuple[Hits, float]
+"""Where chosen rays of a camera hit the layers, and how many pixels that do stand for each."""
+
+
+def _views(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> list[_View]:
     chosen = [cameras[i] for i in spread(len(cameras), params.cameras)]
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
         cast = cast_layers(camera, meshes)
         pixels = cast.choose(rng, params.rays_per_camera)
         views.append((cast.at(pixels), int(cast.hit.any(2).sum()) / max(1, len(pixels))))
+    return views
+
+
+def block_weights(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Weights:
+    """W of each macroblock: the greatest over some frames, of the sum over the pixels of some cameras."""
+    return _block_weights(content, _views(content, cameras, params), spread(content.frames, params.frames))
+
+
+def _block_weights(content: LevelContent, views: Sequence[_View], frames: Sequence[int]) -> Weights:
+    layout = content.layout
     blocks = np.zeros((layout.height // MACROBLOCK, layout.width // MACROBLOCK))
-    for frame in spread(content.frames, params.frames):
+    for frame in frames:
         textures, picture = content.frame(frame), np.zeros((layout.height, layout.width))
         for hits, pixels_a_ray in views:
             _add_weights(picture, hits, pixels_a_ray, textures, layout)

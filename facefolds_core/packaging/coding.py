@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.manifest import Level, Quality
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.regions import Region
+from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
@@ -47,7 +47,7 @@ def coded_level(
     """
     params = params.model_copy(update={"mesh": resolved(params.mesh, content.layers, cameras)})
     video, crfs = params.video, None
-    regions = [] if video.lossless else regions_of(content, cameras, params.attention)
+    regions = nowhere if video.lossless else regions_of(content, cameras, params.attention)
     if meter is not None and video.target_psnr is not None and not video.lossless:
         search, target = params.search, video.target_psnr
         crfs = {
@@ -65,7 +65,7 @@ def coded_level(
 def _crf(
     folder: Path,
     content: LevelContent,
-    regions: Sequence[Region],
+    regions: Regions,
     codec: Codec,
     video: VideoCodec,
     meter: ViewMeter,

@@ -28,7 +28,6 @@ from facefolds_core.params.explicit import (
     GridTextureParams,
     LossParams,
     MovingParams,
-    PruningParams,
 )
 from facefolds_core.params.export import (
     AutoWindowParams,
@@ -41,8 +40,9 @@ from facefolds_core.params.export import (
     TextureParams,
 )
 from facefolds_core.params.few_cameras import FewCameraParams
-from facefolds_core.params.matte import CutOutParams, MatteParams, PlateParams, VoteParams
+from facefolds_core.params.matte import CutOutParams, MatteParams, OutlineParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams, MlpStartParams
+from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.segments import SegmentParams
@@ -100,6 +100,7 @@ __all__ = [
     "MotionParams",
     "MovingParams",
     "NormalizeParams",
+    "OutlineParams",
     "Overrides",
     "PlateParams",
     "Preset",

@@ -127,6 +127,11 @@ class AttentionParams(Section):
     frames: Count = 3
     """Evenly spread; the one counts in which a place shows most."""
 
+    of: Literal["take", "segment"] = "take"
+    """What is looked at for a segment of a stream: those frames of the take, or the one in the segment's middle. With
+    "segment" a frame that changes has only the segments encoded again that changed; with "take" all, if one of those
+    frames is near."""
+
     rays_per_camera: Count = 16_000
     """Of those that hit anything, drawn once."""
 

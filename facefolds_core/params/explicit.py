@@ -6,8 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Betas, Count, Factor, Natural, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
 from facefolds_core.params.few_cameras import FewCameraParams
+from facefolds_core.params.matte import OutlineParams
+from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
@@ -147,38 +149,6 @@ class MovingParams(Section):
     """in so many frames."""
 
 
-class PruningParams(Section):
-    """What is left out of the trained model."""
-
-    layer_alpha: Share = 1 / 255
-    """An outer or inner layer whose alpha is nowhere larger is dropped: no pixel changes by more than this."""
-
-    texel_opacity: Share = 1 / 1020
-    """Texels that add less to the opacity of every training ray that was looked at (in each frame one ray in several,
-    some `rays_per_texel` a texel; all of them over the frames) are made transparent. A ray reads four a layer: its
-    colour changes by no more than N / 255, and that only if all of them are just below."""
-
-    room_gain: Weight = 0.001
-    """Directions in which the layers show the training pictures by less than this better than the bare background does
-    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none."""
-
-    room_frames: Count = 3
-    """Frames that are looked at for that,"""
-
-    room_texels: Count = 4
-    """in squares of so many texels a side."""
-
-    speck_opacity: Share = 0.3
-    """Of all layers together, in any frame: patches of texels that are more opaque are compared by size,"""
-
-    speck_share: Share = 0.02
-    """and those smaller than this share of the largest one are made transparent, with all that is farther than
-    `speck_reach` from the others: splinters beside the head, that cameras left over. 0 keeps them."""
-
-    speck_reach: Natural = 3
-    """Texels: the soft edge of what stays."""
-
-
 class DivergenceParams(Section):
     """When a level of training is begun again, and how often."""
 
@@ -275,6 +245,9 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
+
+    outlines: OutlineParams = OutlineParams()
+    """Where the subject is in a training picture, for `pruning.beside_gain`."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""

@@ -77,7 +77,20 @@ class VoteParams(Section):
     has no matte."""
 
 
-class MatteParams(Section):
+class OutlineParams(Section):
+    """How the subject is found in a picture: beside its clean plate, or cut out of it."""
+
+    plates: PlateParams = PlateParams()
+    """Of a picture with a clean plate."""
+
+    cut_out: CutOutParams = CutOutParams()
+    """Of a picture by itself."""
+
+    vote: VoteParams = VoteParams()
+    """Of all pictures."""
+
+
+class MatteParams(OutlineParams):
     """Where the subject is in each picture: mattes to look at and to correct (`mattes` of a subject). They serve the
     scores of cameras without masks, and the training if it is told so."""
 
@@ -89,12 +102,3 @@ class MatteParams(Section):
     train: Literal["given", "all", "none"] = "given"
     """Which are targets of the starting volume's opacity (`train.volume.matte_weight`): those that came with the
     capture or that `mattes` of the subject names; all, those that were found, too; or none."""
-
-    plates: PlateParams = PlateParams()
-    """Of a picture with a clean plate."""
-
-    cut_out: CutOutParams = CutOutParams()
-    """Of a picture by itself."""
-
-    vote: VoteParams = VoteParams()
-    """Of all pictures."""

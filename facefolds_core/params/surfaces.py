@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from facefolds_core.params.base import Count, Length, Many, Pixels, Section, Share
+from facefolds_core.params.base import Count, Factor, Length, Many, Pixels, Section, Share
 
 
 class StartParams(Section):
@@ -107,7 +107,11 @@ class GeometryParams(Section):
     a surface is uncertain show it several times."""
 
     max_halfwidth: Length = 0.015
-    """No layers lie farther from their middle than this, units, however blurred the volume is."""
+    """No layers lie farther from their middle than this, units, however blurred the volume is,"""
+
+    max_halfwidth_pixels: Factor = 8.0
+    """nor than so many pixels of the median training camera (but `halfwidth` they may): what lies farther apart shows
+    each camera its own picture. In fog `max_halfwidth` alone counts."""
 
     min_radius: Annotated[float, Field(ge=0.02, le=10)] = 0.08
     """No layer's middle comes nearer to c, units: the search for crossings takes strides of less than half of that."""

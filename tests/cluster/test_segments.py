@@ -33,12 +33,13 @@ def result(root: Path) -> dict[str, bytes]:
     return found
 
 
-def fitting(worker: subprocess.Popen[bytes]) -> bool:
-    """Whether a segment is under way there, and past the imports."""
+def training(worker: subprocess.Popen[bytes], part: str) -> bool:
+    """Whether a base, or a segment, is under way there, and past the imports."""
     for process in psutil.Process(worker.pid).children(recursive=True):
         with suppress(psutil.Error):  # it has ended
             words = process.cmdline()
-            if "--part" in words and words[-1] != "base" and sum(process.cpu_times()[:2]) > 3:
+            made = words[words.index("--part") + 1] if "--part" in words else ""
+            if made and (made == "base") == (part == "base") and sum(process.cpu_times()[:2]) > 3:
                 return True
     return False
 
@@ -56,8 +57,9 @@ def begin(root: Path, project_root: Path, *command: str) -> subprocess.Popen[str
 
 
 @pytest.mark.timeout(2 * PATIENCE)
-def test_a_take_is_what_dvc_repro_makes_though_a_worker_was_killed_in_mid_segment(
-    tmp_path: Path, project_root: Path
+@pytest.mark.parametrize(("part", "begun"), [("base", 2), ("segment", 4)])
+def test_a_take_is_what_dvc_repro_makes_though_a_worker_was_killed_in_mid_part(
+    part: str, begun: int, tmp_path: Path, project_root: Path
 ) -> None:
     serial, root = (make_take(tmp_path / name, project_root) for name in ("serial", "cluster"))
     with dask_cluster(tmp_path, project_root, **THREADS) as (address, workers):
@@ -67,13 +69,13 @@ def test_a_take_is_what_dvc_repro_makes_though_a_worker_was_killed_in_mid_segmen
         deadline = time.monotonic() + PATIENCE
         busy: list[subprocess.Popen[bytes]] = []
         while process.poll() is None and time.monotonic() < deadline and not busy:
-            busy = [worker for worker in workers if fitting(worker)]
+            busy = [worker for worker in workers if training(worker, part)]
             time.sleep(0.05)
         assert busy
         busy[0].kill()
         output, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, output
-    begun = [line for line in output.splitlines() if ".segment-" in line and ": train on " in line]
-    assert len(begun) == 4, "one of the three was begun twice"
+    said = [line for line in output.splitlines() if f".{part}" in line and ": train on " in line]
+    assert len(said) == begun, "the base, or one of the three segments, was begun twice"
     assert repro.wait(PATIENCE) == 0
     assert result(root) == result(serial)

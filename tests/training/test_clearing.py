@@ -8,6 +8,7 @@ import torch
 from facefolds_core.hit_codes import encode
 from facefolds_core.params import ExplicitParams, PruningParams
 from facefolds_core.training.explicit.clearing import painted_room, specks
+from facefolds_core.training.explicit.silhouettes import Silhouettes
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Shown, Views
 
@@ -83,3 +84,32 @@ def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> No
     assert poor[:, :8].all() and not poor[:, 16:].any()
     kept = params.pruning.model_copy(update={"room_gain": 0.0})
     assert not painted_room(state, OneRay(), shown, 1, kept).any()
+
+
+def _half_room(params: ExplicitParams) -> tuple[TextureState, Shown]:
+    """A room of grey 0.2, and opaque texels that show 0.27 everywhere: a gain of 0.005."""
+    state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)
+    state.colour[0] = 0.27
+    state.layers[0, ..., 3] = 8.0
+    return state, Shown(np.full((1, 1024, 3), round(255 * 0.27), np.uint8))
+
+
+def test_paint_on_pixels_beside_the_subject_is_cleared_earlier() -> None:
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})
+    state, shown = _half_room(params)
+    right = np.where(np.arange(1024) % 32 < 16, 0, 255).astype(np.uint8)[None]
+    outlines = Silhouettes(0, np.array([0]), right)
+    poor = painted_room(state, OneRay(), shown, 1, params.pruning, outlines).view(32, 32)
+    assert poor[:, :12].all() and not poor[:, 20:].any()
+    assert not painted_room(state, OneRay(), shown, 1, params.pruning).any()  # nothing is known of the outline
+    other = Silhouettes(0, np.array([-1]), right)  # of another camera alone
+    assert not painted_room(state, OneRay(), shown, 1, params.pruning, other).any()
+    for key, value in (("beside_gain", 0.0), ("beside_gain", 0.004)):
+        kept = params.pruning.model_copy(update={key: value})
+        assert not painted_room(state, OneRay(), shown, 1, kept, outlines).any()
+
+
+def test_outlines_of_cameras_that_have_none_are_unknown() -> None:
+    known = Silhouettes(0, np.array([1, -1, 0]), np.array([[0, 255], [51, 102]], np.uint8))
+    found = known.of(np.array([0, 0, 1, 2]), np.array([0, 1, 0, 1]))
+    np.testing.assert_allclose(found, [0.2, 0.4, np.nan, 1.0], rtol=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -133,9 +134,28 @@ def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
     seen = Profile(
         radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
     )
-    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.01), 0.006)
-    np.testing.assert_allclose(fit.spread(seen, radius, GEOMETRY, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
-    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, GEOMETRY, voxel=0.01), GEOMETRY.max_halfwidth)
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, 0.015, voxel=0.01), 0.006)
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, 0.015, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, 0.006, 0.015, voxel=0.01), 0.015)
+
+
+@pytest.mark.parametrize(("pixel", "most"), [(0.001, 0.008), (0.002, 0.015), (0.0002, 0.006)])
+def test_layers_are_no_more_than_so_many_pixels_wide(pixel: float, most: float) -> None:
+    params = GEOMETRY.model_copy(update={"halfwidth": 0.006, "max_halfwidth": 0.015, "max_halfwidth_pixels": 8.0})
+    assert fit.greatest_halfwidth(params, pixel) == pytest.approx(most)
+    anyhow = params.model_copy(update={"max_halfwidth_pixels": math.inf})
+    assert fit.greatest_halfwidth(anyhow, pixel) == pytest.approx(0.015)
+
+
+def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camera(
+    trained: tuple[Scene, Path],
+) -> None:
+    scene = trained[0]
+    cameras = [scene.cameras[i] for i in scene.indices("train")]
+    apart = [
+        np.linalg.norm(c.project(np.zeros(3))[0] - c.project(1e-4 * c.rotation[0])[0]) for c in cameras
+    ]  # pixels, of a step to the camera's right
+    assert fit.pixel_size(scene) == pytest.approx(1e-4 / float(np.median(apart)), rel=0.02)
 
 
 def test_plan_spends_all_iterations() -> None:

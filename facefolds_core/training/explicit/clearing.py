@@ -9,21 +9,30 @@ from scipy import ndimage
 
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import ExplicitParams, PruningParams
+from facefolds_core.training.explicit.silhouettes import Silhouettes
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays
 
 
-def clear_texels(state: TextureState, rays: Rays, images: Pictures, passes: int, params: ExplicitParams) -> list[Fact]:
+def clear_texels(
+    state: TextureState,
+    rays: Rays,
+    images: Pictures,
+    passes: int,
+    params: ExplicitParams,
+    outlines: Silhouettes | None = None,
+) -> list[Fact]:
     """Make them transparent; what is to be said of it.
 
     Args:
         rays: of the training cameras, looked at in `passes` parts.
         images: of the same.
+        outlines: of the subject in some of them; None if nothing is known.
     """
     least, found = params.pruning.texel_opacity, list[Fact]()
     hidden = state.contributions(rays, passes) < least
     hidden |= state.beside(params.start.beside_opacity)
-    hidden |= painted_room(state, rays, images, passes, params.pruning)
+    hidden |= painted_room(state, rays, images, passes, params.pruning, outlines)
     state.hide(hidden)
     apart, count = specks(_opacity(state), params.pruning)
     if count:
@@ -35,36 +44,83 @@ def clear_texels(state: TextureState, rays: Rays, images: Pictures, passes: int,
     return found
 
 
-def painted_room(state: TextureState, rays: Rays, images: Pictures, passes: int, params: PruningParams) -> torch.Tensor:
+def painted_room(
+    state: TextureState,
+    rays: Rays,
+    images: Pictures,
+    passes: int,
+    params: PruningParams,
+    outlines: Silhouettes | None = None,
+) -> torch.Tensor:
     """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background.
 
     A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
     black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show over the
-    background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`.
+    background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. Where rays
+    lie beside the subject's `outlines` for the most part, `beside_gain` counts instead of `room_gain`.
     """
     (h, w), size = state.shape, params.room_texels
-    if params.room_gain == 0:
-        return torch.zeros(h * w, 1, dtype=torch.bool)
-    rows, columns = -(-h // size), -(-w // size)
-    gain, mass = np.zeros(rows * columns), np.zeros(rows * columns)
-    background = state.background.cpu().numpy()
-    for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, params.room_frames)}):
-        views, chosen = rays.part(frame, 0, passes)
-        picture = images.frame(frame)
-        seen = np.zeros((len(views.pixel), 6), np.float32)
-        state.look(views, picture, frame, seen)
-        seen, camera, pixel = seen[chosen], views.camera[chosen], views.pixel[chosen]
-        bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
-        better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
+    poor = np.zeros((-(-h // size), -(-w // size)), bool)
+    if params.room_gain > 0 or (params.beside_gain > 0 and outlines is not None):
+        gain, mass = _Cells(state.shape, size), _Cells(state.shape, size)
+        background = state.background.cpu().numpy()
+        for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, params.room_frames)}):
+            seen, camera, pixel = _look(state, rays, images, passes, frame)
+            bare = images.frame(frame)[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
+            better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
+            gain.add(seen, better)
+            mass.add(seen, np.ones(len(seen)))
+        poor = gain.blurred() < params.room_gain * mass.blurred()
+        if outlines is not None and params.beside_gain > 0:
+            beside = _beside(state, rays, images, passes, outlines) < params.beside_share
+            poor |= beside & (gain.blurred() < params.beside_gain * mass.blurred())
+    return torch.from_numpy(np.kron(poor, np.ones((size, size), bool))[:h, :w].reshape(-1, 1))
+
+
+def _beside(
+    state: TextureState, rays: Rays, images: Pictures, passes: int, outlines: Silhouettes
+) -> NDArray[np.float64]:
+    """Of each cell, how much of what it shows lies on the subject in pictures whose outline is known; 1 if nothing."""
+    seen, camera, pixel = _look(state, rays, images, passes, outlines.frame)
+    share = outlines.of(camera, pixel)
+    known = np.isfinite(share)
+    size = state.params.pruning.room_texels
+    inside, mass = _Cells(state.shape, size), _Cells(state.shape, size)
+    inside.add(seen[known], share[known])
+    mass.add(seen[known], np.ones(int(known.sum())))
+    whole = mass.blurred()
+    return np.where(whole > 0, inside.blurred() / np.maximum(whole, 1e-12), 1.0)
+
+
+def _look(
+    state: TextureState, rays: Rays, images: Pictures, passes: int, frame: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+    """What rays of a frame see, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,)."""
+    views, chosen = rays.part(frame, 0, passes)
+    seen = np.zeros((len(views.pixel), 6), np.float32)
+    state.look(views, images.frame(frame), frame, seen)
+    return seen[chosen], views.camera[chosen], views.pixel[chosen]
+
+
+class _Cells:
+    """Sums over squares of texels, of what rays see there, by their opacity."""
+
+    def __init__(self, shape: tuple[int, int], size: int) -> None:
+        self.shape, self.size = shape, size
+        self.sums = np.zeros((-(-shape[0] // size), -(-shape[1] // size)))
+
+    def add(self, seen: NDArray[np.float32], values: NDArray[np.floating]) -> None:
+        """seen (R, 6) as above; values (R,)."""
         opacity = seen[:, 3]
         place = seen[:, 4:] / np.maximum(opacity, 1e-6)[:, None]
-        cell = (place[:, 1] * h / size).astype(int).clip(0, rows - 1) * columns
-        cell += (place[:, 0] * w / size).astype(int).clip(0, columns - 1)
-        np.add.at(gain, cell, better * opacity)
-        np.add.at(mass, cell, opacity)
-    blurred = [ndimage.gaussian_filter(x.reshape(rows, columns), 1.0, mode="nearest") for x in (gain, mass)]
-    poor = blurred[0] < params.room_gain * blurred[1]
-    return torch.from_numpy(np.kron(poor, np.ones((size, size), bool))[:h, :w].reshape(-1, 1))
+        (h, w), (rows, columns) = self.shape, self.sums.shape
+        row = (place[:, 1] * h / self.size).astype(int).clip(0, rows - 1)
+        column = (place[:, 0] * w / self.size).astype(int).clip(0, columns - 1)
+        np.add.at(self.sums, (row, column), values * opacity)
+
+    def blurred(self) -> NDArray[np.float64]:
+        blurred: NDArray[np.float64] = ndimage.gaussian_filter(self.sums, 1.0, mode="nearest")
+        return blurred
 
 
 def _opacity(state: TextureState) -> NDArray[np.float32]:

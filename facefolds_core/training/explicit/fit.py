@@ -92,7 +92,8 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
         source = fact("middle_from_mesh", reach=params.mesh.reach)
     middle = extrapolate(known).clip(geometry.min_radius)
-    widths = spread(seen, middle, geometry, volume.voxel)
+    most = greatest_halfwidth(geometry, pixel_size(scene))
+    widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
     texels = texel_count(scene, window, radius, pixels_of_texel(scene, params))
@@ -105,21 +106,21 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source, pixels_of_texel(scene, params)), *notes),
+        reasons=(*_reasons(params, losses[chart], source, most, pixels_of_texel(scene, params)), *notes),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
 
 
-def _reasons(params: ExplicitParams, lost: float, middle: Fact, pixels: float) -> tuple[Fact, ...]:
+def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, pixels: float) -> tuple[Fact, ...]:
     """One a choice."""
     start, geometry = params.start, params.geometry
     return (
         fact("centre_chosen", tie=start.centre_tie, lost=lost),
         fact("window_chosen", opacity=start.subject_opacity, margin=start.window_margin),
         middle,
-        fact("halfwidth_chosen", least=geometry.halfwidth, most=geometry.max_halfwidth),
+        fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
         fact("texels_chosen", pixels=pixels),
     )
 
@@ -156,15 +157,17 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def spread(seen: Profile, middle: Array, params: GeometryParams, voxel: float) -> Array:
-    """Halfwidths: `halfwidth`, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
+def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
+    """Units; `pixel`: of the median camera at the subject, units."""
+    return max(params.halfwidth, min(params.max_halfwidth, params.max_halfwidth_pixels * pixel))
+
+
+def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:
+    """Halfwidths: the least one, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
     surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
     thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
-    halfwidth = params.halfwidth
-    wide: Array = ndimage.gaussian_filter(halfwidth + thick + off, 4.0, mode="nearest").clip(
-        halfwidth, max(halfwidth, params.max_halfwidth)
-    )
+    wide: Array = ndimage.gaussian_filter(least + thick + off, 4.0, mode="nearest").clip(least, most)
     return wide
 
 
@@ -199,12 +202,16 @@ def pixels_of_texel(scene: Scene, params: ExplicitParams) -> float:
 
 def texel_count(scene: Scene, window: Window, radius: float, pixels_per_texel: float) -> tuple[int, int]:
     """(H, W), multiples of 16: a texel at `radius` from c is so many pixels of the median training camera."""
-    cameras = [scene.cameras[i] for i in scene.indices("train")]
-    pixel = float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
-    texel = pixels_per_texel * pixel
+    texel = pixels_per_texel * pixel_size(scene)
     height = (window[1] - window[0]) * math.pi / 2 * radius / texel
     width = (window[3] - window[2]) * math.pi / 2 * radius / texel
     return max(32, 16 * round(height / 16)), max(32, 16 * round(width / 16))
+
+
+def pixel_size(scene: Scene) -> float:
+    """Of the median training camera at the origin, units."""
+    cameras = [scene.cameras[i] for i in scene.indices("train")]
+    return float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
 
 
 def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:

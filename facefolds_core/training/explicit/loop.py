@@ -3,6 +3,7 @@ crossings. A short take simply starts again where it was interrupted; the base o
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -58,16 +59,18 @@ def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | 
 
 
 def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
-    """The parameters of the layers' training after what the volume's said.
+    """The parameters of the layers' geometry and training after what the volume's said.
 
     Where the subject was fog, backgrounds stay what the room shows (`background.rate` 0): those that learn would take
-    up what is as pale as what stands behind it. Nothing is cleared for looking like the room there either.
+    up what is as pale as what stands behind it. Nothing is cleared for looking like the room there either, and layers
+    lie as far apart as `max_halfwidth` lets them: where the surface is nobody knows to a few pixels.
     """
     if not any(note.kind == "fog" for note in notes):
         return params
     background = params.background.model_copy(update={"rate": 0.0})
-    pruning = params.pruning.model_copy(update={"room_gain": 0.0})
-    return params.model_copy(update={"background": background, "pruning": pruning})
+    pruning = params.pruning.model_copy(update={"room_gain": 0.0, "beside_gain": 0.0})
+    geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": math.inf})
+    return params.model_copy(update={"background": background, "pruning": pruning, "geometry": geometry})
 
 
 @dataclass(frozen=True)
@@ -106,13 +109,14 @@ def fit_with_surroundings(
         cameras = choose_cameras(scene, volume.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        fit = fit_scene(cameras.scene, volume, used)
+        own = for_notes(used, found)
+        fit = fit_scene(cameras.scene, volume, own)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        trainer = Trainer(cameras, for_notes(used, found), fit, volume, device)
+        trainer = Trainer(cameras, own, fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
         levels = plan(fit, params, scene.num_frames)
         bar.total = bar.n + sum(level.iterations for level in levels)

@@ -26,6 +26,7 @@ from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
+from facefolds_core.training.explicit.silhouettes import silhouettes
 from facefolds_core.training.explicit.state import LossWeights, TextureState, on_one_thread, state_type
 from facefolds_core.training.explicit.views import Images, Rays, rays_of
 from facefolds_core.training.log import log_metrics
@@ -224,7 +225,8 @@ class Trainer:
         state, n = self.state, self.params.layers
         state.forget_moments()
         assert self.views is not None
-        self.events += clear_texels(state, self.views, self.images, self._stride(), self.params)
+        outlines = silhouettes(self.scene, self.volume, self.params)
+        self.events += clear_texels(state, self.views, self.images, self._stride(), self.params, outlines)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.

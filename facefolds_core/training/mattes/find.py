@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import MatteParams
+from facefolds_core.params import OutlineParams
 from facefolds_core.training.mattes.cut_out import cut_out, opacity_in, reduced
 from facefolds_core.training.mattes.plates import from_plate
 from facefolds_core.training.mattes.vote import agreed, outvoted
@@ -69,7 +69,7 @@ def wanted_pictures(scene: Scene, frames: Sequence[int]) -> list[Key]:
     ]
 
 
-def beside_plates(scene: Scene, pictures: Sequence[Key], params: MatteParams) -> list[CutOut]:
+def beside_plates(scene: Scene, pictures: Sequence[Key], params: OutlineParams) -> list[CutOut]:
     """Of those pictures whose cameras have a clean plate."""
     plates, found = scene.open_plates(), list[CutOut]()
     for index, frame in pictures:
@@ -80,7 +80,7 @@ def beside_plates(scene: Scene, pictures: Sequence[Key], params: MatteParams) ->
     return found
 
 
-def small(scene: Scene, image: Image, params: MatteParams) -> Image:
+def small(scene: Scene, image: Image, params: OutlineParams) -> Image:
     """A picture as it is cut out."""
     camera = reduced(scene.cameras[0], params.cut_out.long_side)
     return np.asarray(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), np.uint8)
@@ -90,7 +90,7 @@ def from_pictures(
     scene: Scene,
     volume: Volume,
     pictures: Sequence[Key],
-    params: MatteParams,
+    params: OutlineParams,
     bar: tqdm,
     sure: Mapping[Key, Image] | None = None,
 ) -> list[CutOut]:
@@ -123,6 +123,6 @@ def from_pictures(
     ]
 
 
-def _camera(scene: Scene, key: Key, params: MatteParams) -> Camera:
+def _camera(scene: Scene, key: Key, params: OutlineParams) -> Camera:
     """Of a picture as it is cut out."""
     return reduced(scene.camera_in_head(*key), params.cut_out.long_side)
