@@ -20,6 +20,9 @@ THREADS = dict.fromkeys(VARIABLES, "1")
 PATIENCE = 600.0
 """Seconds for each half."""
 
+CHECKPOINT = ".dvc/cache/begun/*/take/*/state.json"
+"""Of a base, in a project's folder."""
+
 pytestmark = [pytest.mark.pipeline, pytest.mark.nightly]
 
 
@@ -69,7 +72,8 @@ def test_a_take_is_what_dvc_repro_makes_though_a_worker_was_killed_in_mid_part(
         deadline = time.monotonic() + PATIENCE
         busy: list[subprocess.Popen[bytes]] = []
         while process.poll() is None and time.monotonic() < deadline and not busy:
-            busy = [worker for worker in workers if training(worker, part)]
+            if part == "segment" or list(root.glob(CHECKPOINT)):
+                busy = [worker for worker in workers if training(worker, part)]
             time.sleep(0.05)
         assert busy
         busy[0].kill()
@@ -79,3 +83,4 @@ def test_a_take_is_what_dvc_repro_makes_though_a_worker_was_killed_in_mid_part(
     assert len(said) == begun, "the base, or one of the three segments, was begun twice"
     assert repro.wait(PATIENCE) == 0
     assert result(root) == result(serial)
+    assert not list(root.glob(CHECKPOINT)), "who went on with the base deleted its checkpoint"
