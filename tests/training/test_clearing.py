@@ -87,11 +87,11 @@ def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> No
 
 
 def _half_room(params: ExplicitParams) -> tuple[TextureState, Shown]:
-    """A room of grey 0.2, and opaque texels that show 0.27 everywhere: a gain of 0.005."""
+    """A room of grey 0.2, and opaque texels that show 0.245 everywhere: a gain of 0.002."""
     state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)
-    state.colour[0] = 0.27
+    state.colour[0] = 0.245
     state.layers[0, ..., 3] = 8.0
-    return state, Shown(np.full((1, 1024, 3), round(255 * 0.27), np.uint8))
+    return state, Shown(np.full((1, 1024, 3), round(255 * 0.245), np.uint8))
 
 
 def test_paint_on_pixels_beside_the_subject_is_cleared_earlier() -> None:
@@ -104,7 +104,7 @@ def test_paint_on_pixels_beside_the_subject_is_cleared_earlier() -> None:
     assert not painted_room(state, OneRay(), shown, 1, params.pruning).any()  # nothing is known of the outline
     other = Silhouettes(0, np.array([-1]), right)  # of another camera alone
     assert not painted_room(state, OneRay(), shown, 1, params.pruning, other).any()
-    for key, value in (("beside_gain", 0.0), ("beside_gain", 0.004)):
+    for key, value in (("beside_gain", 0.0), ("beside_gain", 0.0015)):
         kept = params.pruning.model_copy(update={key: value})
         assert not painted_room(state, OneRay(), shown, 1, kept, outlines).any()
 
