@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from facefolds_core.facts import Fact
 from facefolds_core.geometry.chart import Chart
+from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.loop import for_notes
+from facefolds_core.training.explicit.loop import for_notes, for_poses
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
@@ -18,6 +20,7 @@ from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.search import _clear_of_fog, cut_share, in_ball
 from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
 from facefolds_core.training.volume.walls import Wall
+from tests.scenes import make_scene
 
 PARAMS = ExplicitParams()
 REACH, VOXEL = 0.45, 0.015
@@ -118,6 +121,16 @@ def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> N
     assert found.pruning.room_gain == 0 < PARAMS.pruning.room_gain
     assert found.geometry.max_halfwidth_pixels == np.inf > PARAMS.geometry.max_halfwidth_pixels
     assert found.losses == PARAMS.losses
+
+
+def test_backgrounds_behind_a_turning_head_learn_more_slowly(tmp_path: Path) -> None:
+    still = make_scene(tmp_path, size=16)
+    assert for_poses(PARAMS, still) is PARAMS
+    turning = replace(still, poses=Track.of([np.eye(3)] * still.num_frames, np.zeros((still.num_frames, 3))))
+    found = for_poses(PARAMS, turning)
+    assert found.background.rate == PARAMS.moving.background_rate < PARAMS.background.rate
+    slow = ExplicitParams.model_validate({"background": {"rate": 0.01}})
+    assert for_poses(slow, turning).background.rate == 0.01
 
 
 def test_a_denser_volume_has_so_many_times_the_optical_depth() -> None:

@@ -73,6 +73,14 @@ def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
     return params.model_copy(update={"background": background, "pruning": pruning, "geometry": geometry})
 
 
+def for_poses(params: ExplicitParams, scene: Scene) -> ExplicitParams:
+    """The parameters of the training of a head that turns, or `params` of one that does not."""
+    if scene.poses is None:
+        return params
+    rate = min(params.background.rate, params.moving.background_rate)
+    return params.model_copy(update={"background": params.background.model_copy(update={"rate": rate})})
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """What a training found out beside the model, and what frames are fitted with that come later.
@@ -109,7 +117,7 @@ def fit_with_surroundings(
         cameras = choose_cameras(scene, volume.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        own = for_notes(used, found)
+        own = for_notes(for_poses(used, scene), found)
         fit = fit_scene(cameras.scene, volume, own)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
