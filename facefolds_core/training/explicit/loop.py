@@ -78,7 +78,10 @@ def for_poses(params: ExplicitParams, scene: Scene) -> ExplicitParams:
     if scene.poses is None:
         return params
     rate = min(params.background.rate, params.moving.background_rate)
-    return params.model_copy(update={"background": params.background.model_copy(update={"rate": rate})})
+    background = params.background.model_copy(update={"rate": rate})
+    most = params.moving.max_halfwidth_pixels
+    geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": most})
+    return params.model_copy(update={"background": background, "geometry": geometry})
 
 
 @dataclass(frozen=True)

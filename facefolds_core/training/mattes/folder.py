@@ -26,7 +26,7 @@ from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.progress import progress
 from facefolds_core.training.mattes.find import CutOut, Key, beside_plates, from_pictures, small, wanted_pictures
 from facefolds_core.training.mattes.sheet import MOST, contact_sheet
-from facefolds_core.training.segments.plan import trained_at_once
+from facefolds_core.training.segments.key_frames import trained_at_once
 from facefolds_core.training.volume.fit import iterations, volume_frames
 from facefolds_core.training.volume.search import find_subject
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
@@ -16,14 +14,11 @@ from facefolds_core.training.segments.base import (
     digests_of_frames,
     fingerprint_of_base,
 )
-from facefolds_core.training.segments.forecast import forecast
+from facefolds_core.training.segments.key_frames import chosen_key_frames
 from facefolds_core.training.segments.keys import (
-    Float,
     comparable,
-    farthest_first,
     likenesses,
     mixture,
-    named_frames,
 )
 
 
@@ -66,7 +61,7 @@ def plan_take(scene: Scene, params: ExplicitParams, key_frames: int) -> TakePlan
     """
     digests = digests_of_frames(scene, progress(range(scene.num_frames), desc="fingerprints", unit="frame"))
     parts, segments = likenesses(scene, params.segments), params.segments
-    keys = _key_frames(scene, parts, params, key_frames)
+    keys = chosen_key_frames(scene, parts, params, key_frames)
     base = fingerprint_of_base(scene, digest_of_training(params), keys, digests)
     common = base.encode() + digest_of_fitting(params)
     names = [hashlib.sha256(common + digest).hexdigest()[:16] for digest in digests]
@@ -77,23 +72,3 @@ def plan_take(scene: Scene, params: ExplicitParams, key_frames: int) -> TakePlan
         part = slice(first, first + segments.frames)
         found.append(Segment(number, tuple(range(scene.num_frames)[part]), tuple(names[part]), tuple(shares[part])))
     return TakePlan(tuple(keys), base, tuple(found))
-
-
-def trained_at_once(scene: Scene, params: ExplicitParams) -> tuple[Scene, list[int]]:
-    """What the starting volume and the layers are fitted to, and the numbers of its frames in the scene: all of it, or
-    the key frames of a take that is trained in segments.
-
-    Raises:
-        UserError: as `plan_take`.
-    """
-    count = forecast(scene, params).key_frames
-    if count is None:
-        return scene, list(range(scene.num_frames))
-    keys = _key_frames(scene, likenesses(scene, params.segments), params, count)
-    return part_of(scene, keys), keys
-
-
-def _key_frames(scene: Scene, parts: Sequence[Float], params: ExplicitParams, count: int) -> list[int]:
-    """Those that are named, else at most so many; `parts`: of `likenesses`."""
-    named = params.segments.named
-    return named_frames(scene, named) if named else farthest_first(comparable(parts), count)
