@@ -109,6 +109,14 @@ def test_paint_on_pixels_beside_the_subject_is_cleared_earlier() -> None:
         assert not painted_room(state, OneRay(), shown, 1, kept, outlines).any()
 
 
+def test_nothing_of_the_subject_is_cleared_where_only_what_lies_beside_it_is_to_be() -> None:
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2, "room_gain": 0.0}})
+    state, shown = _half_room(params)
+    state.colour[0] = 0.9  # far worse than the bare room
+    inside = Silhouettes(0, np.array([0]), np.full((1, 1024), 255, np.uint8))
+    assert not painted_room(state, OneRay(), shown, 1, params.pruning, inside).any()
+
+
 def test_outlines_of_cameras_that_have_none_are_unknown() -> None:
     known = Silhouettes(0, np.array([1, -1, 0]), np.array([[0, 255], [51, 102]], np.uint8))
     found = known.of(np.array([0, 0, 1, 2]), np.array([0, 1, 0, 1]))

@@ -147,6 +147,16 @@ def test_training_cameras_vote_about_all_pictures(tmp_path: Path) -> None:
     assert any(one.believed and one.matte.any() and not one.matte.all() for one in found)
 
 
+def test_cut_outs_with_nothing_in_them_do_not_vote_and_are_not_believed(tmp_path: Path) -> None:
+    scene, ball = make_scene(tmp_path, size=32), _ball(0.33)
+    nothing = ball.grid.copy()
+    nothing[..., 0] = -kernel.LIMIT
+    pictures = wanted_pictures(scene, [ball.frame])
+    with tqdm(disable=True) as bar:
+        found = from_pictures(scene, replace(ball, grid=nothing), pictures, MatteParams(), bar)
+    assert len(found) == len(pictures) and not any(one.believed or one.matte.any() for one in found)
+
+
 def test_what_stands_in_the_heads_shadow_is_no_subject() -> None:
     """Behind the head one picture's bookshelf is undisputed: the others see the head there."""
     ball, cameras = _ball(0.15), _cameras()

@@ -70,7 +70,8 @@ def painted_room(
             better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
             gain.add(seen, better)
             mass.add(seen, np.ones(len(seen)))
-        poor = gain.blurred() < params.room_gain * mass.blurred()
+        if params.room_gain > 0:
+            poor = gain.blurred() < params.room_gain * mass.blurred()
         if outlines is not None and params.beside_gain > 0:
             beside = _beside(state, rays, images, passes, outlines) < params.beside_share
             poor |= beside & (gain.blurred() < params.beside_gain * mass.blurred())

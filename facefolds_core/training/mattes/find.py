@@ -94,8 +94,9 @@ def from_pictures(
     bar: tqdm,
     sure: Mapping[Key, Image] | None = None,
 ) -> list[CutOut]:
-    """Cut the subject out of each of `pictures`, and let those of training cameras vote; fewer than see a voxel for it
-    to be anybody's do not.
+    """Cut the subject out of each of `pictures`, and let those of training cameras vote in which there is something;
+    fewer than see a voxel for it to be anybody's do not. None is believed that has nothing in common with what
+    they agree on, or is empty where nobody votes.
 
     Args:
         volume: with the subject alone in it.
@@ -111,14 +112,15 @@ def from_pictures(
         bar.update()
     voters = [(cameras[n], cut[n]) for n, (index, frame) in enumerate(pictures) if index in training]
     voters += [(_camera(scene, key, params), (matte > 127).astype(np.uint8)) for key, matte in (sure or {}).items()]
+    voters = [(camera, matte) for camera, matte in voters if matte.any()]
     if len(voters) < params.vote.min_views:
         found = zip(pictures, images, cut, strict=True)
-        return [CutOut(*key, image, 255 * matte, "picture") for key, image, matte in found]
+        return [CutOut(*key, image, 255 * matte, "picture", None, bool(matte.any())) for key, image, matte in found]
     hull = agreed(volume, [camera for camera, _ in voters], [matte for _, matte in voters], params.vote)
     mended, agreement = outvoted(hull, cameras, cut, params.vote)
     least = params.vote.least * float(np.median(agreement)) if len(agreement) else 0.0
     return [
-        CutOut(*key, image, 255 * matte, "picture", float(share), bool(share >= least))
+        CutOut(*key, image, 255 * matte, "picture", float(share), bool(share >= least and share > 0))
         for key, image, matte, share in zip(pictures, images, mended, agreement, strict=True)
     ]
 

@@ -93,9 +93,10 @@ def digests_of_frames(scene: Scene, frames: Iterable[int]) -> list[bytes]:
     found = []
     for k in frames:
         digest = hashlib.blake2b(digest_size=16)
-        for store in (one for one in stores if one is not None):
+        for number, store in ((n, one) for n, one in enumerate(stores) if one is not None):
             for camera in scene.indices("train"):
                 if (camera, k) in store:
+                    digest.update(f"{number} {camera}".encode())
                     digest.update(np.ascontiguousarray(store.image(camera, k)).data)
         if surface is not None:
             digest.update(np.ascontiguousarray(surface[0][k]).data)
@@ -113,7 +114,9 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
             digest.update(f"{camera.name} {camera.width} {camera.height}".encode())
             digest.update(camera.K.tobytes() + camera.w2c.tobytes())
     plates = scene.open_plates()
+    digest.update(repr(scene.radius).encode())
     for camera_index, _ in () if plates is None else plates:
+        digest.update(f"{camera_index}".encode())
         digest.update(np.ascontiguousarray(plates.image(camera_index, 0)).data)  # type: ignore[union-attr]
     surface = scene.load_surface()
     digest.update(b"" if surface is None else surface[1].tobytes())
