@@ -65,8 +65,9 @@ def painted_room(
         gain, mass = _Cells(state.shape, size), _Cells(state.shape, size)
         background = state.background.cpu().numpy()
         for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, params.room_frames)}):
-            seen, camera, pixel = _look(state, rays, images, passes, frame)
-            bare = images.frame(frame)[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
+            picture = images.frame(frame)
+            seen, camera, pixel = _look(state, rays, picture, passes, frame)
+            bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
             better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
             gain.add(seen, better)
             mass.add(seen, np.ones(len(seen)))
@@ -82,7 +83,7 @@ def _beside(
     state: TextureState, rays: Rays, images: Pictures, passes: int, outlines: Silhouettes
 ) -> NDArray[np.float64]:
     """Of each cell, how much of what it shows lies on the subject in pictures whose outline is known; 1 if nothing."""
-    seen, camera, pixel = _look(state, rays, images, passes, outlines.frame)
+    seen, camera, pixel = _look(state, rays, images.frame(outlines.frame), passes, outlines.frame)
     share = outlines.of(camera, pixel)
     known = np.isfinite(share)
     size = state.params.pruning.room_texels
@@ -94,12 +95,13 @@ def _beside(
 
 
 def _look(
-    state: TextureState, rays: Rays, images: Pictures, passes: int, frame: int
+    state: TextureState, rays: Rays, picture: NDArray[np.uint8], passes: int, frame: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-    """What rays of a frame see, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,)."""
+    """What rays of a frame see, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,); picture
+    (C, pixels, 3) of the frame."""
     views, chosen = rays.part(frame, 0, passes)
     seen = np.zeros((len(views.pixel), 6), np.float32)
-    state.look(views, images.frame(frame), frame, seen)
+    state.look(views, picture, frame, seen)
     return seen[chosen], views.camera[chosen], views.pixel[chosen]
 
 
