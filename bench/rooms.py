@@ -26,6 +26,7 @@ from facefolds_core.files import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
 from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.strips import strip
+from facefolds_core.spacing import spread
 
 MARKS = ("<!-- rooms: written by bench/rooms.py -->", "<!-- end of rooms -->")
 FIGURES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr_interior", "psnr_band", "matte_iou")
@@ -38,7 +39,7 @@ def aside(count: int) -> list[str]:
     """Names of the actor's cameras but the held-out ones and `count` others, spread by azimuth."""
     rig = [camera for camera in make_rig(CaptureParams()).cameras if camera.name not in ("A011", "A023")]
     rig.sort(key=lambda camera: float(np.arctan2(camera.centre[0], 1000 - camera.centre[2])))
-    kept = set(np.linspace(0, len(rig) - 1, count).round().astype(int).tolist())
+    kept = spread(range(len(rig)), count)
     return [camera.name for k, camera in enumerate(rig) if k not in kept]
 
 

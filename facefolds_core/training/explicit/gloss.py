@@ -14,6 +14,7 @@ from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
+from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
     Maps,
@@ -106,7 +107,7 @@ class GlossFit:
             return self._look_in_turns(state, source, images, self.poses)
         views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
-        frames = sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.frames)})
+        frames = spread(range(len(state.steps)), self.params.frames)
         for frame in frames:
             state.look(views, images.frame(frame), frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames))
@@ -114,7 +115,7 @@ class GlossFit:
     def _look_in_turns(self, state: TextureState, source: Rays, images: Images, poses: Track) -> Seen:
         """Of some rays of each of some frames: in each one the room shines from elsewhere."""
         found = []
-        for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.moving_frames)}):
+        for frame in spread(range(len(state.steps)), self.params.moving_frames):
             views, _ = source.part(frame, 0, 1)
             sums = np.zeros((len(views.pixel), 6), np.float32)
             state.look(views, images.frame(frame), frame, sums)
