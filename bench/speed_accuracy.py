@@ -91,9 +91,7 @@ def main(
     subjects: Annotated[str, typer.Option(help="Comma-separated names in params.yaml.")] = "actor",
     presets: Annotated[str, typer.Option(help="Comma-separated.")] = "fast,quick,paper",
     iterations: Annotated[str, typer.Option(help="Comma-separated; by default some 10 s to 15 minutes' worth.")] = "",
-    clock: Annotated[
-        Clock, typer.Option(help="`processor`: processor time / --threads, where others work too.")
-    ] = "wall",
+    clock: Annotated[Clock, typer.Option(help="`processor`: processor time / --threads, where others work.")] = "wall",
     threads: Annotated[int, typer.Option(help="That share the work; 0 is what torch takes.")] = 0,
     frames: Annotated[int, typer.Option(help="Of each held-out camera that are scored, evenly spaced.")] = 3,
     work: Annotated[Path, typer.Option(help="Folder for the trainings.")] = Path("data/bench"),
