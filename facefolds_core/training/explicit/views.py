@@ -36,6 +36,10 @@ class Views:
     pixel: NDArray[np.int32]
     directions: NDArray[np.float32]
 
+    def part(self, chosen: NDArray[np.integer]) -> Views:
+        """Some of the rays, copied."""
+        return Views(self.codes[chosen], self.camera[chosen], self.pixel[chosen], self.directions[chosen])
+
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
     """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers.
