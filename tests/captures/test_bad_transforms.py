@@ -15,7 +15,6 @@ from tests.captures.fixtures import (
 )
 from tests.captures.test_bad_captures import Edit, refused
 
-
 ENTRIES: list[tuple[str, Edit, str, str]] = [
     ("no path", {"file_path": None}, "a key is missing", "frames[1], file_path"),
     ("no matrix", {"transform_matrix": None}, "a key is missing", "transform_matrix"),
