@@ -56,9 +56,8 @@ def enlarge(source: Path, folder: Path, factor: int) -> None:
 
 def table(found: dict[str, Watched]) -> str:
     """A row a stage."""
-    rows = [
-        [stage, f"{one.memory / 1e6:.0f}", f"{one.processor:.0f}", f"{one.seconds:.0f}"] for stage, one in found.items()
-    ]
+    figures = {stage: (one.memory / 1e6, one.processor, one.seconds) for stage, one in found.items()}
+    rows = [[stage, *(f"{value:.0f}" for value in own)] for stage, own in figures.items()]
     return markdown(["stage", "MB", "s of processor", "s"], rows)
 
 

@@ -26,6 +26,7 @@ from facefolds_core.files import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
 from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.strips import strip
+from facefolds_core.spacing import spread
 
 MARKS = ("<!-- rooms: written by bench/rooms.py -->", "<!-- end of rooms -->")
 FIGURES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr_interior", "psnr_band", "matte_iou")
@@ -38,7 +39,7 @@ def aside(count: int) -> list[str]:
     """Names of the actor's cameras but the held-out ones and `count` others, spread by azimuth."""
     rig = [camera for camera in make_rig(CaptureParams()).cameras if camera.name not in ("A011", "A023")]
     rig.sort(key=lambda camera: float(np.arctan2(camera.centre[0], 1000 - camera.centre[2])))
-    kept = set(np.linspace(0, len(rig) - 1, count).round().astype(int).tolist())
+    kept = spread(range(len(rig)), count)
     return [camera.name for k, camera in enumerate(rig) if k not in kept]
 
 
@@ -57,11 +58,16 @@ ROOMS: dict[str, tuple[str, dict[str, Any]]] = {
     "clutter, mattes of plates": ("", {"capture": CLUTTER, "matte": FOUND}),
 }
 """Name -> folder in shared/captures ("" is the actor of params.yaml), the subject's keys."""
+STRIPS = ("actor", "clutter", "actor, 8 cameras")  # rows of docs/images/rooms.jpg
+
+
+def strip_of(folder: Path, room: str) -> Path:
+    return folder / f"{room.replace(', ', '_').replace(' ', '-')}.jpg"
 
 
 def run(name: str, folder: Path, captures: Path) -> Found:
     """Run the stages, draw the strip, keep the figures."""
-    (capture, keys), project = ROOMS[name], Project(folder / name.replace(", ", "_").replace(" ", "-"), "actor")
+    (capture, keys), project = ROOMS[name], Project(strip_of(folder, name).with_suffix(""), "actor")
     params = own_params("actor", {} if capture else keys)
     if capture:
         with atomic_folder(folder / f"{project.root.name}_capture") as place:
@@ -73,11 +79,10 @@ def run(name: str, folder: Path, captures: Path) -> Found:
     project.run("configure", *STAGE_SECTIONS)
     asset, metrics = read_asset(project.folders.asset), read_json(project.folders.metrics)
     picture = Image.fromarray(strip(asset, range(-80, 81, 20), COLOURS, (130, 165), 20.0))
-    picture.save(folder / f"{project.root.name}.jpg")
+    picture.save(strip_of(folder, name))
     figures, fresh, cost = {n: metrics["asset"][n] for n in FIGURES}, metrics.get("fresh_views"), metrics["cost"]
     if fresh:
-        far = fresh["bands"][-1]["psnr_subject"]["asset"]
-        figures |= {"fresh": fresh["asset"]["psnr_subject"], "far": far}
+        figures |= {"fresh": fresh["asset"]["psnr_subject"], "far": fresh["bands"][-1]["psnr_subject"]["asset"]}
     size = cost["mesh_bytes"] + cost["texture_bytes"]
     return Found(room=name, figures=figures, bytes=size, commit=commit_name(), date=now())
 
@@ -102,13 +107,18 @@ def main(
     if unknown := set(names) - set(ROOMS):
         raise UserError("no such room", place="--only", found="; ".join(unknown), expected="; ".join(ROOMS))
     store = Store(folder / "rooms.json", "rooms", Found)
+    drawn = set(names) - {one.room for one in store.read()}
+    missing = [room for room in STRIPS if room not in drawn and not strip_of(folder, room).exists()]
+    if write and missing:
+        again = f'--only "{"; ".join(missing)}" draws it, once {store.path.name} does not have it any more'
+        raise UserError("no strip for docs/images/rooms.jpg", file=strip_of(folder, missing[0]), remedy=again)
     for one in store.fill([Found(room=name) for name in names], lambda blank: run(blank.room, folder, captures)):
         typer.echo(f"{one.room}: {one.figures}")
     known = {one.room: one for one in store.read()}
     typer.echo(text := f"{now()[:10]}, {machine_name('cpu')}.\n\n{table({n: known[n] for n in ROOMS if n in known})}")
     if write:
         replace_between(ROOT / "bench" / "RESULTS.md", *MARKS, text)
-        strips = [open_picture(folder / f"{name}.jpg") for name in ("actor", "clutter", "actor_8-cameras")]
+        strips = [open_picture(strip_of(folder, room)) for room in STRIPS]
         Image.fromarray(np.vstack([np.asarray(one) for one in strips])).save(ROOT / "docs" / "images" / "rooms.jpg")
 
 

@@ -21,9 +21,9 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_train
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.model.device import device_of, pick_device
-from facefolds_core.packaging.views import spread
 from facefolds_core.scoring.panels import METRICS
 from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.spacing import spread
 from facefolds_core.training.report import device_name
 
 RESULTS = Path("bench/results/speed_accuracy.json")
@@ -43,7 +43,7 @@ def score(project: Project, frames: int) -> Scores:
         UserError: if there is no held-out camera.
     """
     scene = read_scene(project.folders.scene)
-    times = {k: float(k) for k in spread(scene.num_frames, frames)}
+    times = {k: float(k) for k in spread(range(scene.num_frames), frames)}
     device = device_of(read_train(project.folders.config))
     found = [v for _, _, v in score_model(project.folders.model, scene, times, find_perceptual(device), device)]
     if not found:
@@ -91,9 +91,7 @@ def main(
     subjects: Annotated[str, typer.Option(help="Comma-separated names in params.yaml.")] = "actor",
     presets: Annotated[str, typer.Option(help="Comma-separated.")] = "fast,quick,paper",
     iterations: Annotated[str, typer.Option(help="Comma-separated; by default some 10 s to 15 minutes' worth.")] = "",
-    clock: Annotated[
-        Clock, typer.Option(help="`processor`: processor time / --threads, where others work too.")
-    ] = "wall",
+    clock: Annotated[Clock, typer.Option(help="`processor`: processor time / --threads, where others work.")] = "wall",
     threads: Annotated[int, typer.Option(help="That share the work; 0 is what torch takes.")] = 0,
     frames: Annotated[int, typer.Option(help="Of each held-out camera that are scored, evenly spaced.")] = 3,
     work: Annotated[Path, typer.Option(help="Folder for the trainings.")] = Path("data/bench"),

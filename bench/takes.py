@@ -2,13 +2,13 @@
 
 python -m bench.takes FOLDER [--frames 60,240,960]
 
-The actor is filmed in small pictures, at a rate at which no two frames of her loop are alike: equal ones are
-trained once. Each stage runs in a process of its own; two more fit
-segments. Memory is anonymous memory, of the process and its children together, at most: pages of mapped files can be
-taken back at any time, and are not counted. The shortest take is made once before, so that nothing is compiled while it
-is measured. At the end one frame in the middle of the longest take is changed, and its stages run once more, with the
-key frames of the first run (`train.segments.named`): what did not change is taken over. Meshes are made by the key
-frames, and attention is a segment's own, so that the change stays where it is.
+The actor is filmed in small pictures, at a rate at which no two frames of her loop are alike: equal ones are trained
+once. Each stage runs in a process of its own; two more fit segments. Memory is anonymous memory, of the process and its
+children together, at most: pages of mapped files can be taken back at any time, and are not counted. The shortest take
+is made once before, so that nothing is compiled while it is measured. At the end one frame in the middle of the longest
+take is changed, and its stages run once more, with the key frames of the first run (`train.segments.named`): what did
+not change is taken over. Meshes are made by the key frames, and attention is a segment's own, so that the change stays
+where it is.
 """
 
 from __future__ import annotations
@@ -101,9 +101,8 @@ def measure(folder: Path, frames: int) -> dict[str, Watched]:
     """All stages of a take, by their names."""
     project = Project(folder / f"frames{frames}", "take")
     subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 6}}
-    project.write(
-        merged({"subjects": {"take": subject}, **PARAMS}, {"capture": {"frames": frames, "seconds": frames / RATE}})
-    )
+    film = {"capture": {"frames": frames, "seconds": frames / RATE}}
+    project.write(merged({"subjects": {"take": subject}, **PARAMS}, film))
     project.run("configure")
     found = {}
     for stage in STAGE_SECTIONS:
@@ -145,13 +144,9 @@ def table(found: dict[int, dict[str, Watched]]) -> str:
     for stage in STAGE_SECTIONS[1:]:  # the actor is filmed picture by picture
         runs = [found[k][stage] for k in lengths]
         memory, seconds = [run.memory for run in runs], [run.processor for run in runs]
-        rows.append(
-            [stage]
-            + [f"{value / 1e6:.0f}" for value in memory]
-            + [f"{memory[-1] / memory[0]:.2f}"]
-            + [f"{value:.1f}" for value in seconds]
-            + [f"{seconds[-1] / seconds[0]:.1f}"]
-        )
+        megabytes = [*(f"{value / 1e6:.0f}" for value in memory), f"{memory[-1] / memory[0]:.2f}"]
+        times = [*(f"{value:.1f}" for value in seconds), f"{seconds[-1] / seconds[0]:.1f}"]
+        rows.append([stage, *megabytes, *times])
     return markdown(head, rows)
 
 

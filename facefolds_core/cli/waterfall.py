@@ -15,9 +15,9 @@ from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
-from facefolds_core.packaging.views import spread
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.waterfall import waterfall
+from facefolds_core.spacing import spread
 
 
 def command(
@@ -32,7 +32,7 @@ def command(
         for folders in map(SubjectFolders, subjects or evaluated_subjects(data)):
             scene = read_scene(folders.scene)
             model = load_model(folders.model, device_of(read_train(folders.config)))
-            steps = waterfall(scene, model, folders, spread(scene.num_frames, frames))
+            steps = waterfall(scene, model, folders, spread(range(scene.num_frames), frames))
             with atomic_folder(folders.waterfall.parent) as temporary:
                 write_json(
                     temporary / folders.waterfall.name,

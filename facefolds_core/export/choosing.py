@@ -18,6 +18,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import ChoiceParams, MeshChoiceParams, TextureChoiceParams
 from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.spacing import spread
 
 Texture = NDArray[np.uint8]
 
@@ -42,17 +43,11 @@ def looks_of(scene: Scene, params: ChoiceParams) -> tuple[Split, list[Look]]:
     split: Split = "validate" if "validate" in scene.splits else "train"
     store = scene.open_frames()
     looks = []
-    for camera in _spread(scene.indices(split), params.cameras):
-        for k in _spread([k for k in range(scene.num_frames) if (camera, k) in store], params.frames):
+    for camera in spread(scene.indices(split), params.cameras, ends=False):
+        seen = [k for k in range(scene.num_frames) if (camera, k) in store]
+        for k in spread(seen, params.frames, ends=False):
             looks.append(Look(scene.camera_in_head(camera, k), k, store.image(camera, k) / 255.0))
     return split, looks
-
-
-def _spread(items: Sequence[int], most: int) -> list[int]:
-    if not items:
-        return []
-    places = np.rint((np.arange(min(most, len(items))) + 0.5) * len(items) / min(most, len(items)) - 0.5)
-    return [items[int(place)] for place in places]
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]

@@ -75,10 +75,11 @@ def decimate_layers(
         if len(coarse.faces) == 0:
             raise UserError(
                 "decimation left nothing of a layer",
-                place=f"layer {i} (0 is the outermost)",
+                place=f"layer {i} (0 is the outermost), R^m {resolution}",
                 expected="at least one triangle",
                 found=f"{len(surface.faces)} triangles before, none after",
-                remedy="raise decimate.resolution",
+                remedy="raise this R^m where it stands: decimate.resolution, decimate.auto.candidates or a level's "
+                "mesh_resolution in compress.levels",
             )
         st = layer_st(coarse.vertices, grids, i, params.uv)
         meshes.append(TexturedMesh(coarse.vertices, coarse.faces, st))

@@ -28,6 +28,7 @@ from facefolds_core.frame_store import FrameStore
 from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.source_code import digest_of_packages
+from facefolds_core.spacing import spread
 
 _USUAL = BakeParams()
 
@@ -44,10 +45,8 @@ def texel_weights(
         params: how many frames are looked at, evenly spread; the greatest weight counts.
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
-    count = min(params.hold_frames, len(frames))
-    chosen = sorted({frames[round(float(i))] for i in np.linspace(0, len(frames) - 1, count)})
     weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
-    for frame in chosen:
+    for frame in spread(frames, params.hold_frames):
         sums = np.zeros_like(weights)
         images = np.stack([textures.image(n, frame) for n in layers]).astype(np.float32)
         add_weights(codes, images, sums, params.min_light)

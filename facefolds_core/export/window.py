@@ -20,6 +20,7 @@ from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import AutoWindowParams
+from facefolds_core.spacing import spread
 
 _USUAL = AutoWindowParams()
 
@@ -41,7 +42,7 @@ def visible_window(
         the window, cut to the model's; the model's if it is transparent everywhere.
     """
     known = range(model.num_frames) if among is None else sorted(among)
-    frames = sorted({known[round(f)] for f in np.linspace(0, len(known) - 1, params.frames)})
+    frames = spread(known, params.frames)
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for camera in cameras:
         stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / params.rays_per_camera)))

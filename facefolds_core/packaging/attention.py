@@ -20,11 +20,11 @@ from facefolds_core.asset.packing import MACROBLOCK, AtlasLayout
 from facefolds_core.asset.regions import QUANTISERS, Region, Regions, nowhere
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.packaging.views import spread
 from facefolds_core.params import AttentionParams
 from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture
+from facefolds_core.spacing import spread
 
 Weights = NDArray[np.float64]
 """(rows, columns), mean W of the texels of each macroblock of the picture."""
@@ -42,7 +42,7 @@ def regions_of(content: LevelContent, cameras: Sequence[Camera], params: Attenti
     views = list[_View]()
 
     def of(frames: range) -> Sequence[Region]:
-        chosen = tuple(spread(content.frames, params.frames))
+        chosen = tuple(spread(range(content.frames), params.frames))
         if params.of == "segment" and content.part_frames:
             chosen = (frames[len(frames) // 2],)
         with lock:
@@ -60,7 +60,7 @@ _View = tuple[Hits, float]
 
 
 def _views(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> list[_View]:
-    chosen = [cameras[i] for i in spread(len(cameras), params.cameras)]
+    chosen = spread(cameras, params.cameras)
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
         cast = cast_layers(camera, meshes)
@@ -71,7 +71,7 @@ def _views(content: LevelContent, cameras: Sequence[Camera], params: AttentionPa
 
 def block_weights(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Weights:
     """W of each macroblock: the greatest over some frames, of the sum over the pixels of some cameras."""
-    return _block_weights(content, _views(content, cameras, params), spread(content.frames, params.frames))
+    return _block_weights(content, _views(content, cameras, params), spread(range(content.frames), params.frames))
 
 
 def _block_weights(content: LevelContent, views: Sequence[_View], frames: Sequence[int]) -> Weights:

@@ -16,8 +16,9 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging.attention import regions_of
 from facefolds_core.packaging.meshbits import resolved
 from facefolds_core.packaging.rate import search_crf
-from facefolds_core.packaging.views import ViewMeter, spread
+from facefolds_core.packaging.views import ViewMeter
 from facefolds_core.params import CompressParams, CrfSearchParams, VideoCodec
+from facefolds_core.spacing import spread
 
 
 def make_meter(content: LevelContent, cameras: Sequence[Camera], params: CompressParams) -> ViewMeter | None:
@@ -25,7 +26,10 @@ def make_meter(content: LevelContent, cameras: Sequence[Camera], params: Compres
     if not cameras:
         return None
     wanted = params.meter.frames
-    frames = {*spread(content.frames, wanted), *spread(min(content.frames, params.search.frames), wanted)}
+    frames = {
+        *spread(range(content.frames), wanted),
+        *spread(range(min(content.frames, params.search.frames)), wanted),
+    }
     meshes = [layer.mesh for layer in content.layers]
     return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames}, params.meter)
 

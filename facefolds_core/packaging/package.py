@@ -43,9 +43,10 @@ from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, level_params
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
-from facefolds_core.packaging.views import spread, training_cameras
+from facefolds_core.packaging.views import training_cameras
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.source_code import digest_of_packages
+from facefolds_core.spacing import spread
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> 
         return []
     store, found = scene.open_frames(), []
     keys = [key for key in store if key[0] in scene.indices("holdout")]
-    for index, key in enumerate(keys[i] for i in spread(len(keys), params.photos)) if keys else ():
+    for index, key in enumerate(spread(keys, params.photos)):
         path = folder / f"photo_{index:02d}.jpg"
         Image.fromarray(store.image(*key)).save(path, quality=params.jpeg_quality)
         camera = scene.cameras[key[0]]

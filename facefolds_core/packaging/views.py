@@ -17,6 +17,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import MeterParams
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture, composite
+from facefolds_core.spacing import spread
 
 Image = NDArray[np.float32]
 
@@ -24,11 +25,6 @@ MAX_PSNR = 100.0
 """Of equal pictures, dB."""
 
 _USUAL = MeterParams()
-
-
-def spread(count: int, wanted: int) -> list[int]:
-    """At most `wanted` of `count` indices, evenly spaced, the first and the last among them."""
-    return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(wanted, count))})
 
 
 def training_cameras(scene: Scene) -> list[Camera]:
@@ -55,7 +51,7 @@ class ViewMeter:
         params: MeterParams = _USUAL,
         seed: int = 0,
     ) -> None:
-        self._cameras = [cameras[i] for i in spread(len(cameras), params.cameras)]
+        self._cameras = spread(cameras, params.cameras)
         rng = np.random.default_rng(seed)
         self._pixels: list[NDArray[np.intp]] = []
         hits = []

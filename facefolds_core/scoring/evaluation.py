@@ -20,7 +20,6 @@ from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
-from facefolds_core.packaging.views import spread
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
 from facefolds_core.rendering import AssetCaster, composite
@@ -36,6 +35,7 @@ from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
 from facefolds_core.scoring.truths import MatteKind, Truth, Truths
+from facefolds_core.spacing import spread
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
 
@@ -93,7 +93,7 @@ def evaluate(
     """
     _check(scene, model, scene.indices("holdout"))
     scorer = _Scorer(scene, model, asset, params, perceptual, kept)
-    show = _Show(asset, set(spread(scene.num_frames, params.sheet_frames)))
+    show = _Show(asset, set(spread(range(scene.num_frames), params.sheet_frames)))
     rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
     found, changes = [], {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:

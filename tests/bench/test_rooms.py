@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from PIL import Image
 
 from bench import rooms
 from bench.results import Found, Store
@@ -15,6 +16,7 @@ from bench.run import Project
 from facefolds_core.captures.actor import make_rig
 from facefolds_core.files import write_json
 from facefolds_core.params import CaptureParams
+from facefolds_core.pictures import open_picture
 from tests.bench.test_commands import invoke
 
 
@@ -58,3 +60,38 @@ def test_what_was_measured_is_not_measured_again(tmp_path: Path, monkeypatch: py
     assert said.exit_code != 0 and "no such room" in said.output
     assert [subject["capture"].get("clutter") for subject in ran] == [None, 1.0]
     assert [one.room for one in Store(tmp_path / "rooms.json", "rooms", Found).read()] == ["plain room", "clutter"]
+
+
+def _strips(folder: Path, *rooms_: str) -> None:
+    for room in rooms_:
+        Image.new("RGB", (4, 4)).save(rooms.strip_of(folder, room))
+
+
+def test_a_strip_that_will_be_missing_is_said_before_anything_is_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran = _measured(monkeypatch)
+    _strips(tmp_path, "actor", "clutter")
+    said = invoke(rooms.main, str(tmp_path), "--only", "plain room", "--write")
+    assert said.exit_code != 0 and "actor_8-cameras.jpg" in said.output and "actor, 8 cameras" in said.output
+    assert not ran
+
+
+def test_a_strip_that_is_about_to_be_drawn_is_not_missed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran, root = _measured(monkeypatch), tmp_path / "root"
+    (root / "bench").mkdir(parents=True)
+    (root / "bench" / "RESULTS.md").write_text("\n".join(rooms.MARKS))
+    (root / "docs" / "images").mkdir(parents=True)
+    monkeypatch.setattr(rooms, "ROOT", root)
+    _strips(tmp_path, "actor", "actor, 8 cameras")
+    said = invoke(rooms.main, str(tmp_path), "--only", "clutter", "--write")
+    assert said.exit_code == 0, said.output
+    assert len(ran) == 1 and open_picture(root / "docs" / "images" / "rooms.jpg").size == (4, 12)
+
+
+def test_a_room_that_was_measured_elsewhere_is_not_drawn_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = _measured(monkeypatch)
+    _strips(tmp_path, "actor", "actor, 8 cameras")
+    Store(tmp_path / "rooms.json", "rooms", Found).add(Found(room="clutter"))
+    said = invoke(rooms.main, str(tmp_path), "--only", "clutter; plain room", "--write")
+    assert said.exit_code != 0 and "clutter.jpg" in said.output and not ran

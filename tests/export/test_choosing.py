@@ -13,13 +13,21 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.export import steps
 from facefolds_core.export.choosing import choose_meshes, choose_texels, looks_of
+from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
+from facefolds_core.export.stores import Grids
 from facefolds_core.facts import fact
 from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import DecimateParams, MeshChoiceParams, TextureChoiceParams, TextureParams
+from facefolds_core.params import (
+    DecimateParams,
+    MeshChoiceParams,
+    ReconstructParams,
+    TextureChoiceParams,
+    TextureParams,
+)
 from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
 from stages.common import write_choice
@@ -48,6 +56,14 @@ def stripes(period: float) -> NDArray[np.uint8]:
     image = np.full((SIDE, SIDE, 4), 255, np.uint8)
     image[..., :3] = np.rint(wave)[None, :, None]
     return image
+
+
+def surfaces(grids: Grids, method: str) -> steps.Surfaces:
+    """Those of `reconstruct`; Poisson's one after the other, as processes of their own take seconds to begin."""
+    if method == "grid":
+        return grid_sheets(grids, None).sheets
+    params = ReconstructParams(depth=5)
+    return [reconstruct(gather_samples(grids, i, None), params, i).surface for i in range(grids.num_layers)]
 
 
 @dataclass(frozen=True)
@@ -129,14 +145,14 @@ def test_numbers_fix_both(tmp_path: Path) -> None:
     assert (size, why) == (40, None)
 
 
-def test_coarser_levels_are_never_finer_than_the_full_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("method", ["grid", "poisson"])
+def test_coarser_levels_are_never_finer_than_the_full_one(tmp_path: Path, method: str) -> None:
     scene = make_scene(tmp_path, cameras=3, size=40, frames=1)
     grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
     write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
     given: dict[str, Any] = {"resolution": "auto", "auto": {"candidates": [8, 16], "within": 50.0, "fidelity": 0.0}}
     params = DecimateParams.model_validate(given)
-    sheets = grid_sheets(grids, None).sheets
-    made = steps.decimate_all(sheets, grids, scene, tmp_path / "samples.arrow", params, [6, 12])
+    made = steps.decimate_all(surfaces(grids, method), grids, scene, tmp_path / "samples.arrow", params, [6, 12])
     assert made.why is not None and made.why.values["chosen"] == 8
     assert len(made.meshes[0].vertices) <= 64
     assert made.coarser[12] is made.meshes and len(made.coarser[6][0].vertices) <= 36

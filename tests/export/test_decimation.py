@@ -110,3 +110,11 @@ def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
 def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
     with pytest.raises(UserError, match="do not belong together"):
         decimate_layers(surfaces * 2, grids, 16, DecimateParams(), progress=False)
+
+
+def test_where_nothing_is_left_of_a_layer_its_resolution_is_named(grids: Grids, surfaces: list[Surface]) -> None:
+    """Faces that all look inwards are dropped."""
+    inwards = [Surface(one.vertices, np.ascontiguousarray(one.faces[:, ::-1])) for one in surfaces]
+    with pytest.raises(UserError, match="left nothing") as caught:
+        decimate_layers(inwards, grids, 16, DecimateParams(), progress=False)
+    assert "R^m 16" in str(caught.value) and "decimate.auto.candidates" in str(caught.value)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.packaging.views import MAX_PSNR, ViewMeter, spread
+from facefolds_core.packaging.views import MAX_PSNR, ViewMeter
 from tests.assets import cap_mesh, cap_textures, radius_of
 from tests.scenes import look_at_origin
 
@@ -38,10 +38,3 @@ def test_what_is_hidden_costs_nothing() -> None:
     wrong[1, ..., :3] = 0
     # The outer cap covers the inner one but along the rim of its own outline.
     assert meter(textures).psnr([(0, list(wrong))]) > 30
-
-
-@pytest.mark.parametrize(
-    ("count", "wanted", "found"), [(10, 3, [0, 4, 9]), (12, 3, [0, 6, 11]), (2, 5, [0, 1]), (1, 1, [0]), (9, 1, [0])]
-)
-def test_spread(count: int, wanted: int, found: list[int]) -> None:
-    assert spread(count, wanted) == found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +10,19 @@ import pytest
 import torch
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.track import Track
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
+from facefolds_core.training.explicit.reflection import Seen
+from facefolds_core.training.explicit.state import TextureState
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
-from tests.training.test_moving import TURNED, layers
+from tests.training.test_moving import TURNED, layers, rays
 from tests.training.test_segments import params
 
 
@@ -47,6 +51,31 @@ def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
     np.testing.assert_array_equal(pictures[0][0], pictures[1][0])
     assert brightness[2] > 2 * brightness[3]
     assert all(np.array_equal(picture[1], pictures[0][1]) for picture in pictures)
+
+
+class Noise:
+    """Other pictures in each frame."""
+
+    def frame(self, index: int) -> np.ndarray:
+        return np.random.default_rng(index).integers(0, 256, (6, 24 * 24, 3), np.uint8)
+
+
+def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Scene) -> None:
+    turns = Track.of([about((0, 0, 1), 5.0 * k) for k in range(6)], np.zeros((6, 3)))
+    source = rays(replace(scene, frame_ids=tuple("abcdef"), poses=turns), share=150)
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
+    window = (-0.6, 0.6, -0.6, 0.6)
+    every, some = (
+        GlossFit(layers().chart, window, ReflectionParams(rays=most, moving_frames=5), turns).look(
+            state, source, Noise()
+        )
+        for most in (10**6, 100)
+    )
+    step = -(-len(every.st) // 100)
+    assert step > 1 and len({turn.tobytes() for turn in some.turns}) == 5
+    for field in fields(Seen):
+        np.testing.assert_array_equal(getattr(some, field.name), getattr(every, field.name)[::step])
 
 
 @pytest.mark.slow

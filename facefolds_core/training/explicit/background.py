@@ -11,6 +11,7 @@ from torch import Tensor
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import BackgroundParams
+from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.views import Images
 from facefolds_core.training.volume.fit import Volume
 
@@ -25,7 +26,7 @@ def first_background(scene: Scene, images: Images, volume: Volume, params: Backg
     """
     h, w = scene.height, scene.width
     wanted = params.frames if scene.poses is None else params.moving_frames
-    frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, wanted)})
+    frames = spread(range(scene.num_frames), wanted)
     if scene.poses is None:
         mean = np.mean([images.frame(k).astype(np.float32) / 255 for k in frames], 0).reshape(-1, h, w, 3)
         covered = [_opacity(scene.cameras[c], volume, params) >= params.max_opacity for c in images.cameras]

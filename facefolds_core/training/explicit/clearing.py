@@ -9,6 +9,7 @@ from scipy import ndimage
 
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import ExplicitParams, PruningParams
+from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.silhouettes import Silhouettes
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays
@@ -64,7 +65,7 @@ def painted_room(
     if params.room_gain > 0 or (params.beside_gain > 0 and outlines is not None):
         gain, mass = _Cells(state.shape, size), _Cells(state.shape, size)
         background = state.background.cpu().numpy()
-        for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, params.room_frames)}):
+        for frame in spread(range(len(state.steps)), params.room_frames):
             picture = images.frame(frame)
             seen, camera, pixel = _look(state, rays, picture, passes, frame)
             bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]

@@ -14,6 +14,7 @@ from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
+from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
     Maps,
@@ -25,7 +26,7 @@ from facefolds_core.training.explicit.reflection import (
     surface_normals,
 )
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Images, Rays, StillRays, Views
+from facefolds_core.training.explicit.views import Pictures, Rays, StillRays, Views
 
 
 class GlossFit:
@@ -46,7 +47,7 @@ class GlossFit:
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, images: Images, middle: torch.Tensor) -> None:
+    def follow(self, state: TextureState, source: Rays, images: Pictures, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
@@ -55,7 +56,7 @@ class GlossFit:
         self._normals = surface_normals(radii, self.chart, self.window, blank.gloss.shape[:2], self.params.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, normals=self._normals)
-            self._shine(state, self._look(state, source, images))
+            self._shine(state, self.look(state, source, images))
 
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
@@ -63,19 +64,22 @@ class GlossFit:
         begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
         return self.on and begun and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, number: int, rounds: int, state: TextureState, source: Rays, images: Images) -> Fact | None:
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, images: Pictures) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
         if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
             return None
-        found = self.decide(state, source, images)
+        seen = self.look(state, source, images)
+        found = self._decide(state, seen)
         if self.on and self.params.begin == "end":
-            self.fit(state, source, images, done=True)
+            self._fit(state, seen, done=True)
         return found
 
-    def fit(self, state: TextureState, source: Rays, images: Images, done: bool) -> None:
+    def fit(self, state: TextureState, source: Rays, images: Pictures, done: bool) -> None:
         """Fit to what the textures leave over now; `done` if they are trained no more."""
-        seen = self._look(state, source, images)
+        self._fit(state, self.look(state, source, images), done)
+
+    def _fit(self, state: TextureState, seen: Seen, done: bool) -> None:
         used = self._used(seen)
         first = self.maps is None
         assert self._normals is not None
@@ -87,11 +91,11 @@ class GlossFit:
         self.maps = maps if done else centred(maps, used, self.params)
         self._shine(state, seen)
 
-    def decide(self, state: TextureState, source: Rays, images: Images) -> Fact:
+    def _decide(self, state: TextureState, seen: Seen) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
         assert self._normals is not None
         start = replace(Maps.blank(self.window, self.params), normals=self._normals)
-        gain = gain_on_cameras(self._used(self._look(state, source, images)), start, self.params)
+        gain = gain_on_cameras(self._used(seen), start, self.params)
         self.on = gain >= self.params.min_gain
         if not self.on:
             self.maps, state.shine = None, np.zeros((0, 3), np.float32)
@@ -101,33 +105,45 @@ class GlossFit:
         """What the model gets."""
         return None if self.maps is None else self.maps.model()
 
-    def _look(self, state: TextureState, source: Rays, images: Images) -> Seen:
+    def look(self, state: TextureState, source: Rays, images: Pictures) -> Seen:
+        """What textures leave over, on rays for a fit."""
         if self.poses is not None:
             return self._look_in_turns(state, source, images, self.poses)
         views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
-        frames = sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.frames)})
+        frames = spread(range(len(state.steps)), self.params.frames)
         for frame in frames:
             state.look(views, images.frame(frame), frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames))
 
-    def _look_in_turns(self, state: TextureState, source: Rays, images: Images, poses: Track) -> Seen:
-        """Of some rays of each of some frames: in each one the room shines from elsewhere."""
-        found = []
-        for frame in sorted({round(k) for k in np.linspace(0, len(state.steps) - 1, self.params.moving_frames)}):
+    def _look_in_turns(self, state: TextureState, source: Rays, images: Pictures, poses: Track) -> Seen:
+        """Of some rays of each of some frames, as many as a fit takes: in each frame the room shines from elsewhere.
+
+        Frames are looked at twice. What all their rays see would take up to a gigabyte; how many are opaque, and so
+        which ones are taken, is not known before the last frame.
+        """
+        frames = spread(range(len(state.steps)), self.params.moving_frames)
+        opaque, before, found = [], 0, []
+        for frame in frames:
             views, _ = source.part(frame, 0, 1)
-            sums = np.zeros((len(views.pixel), 6), np.float32)
-            state.look(views, images.frame(frame), frame, sums)
-            turn = poses.at(frame).rotation
-            seen = Seen.of(views.camera, views.directions, sums, 1, np.asarray(turn, np.float32))
-            found.append(seen.part(np.flatnonzero(seen.opacity >= self.params.min_opacity)))
+            sums = _seen(state, views, images, frame)
+            opaque.append(np.flatnonzero(sums[:, 3] >= self.params.min_opacity).astype(np.int32))
+        step = self._step(sum(map(len, opaque)))
+        for frame, there in zip(frames, opaque, strict=True):
+            views = source.part(frame, 0, 1)[0].part(there[-before % step :: step])
+            before += len(there)
+            turn = np.asarray(poses.at(frame).rotation, np.float32)
+            found.append(Seen.of(views.camera, views.directions, _seen(state, views, images, frame), 1, turn))
         return Seen.together(found)
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
         opaque = np.flatnonzero(seen.opacity >= self.params.min_opacity)
-        step = max(1, -(-len(opaque) // self.params.rays))
-        return seen.part(opaque[::step])
+        return seen.part(opaque[:: self._step(len(opaque))])
+
+    def _step(self, count: int) -> int:
+        """One of so many of `count` rays is used."""
+        return max(1, -(-count // self.params.rays))
 
     def _shine(self, state: TextureState, seen: Seen) -> None:
         assert self.maps is not None
@@ -139,3 +155,10 @@ def _views(source: Rays) -> Views:
     """The rays of a head that stands still, the same in all frames."""
     assert isinstance(source, StillRays)
     return source.views
+
+
+def _seen(state: TextureState, views: Views, images: Pictures, frame: int) -> NDArray[np.float32]:
+    """(P, 6) what rays see in one frame, as `TextureState.look` gives it."""
+    sums = np.zeros((len(views.pixel), 6), np.float32)
+    state.look(views, images.frame(frame), frame, sums)
+    return sums

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
+from facefolds_core.spacing import spread
 from facefolds_core.training.mattes.find import beside_plates, from_pictures, small
 from facefolds_core.training.volume.fit import Volume
 
@@ -45,7 +46,7 @@ def silhouettes(scene: Scene, volume: Volume, params: ExplicitParams) -> Silhoue
     if params.pruning.beside_gain == 0:
         return None
     frame, training, mattes = volume.frame, scene.indices("train"), scene.open_mattes()
-    places = _spread(len(training), params.pruning.beside_cameras)
+    places = spread(range(len(training)), params.pruning.beside_cameras)
     pictures = [(training[place], frame) for place in places]
     known = {key: mattes.image(*key).reshape(-1) for key in pictures if mattes is not None and key in mattes}
     rest = [key for key in pictures if key not in known]
@@ -66,7 +67,3 @@ def silhouettes(scene: Scene, volume: Volume, params: ExplicitParams) -> Silhoue
     for number, (camera, _) in enumerate(known):
         row[training.index(camera)] = number
     return Silhouettes(frame, row, np.stack(list(known.values())))
-
-
-def _spread(count: int, wanted: int) -> list[int]:
-    return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(wanted, count))})

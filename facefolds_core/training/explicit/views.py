@@ -14,6 +14,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.params import MovingParams
+from facefolds_core.spacing import spread
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,10 @@ class Views:
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
     directions: NDArray[np.float32]
+
+    def part(self, chosen: NDArray[np.integer]) -> Views:
+        """Some of the rays, copied."""
+        return Views(self.codes[chosen], self.camera[chosen], self.pixel[chosen], self.directions[chosen])
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
@@ -152,7 +157,7 @@ class MovingRays:
         self._belt = manifolds.chart.numbers
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
-        frames = sorted({round(k) for k in np.linspace(0, scene.num_frames - 1, params.sample_frames)})
+        frames = spread(range(scene.num_frames), params.sample_frames)
         found = [len(self._traced(k, 0, params.sample).pixel) for k in frames]
         self.count = params.sample * sum(found) // len(found)
         if self.count == 0:

@@ -24,6 +24,7 @@ from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.progress import progress
+from facefolds_core.spacing import spread
 from facefolds_core.training.mattes.find import CutOut, Key, beside_plates, from_pictures, small, wanted_pictures
 from facefolds_core.training.mattes.sheet import MOST, contact_sheet
 from facefolds_core.training.segments.key_frames import trained_at_once
@@ -76,10 +77,9 @@ def make_mattes(
 def _some_given(scene: Scene, given: Mapping[Key, Image], params: MatteParams) -> list[CutOut]:
     """Mattes of the capture, as many as the sheet has room for, spread evenly."""
     keys, store = sorted(given), scene.open_frames()
-    chosen = [keys[k] for k in sorted({round(k) for k in np.linspace(0, len(keys) - 1, min(MOST, len(keys)))})]
     return [
         CutOut(c, k, small(scene, store.image(c, k), params), small(scene, given[c, k], params), "capture")
-        for c, k in chosen
+        for c, k in spread(keys, MOST)
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.spacing import spread
 from facefolds_core.training.mattes.find import CutOut
 
 Image = NDArray[np.uint8]
@@ -24,8 +25,7 @@ MOST = 60
 
 def contact_sheet(scene: Scene, found: Sequence[CutOut]) -> Image:
     """(H, W, 3): each cut-out over green, outvoted ones first, in red frames; with camera and frame."""
-    chosen = sorted(found, key=lambda one: one.believed)
-    chosen = [chosen[k] for k in sorted({round(k) for k in np.linspace(0, len(chosen) - 1, min(MOST, len(chosen)))})]
+    chosen = spread(sorted(found, key=lambda one: one.believed), MOST)
     tiles = [_tile(scene, one) for one in chosen]
     height, width = tiles[0].shape[:2]
     across = math.ceil(math.sqrt(1.5 * len(tiles) * height / width))

@@ -12,6 +12,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import SegmentParams
 from facefolds_core.progress import progress
+from facefolds_core.spacing import spread
 
 Float = NDArray[np.float32]
 
@@ -20,7 +21,7 @@ def likenesses(scene: Scene, params: SegmentParams) -> list[Float]:
     """By what frames are told apart, each (K, D): small grey pictures of a few training cameras and, where the scene
     has them, the tracked meshes in the head's own frame."""
     train = scene.indices("train")
-    cameras = sorted({train[round(i)] for i in np.linspace(0, len(train) - 1, min(params.cameras, len(train)))})
+    cameras = spread(train, params.cameras)
     rows = min(params.thumbnail, scene.height)
     size = (max(1, round(scene.width * rows / scene.height)), rows)
     store = scene.open_frames()
