@@ -17,8 +17,6 @@ from facefolds_core.params import PlateParams
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Channels whose products make a covariance."""
 TINY = float(np.finfo(np.float32).eps)
 """No mean is formed by a smaller weight, no variance is smaller."""
 
@@ -54,7 +52,8 @@ def _nearby(
     colours: Array, weight: Array, ring: tuple[NDArray[np.int64], ...], params: PlateParams
 ) -> tuple[Array, Array]:
     """Mean (P, 3) and covariance (P, 3, 3) of the subject's colours around the ring's pixels."""
-    products = np.stack([colours[..., a] * colours[..., b] for a, b in PAIRS], -1)
+    one, other = np.triu_indices(3)
+    products = colours[..., one] * colours[..., other]
     sums = np.dstack([weight, colours * weight[..., None], products * weight[..., None]])
     height, width = weight.shape  # of half the size a wide blur is the same, and four times as fast
     half = (max(1, width // 2), max(1, height // 2))
@@ -66,9 +65,8 @@ def _nearby(
     here = sums[ring]
     mean = here[:, 1:4] / here[:, :1]
     covariance = np.empty((len(here), 3, 3), np.float32)
-    for number, (a, b) in enumerate(PAIRS):
-        product = here[:, 4 + number] / here[:, 0] - mean[:, a] * mean[:, b]
-        covariance[:, a, b] = covariance[:, b, a] = product
+    covariance[:, one, other] = here[:, 4:] / here[:, :1] - mean[:, one] * mean[:, other]
+    covariance[:, other, one] = covariance[:, one, other]
     return mean, covariance + params.deviation**2 * np.eye(3, dtype=np.float32)
 
 
