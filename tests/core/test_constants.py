@@ -87,7 +87,6 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "export/poisson.py": ("MIN_SAMPLES",),
         "rendering/camera_paths.py": ("STEEPEST",),
         "training/adam.py": ("EPSILON",),
-        "training/mattes/known_background.py": ("TINY",),
         "training/volume/subject.py": ("EMPTY",),
         "rendering/opengl.py": ALL,
         "rendering/raster.py": ALL,
