@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.krt import scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.matching import cameras_with_pictures
 from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
 from facefolds_core.captures.videos import Video, check_together, frame_names
 from facefolds_core.errors import UserError
-from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.params import FrameRange, Subject
 from facefolds_core.reading import is_folder
@@ -111,18 +112,7 @@ def gather(
     Raises:
         UserError: if no camera has both calibration and pictures, calibrations cannot be, or sizes do not fit.
     """
-    known = {one.name for one in calibrations}
-    used = [one for one in calibrations if photos.get(one.name)]
-    facts = [fact("no_images", camera=one.name) for one in calibrations if one not in used]
-    facts += [fact("uncalibrated", camera=name) for name in photos if name not in known and photos[name]]
-    if not used:
-        raise UserError(
-            "no camera has both pictures and a calibration",
-            file=root,
-            expected=f"pictures of cameras named {shorten([one.name for one in calibrations], 5)}",
-            found=shorten(list(photos), 5) or "none",
-            remedy="copy calibration and pictures of the same subject",
-        )
+    used, facts = cameras_with_pictures(calibrations, photos, root)
     sizes = {}
     for one in used:
         frame, picture = next(iter(photos[one.name].items()))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
-from facefolds_core.export.collapse_kernel import locate
+from facefolds_core.export.cover_kernel import locate
 from facefolds_core.export.sheets import Array
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.sphere_uv import st_to_uv

@@ -1,4 +1,4 @@
-"""The normalised scene: coordinates, culling, split, images, stabilisation."""
+"""The normalised scene: coordinates, culling, split, what it holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
 from facefolds_core.captures.capture import complete_subset
-from facefolds_core.captures.images import decode_image, display_colour, downsample, fit_box
+from facefolds_core.captures.images import decode_image
 from facefolds_core.captures.normalization import nearest_to_axes, split_cameras, view_angles
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
@@ -23,14 +23,12 @@ from stages.normalize import left_out
 from tests.captures.fixtures import (
     FACES,
     HEAD,
-    HEAD_TO_WORLD,
     RING,
     SEGMENT,
     VERTICES,
     edit_transforms,
     head_pose,
     opengl_matrix,
-    pose_text,
     save,
     world_camera,
     write_multiface,
@@ -174,48 +172,6 @@ def test_cameras_for_validation_keep_their_masks(tmp_path: Path) -> None:
     assert {plan.scene.splits[camera] for camera, _ in masks} == {"holdout", "validate"}
 
 
-@pytest.mark.parametrize(
-    ("size", "box", "expected"),
-    [
-        ((1334, 2048), (768, 500), (500, 768)),  # the paper's
-        ((2048, 1334), (768, 500), (768, 500)),
-        ((1368, 770), (768, 500), (768, 432)),
-        ((250, 384), (768, 500), (250, 384)),  # never enlarged
-    ],
-)
-def test_images_fit_the_box(size: tuple[int, int], box: tuple[int, int], expected: tuple[int, int]) -> None:
-    assert fit_box(*size, *box) == expected
-
-
-def test_downsampling_by_a_whole_factor_is_the_mean_of_blocks() -> None:
-    image = np.random.default_rng(0).integers(0, 256, (12, 8, 3), dtype=np.uint8)
-    expected = image.reshape(4, 3, 4, 2, 3).mean((1, 3))
-    assert np.abs(downsample(image, 4, 4) - expected).max() < 1e-3
-
-
-def test_display_colour_of_black_and_of_full_grey() -> None:
-    values = display_colour(np.array([[[0, 0, 0], [255, 255, 255]]], np.float32))
-    # Green: (1 - 3/255) * 0.95 / (1 - 3/255) = 0.95, root 0.9747, minus 15/255; red and blue are clipped.
-    assert values[0, 0].tolist() == [0, 0, 0]
-    assert values[0, 1, 1] == pytest.approx(255 * (0.95**0.5 - 15 / 255), abs=1e-2)
-    assert values[0, 1].max() <= 255
-
-
-@pytest.mark.parametrize(
-    ("stored", "expected"),
-    [
-        (np.full((2, 3), 77, np.uint8), [77, 77, 77]),
-        (np.full((2, 3), 77 * 257, np.uint16), [77, 77, 77]),
-        (np.full((2, 3, 3), (10, 20, 30), np.uint8), [10, 20, 30]),
-        (np.full((2, 3, 4), (200, 100, 50, 51), np.uint8), [40, 20, 10]),
-    ],
-)
-def test_grey_16_bit_and_transparent_images_become_rgb(tmp_path: Path, stored: np.ndarray, expected: list[int]) -> None:
-    save(tmp_path / "a.png", stored)
-    image = decode_image(tmp_path / "a.png", "here")
-    assert (image.shape, image.dtype, image[1, 2].tolist()) == ((2, 3, 3), np.uint8, expected)
-
-
 def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
     plan = plan_multiface(tmp_path / "c")
@@ -274,63 +230,6 @@ def test_a_camera_that_lacks_most_frames_is_left_out_instead(tmp_path: Path) -> 
     subject = Subject(source="multiface", path=str(tmp_path / "c"))
     cameras, frames, lines = complete_subset(read_multiface(tmp_path / "c", subject), range(5))
     assert (cameras, frames, len(lines)) == ([0, 2, 3, 4], [0, 1, 2], 1)
-
-
-def test_a_stabilised_head_stands_still(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "c", turn=10)
-    plan = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=True))
-    assert plan.vertices is not None
-    assert np.abs(plan.vertices - plan.vertices[:1]).max() < 1e-6
-
-
-def test_a_stabilised_scene_has_the_cameras_and_views_of_an_unstabilised_one(tmp_path: Path) -> None:
-    """So that scores compare."""
-    write_multiface(tmp_path / "c", turn=10)
-    still, turned = (plan_multiface(tmp_path / "c", NormalizeParams(stabilize=wanted)) for wanted in (False, True))
-    assert still.scene.poses is None and turned.scene.poses is not None
-    assert (still.scene.splits, still.rows) == (turned.scene.splits, turned.rows)
-    for a, b in zip(still.scene.cameras, turned.scene.cameras, strict=True):
-        assert (a.name, a.w2c.tolist()) == (b.name, b.w2c.tolist())
-
-
-@pytest.mark.parametrize(
-    ("turn", "stabilize", "kinds"),
-    [
-        (0.5, "auto", []),
-        (10, "auto", ["head_turns"]),
-        (0.5, True, ["head_turns"]),
-        (10, False, ["head_turns_unheeded"]),
-    ],
-)
-def test_how_much_motion_is_stabilised(tmp_path: Path, turn: float, stabilize: Any, kinds: list[str]) -> None:
-    write_multiface(tmp_path / "c", turn=turn)
-    scene = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=stabilize)).scene
-    found = [one.kind for one in scene.left_out if one.kind.startswith("head_")]
-    assert (found, scene.poses is not None) == (kinds, kinds == ["head_turns"])
-
-
-def test_the_head_is_still_in_its_mean_pose(tmp_path: Path) -> None:
-    """Turns of 0, 10, 20 degrees: the mean is the second frame, whose vertices stay where they were in the world."""
-    write_multiface(tmp_path / "c", turn=10)
-    still, turned = (plan_multiface(tmp_path / "c", NormalizeParams(stabilize=wanted)) for wanted in (False, True))
-    assert still.vertices is not None and turned.vertices is not None and turned.scene.poses is not None
-    assert turned.scene.poses.degrees() == pytest.approx([10, 0, 10], abs=1e-6)
-    assert np.abs(still.vertices[1] - turned.vertices[1]).max() < 2e-3  # of 0.3: turns shorten the mean, the box
-
-
-def test_meshes_that_stand_in_the_world_tell_the_poses(tmp_path: Path) -> None:
-    """All transforms alike: the mesh itself turns, and a corner of it, a jaw, moves."""
-    made = write_multiface(tmp_path / "c")
-    for k, frame in enumerate(made.frames):
-        turned, (rotation, _) = HEAD_TO_WORLD @ head_pose(k, 10)[0], head_pose(0)
-        vertices = np.concatenate([VERTICES, 0.5 * VERTICES, VERTICES * [0.7, 0.2, 0.4]]) @ turned.T
-        vertices[0] += [0, 2.0 * k, 0]
-        made.mesh(frame, ".obj").unlink()
-        vertices.astype("<f4").tofile(made.mesh(frame, ".bin"))
-        made.mesh(frame, "_transform.txt").write_text(pose_text(rotation, HEAD))
-    scene = plan_multiface(tmp_path / "c").scene
-    assert scene.poses is not None
-    assert scene.poses.degrees() == pytest.approx([10, 0, 10], abs=0.3)
 
 
 def test_times_follow_the_rate(tmp_path: Path) -> None:

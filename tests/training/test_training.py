@@ -1,8 +1,5 @@
-"""Training: rays, losses, recovery of a known radius, interruption, divergence, foreign checkpoints."""
+"""Training: rays, losses, recovery of a known radius, divergence, the log."""
 
-import errno
-import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +9,9 @@ from safetensors.torch import load_file
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
-from facefolds_core.model import load_model
 from facefolds_core.model.device import pick_device
 from facefolds_core.params import MlpParams, train_params
-from facefolds_core.training import loop, patience, trained
-from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
+from facefolds_core.training import loop
 from facefolds_core.training.losses import batch_losses
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.start import Start, find_start
@@ -143,45 +138,6 @@ def test_the_first_steps_of_the_papers_preset_keep_the_surfaces(tmp_path: Path) 
     assert float(crossings.hit.float().sum(1).median()) >= settings.layers / 2
 
 
-class Killed(BaseException):
-    """Stands for a signal that ends the process."""
-
-
-@pytest.mark.parametrize("log_lost", [False, True])
-def test_an_interrupted_run_ends_at_the_same_result(
-    scene: Scene, tmp_path: Path, log_lost: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    settings = params(manifold_start="surface", checkpoint_seconds=1e-9, start={"iterations": 5})
-    whole = run(scene, settings, tmp_path / "whole")
-    step = loop.train_step
-
-    def interrupted(state: loop.TrainingState, *rest: object) -> object:
-        if state.iteration == 7:
-            raise Killed
-        return step(state, *rest)
-
-    monkeypatch.setattr(loop, "train_step", interrupted)
-    with pytest.raises(Killed):
-        run(scene, settings, tmp_path / "parts")
-    assert not (tmp_path / "parts" / "model").exists()
-    monkeypatch.setattr(loop, "train_step", step)
-    if log_lost:  # `dvc repro` deletes a stage's outputs before it runs the stage again
-        shutil.rmtree(tmp_path / "parts" / "log")
-    resumed = run(scene, settings, tmp_path / "parts")
-    assert "continuing from iteration 7" in capsys.readouterr().out
-    assert whole.keys() == resumed.keys()
-    assert all(torch.equal(whole[name], resumed[name]) for name in whole)
-
-
-def test_the_checkpoint_is_removed_and_the_report_written(scene: Scene, tmp_path: Path) -> None:
-    settings = params(checkpoint_seconds=1e-9)
-    run(scene, settings, tmp_path)
-    report = json.loads((tmp_path / "model" / "training.json").read_text())
-    assert not list((tmp_path / "checkpoints").rglob("*.safetensors"))
-    assert report["iterations"] == 12 and report["device"].startswith("cpu") and report["preset"] == "quick"
-    assert load_model(tmp_path / "model").num_layers == 3
-
-
 def test_the_log_holds_losses_rates_and_speed(scene: Scene, tmp_path: Path) -> None:
     run(scene, params(), tmp_path)
     names = {str(p.relative_to(tmp_path / "log" / "plots" / "metrics")) for p in (tmp_path / "log").rglob("*.tsv")}
@@ -199,27 +155,6 @@ def test_nothing_is_sent_to_dvc_studio(scene: Scene, tmp_path: Path, monkeypatch
     assert not sent
 
 
-def test_divergence_is_caught_and_the_last_checkpoint_kept(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    settings = params(checkpoint_seconds=1e-9)
-    step = loop.train_step
-
-    def poisoned(state: loop.TrainingState, *rest: object) -> object:
-        if state.iteration == 5:
-            with torch.no_grad():
-                state.model.textures.base.bias[0] = float("nan")
-        return step(state, *rest)
-
-    monkeypatch.setattr(loop, "train_step", poisoned)
-    with pytest.raises(UserError, match="not finite") as caught:
-        run(scene, settings, tmp_path)
-    assert "iteration 5" in str(caught.value) and "lr_manifold" in str(caught.value.remedy)
-    kept = load_file(tmp_path / "checkpoints" / fingerprint(settings, scene) / CHECKPOINT)
-    assert all(t.isfinite().all() for t in kept.values())
-    assert not (tmp_path / "model").exists()
-
-
 def test_parameters_are_untouched_by_a_step_that_diverges(scene: Scene) -> None:
     settings = params()
     state, sampler = state_for(scene, settings)
@@ -229,51 +164,6 @@ def test_parameters_are_untouched_by_a_step_that_diverges(scene: Scene) -> None:
     with pytest.raises(UserError):
         loop.train_step(state, sampler, settings)
     assert all(torch.equal(before[name], tensor) for name, tensor in state.model.state_dict().items())
-
-
-def test_checkpoint_of_another_configuration(scene: Scene, tmp_path: Path) -> None:
-    state, sampler = state_for(scene, params())
-    loop.train_step(state, sampler, params())
-    save_checkpoint(state, "aaaa", tmp_path)
-    with pytest.raises(UserError, match="another configuration") as caught:
-        load_checkpoint(state, "bbbb", tmp_path)
-    assert "bbbb" in str(caught.value.expected) and "aaaa" in str(caught.value.found)
-
-
-def test_checkpoint_of_another_architecture(scene: Scene, tmp_path: Path) -> None:
-    state, sampler = state_for(scene, params())
-    loop.train_step(state, sampler, params())
-    save_checkpoint(state, "aaaa", tmp_path)
-    other, _ = state_for(scene, params(texture_width=20))
-    with pytest.raises(UserError, match="does not belong") as caught:
-        load_checkpoint(other, "aaaa", tmp_path)
-    assert "shape" in str(caught.value.expected)
-
-
-def test_truncated_checkpoint(scene: Scene, tmp_path: Path) -> None:
-    state, sampler = state_for(scene, params())
-    loop.train_step(state, sampler, params())
-    path = save_checkpoint(state, "aaaa", tmp_path)
-    path.write_bytes(path.read_bytes()[:-10])
-    with pytest.raises(UserError, match="damaged") as caught:
-        load_checkpoint(state, "aaaa", tmp_path)
-    assert caught.value.file == path and "delete" in str(caught.value.remedy)
-
-
-def test_fingerprint_tells_configurations_and_scenes_apart(scene: Scene, tmp_path: Path) -> None:
-    other = make_scene(tmp_path, OPAQUE, size=20)
-    marks = {fingerprint(params(), scene), fingerprint(params(seed=1), scene), fingerprint(params(), other)}
-    assert len(marks) == 3
-    assert fingerprint(params(device="cpu", checkpoint_seconds=5.0), scene) == fingerprint(params(), scene)
-
-
-@pytest.mark.parametrize(
-    "values", [{"volume": {"reach": 0.4}}, {"losses": {"late_opacity": 0.2}}, {"geometry": {"rounds": [2.0]}}]
-)
-def test_the_fingerprint_of_the_explicit_model_has_its_nested_keys(scene: Scene, values: dict[str, object]) -> None:
-    usual = train_params({"preset": "fast"})
-    assert fingerprint(train_params({"preset": "fast", **values}), scene) != fingerprint(usual, scene)
-    assert fingerprint(train_params({"preset": "fast", "device": "cpu"}), scene) == fingerprint(usual, scene)
 
 
 def test_missing_training_image(tmp_path: Path) -> None:
@@ -288,38 +178,3 @@ def test_missing_training_image(tmp_path: Path) -> None:
 def test_cuda_where_there_is_none() -> None:
     with pytest.raises(UserError, match="no CUDA device"):
         pick_device("cuda")
-
-
-def test_a_disk_too_full_for_checkpoints_does_not_end_the_training(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    expected = run(scene, params(), tmp_path / "undisturbed")
-
-    def full(*_: object) -> Path:
-        raise OSError(errno.ENOSPC, "No space left on device", "checkpoint.safetensors")
-
-    monkeypatch.setattr(loop, "save_checkpoint", full)
-    found = run(scene, params(checkpoint_seconds=1e-9), tmp_path)
-    assert all(torch.equal(found[name], tensor) for name, tensor in expected.items())
-    assert "no checkpoint at iteration 1: No space left" in capsys.readouterr().err
-
-
-def test_a_model_that_could_not_be_written_is_not_trained_again(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    expected = run(scene, params(), tmp_path / "undisturbed")
-    report = json.loads((tmp_path / "undisturbed" / "model" / "training.json").read_text())
-
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
-        patched.setattr(patience, "SECONDS", 0.0)
-        patched.setattr(trained, "save_model", full)
-        run(scene, params(), tmp_path)
-    assert caught.value.filename == str(tmp_path / "model")
-    monkeypatch.setattr(loop, "train_step", None)  # nothing is left to be done
-    found = run(scene, params(), tmp_path)
-    assert all(torch.equal(found[name], tensor) for name, tensor in expected.items())
-    again = json.loads((tmp_path / "model" / "training.json").read_text())
-    assert again["final_psnr"] == report["final_psnr"]

@@ -26,6 +26,7 @@ from trimesh.exchange.ply import load_ply
 
 from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.captures.gathering import Array, Calibration, gather, inside
+from facefolds_core.captures.matching import chosen_segment
 from facefolds_core.captures.numbers import matrix_from
 from facefolds_core.captures.picture import Picture, ZipPicture, open_zip, read_member
 from facefolds_core.captures.recognition import Recognised
@@ -166,17 +167,7 @@ def _listed(root: Path) -> dict[str, list[str]]:
 def _frames(root: Path, wanted: str | None) -> list[str]:
     """Sorted frames of the segment."""
     segments = _listed(root)
-    chosen = next(iter(segments)) if wanted is None and len(segments) == 1 else wanted
-    if chosen not in segments:
-        words = "several segments, and none is chosen" if wanted is None else "no such segment"
-        raise UserError(
-            words,
-            file=root / "frame_list.csv",
-            place="segment",
-            expected=f"one of {shorten(sorted(segments), 100)}",
-            found=wanted,
-            remedy=f"{'set' if wanted is None else 'correct'} `segment` of this subject in params.yaml",
-        )
+    chosen = chosen_segment(segments, wanted, root / "frame_list.csv", _REMEDY)
     return sorted(set(segments[chosen]))
 
 

@@ -21,10 +21,10 @@ from facefolds_core.captures.capture import Capture, Sound, View, closest_rotati
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.matching import cameras_with_pictures, chosen_segment
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.tracked import read_tracking
-from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, Subject
@@ -65,7 +65,8 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     calibration = read_krt(root / "KRT")
     segment = _segment(root, subject.segment)
     photos = _photos(root / "images" / segment)
-    used, left_out = _cameras(calibration, photos, root)
+    kinds = ("camera_without_images", "camera_without_calibration")
+    used, left_out = cameras_with_pictures(calibration, photos, root, kinds)
     names = sorted({frame for camera in used for frame in photos[camera.name]})
     listed = _listed(root / "frame_list.txt", segment)
     left_out += [fact("frame_without_images", frame=name) for name in listed if name not in names]
@@ -112,24 +113,7 @@ def _segment(root: Path, wanted: str | None) -> str:
     for place in (root, folder):
         check_folder(place, "point `path` at a Multiface subject's folder, which holds KRT and images")
     segments = [path.name for path in _inside(folder) if path.is_dir()] if folder.is_dir() else []
-    if wanted in segments:
-        return str(wanted)
-    if wanted is None and len(segments) == 1:
-        return segments[0]
-    if not segments:
-        problem, remedy = "no segments", "download some: images/SEGMENT/CAMERA/FRAME.png"
-    elif wanted is None:
-        problem, remedy = "several segments, and none is chosen", "set `segment` of this subject in params.yaml"
-    else:
-        problem, remedy = "no such segment", "correct `segment` of this subject in params.yaml"
-    raise UserError(
-        problem,
-        file=folder,
-        place="segment",
-        expected=f"one of {shorten(segments, 100)}" if segments else None,
-        found=wanted,
-        remedy=remedy,
-    )
+    return chosen_segment(segments, wanted, folder, "download some: images/SEGMENT/CAMERA/FRAME.png")
 
 
 def _photos(folder: Path) -> dict[str, dict[str, Path]]:
@@ -155,25 +139,6 @@ def _listed(path: Path, segment: str) -> list[str]:
     )
     pairs = [line.split() for line in text.splitlines()]
     return [pair[1] for pair in pairs if len(pair) == 2 and pair[0] == segment]
-
-
-def _cameras(
-    calibration: list[Calibration], photos: dict[str, dict[str, Path]], root: Path
-) -> tuple[list[Calibration], list[Fact]]:
-    """The cameras with both calibration and images, and facts on the others."""
-    known = {camera.name for camera in calibration}
-    used = [camera for camera in calibration if photos.get(camera.name)]
-    left_out = [fact("camera_without_images", camera=camera.name) for camera in calibration if camera not in used]
-    left_out += [fact("camera_without_calibration", camera=name) for name in photos if name not in known]
-    if not used:
-        raise UserError(
-            "no camera has both images and a calibration",
-            file=root,
-            expected=f"folders of images named {shorten([camera.name for camera in calibration], 5)}",
-            found=shorten(list(photos), 5) or "none",
-            remedy="copy KRT and images of the same subject",
-        )
-    return used, left_out
 
 
 def _views(

@@ -38,6 +38,7 @@ import numpy as np
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, footage, gather, inside, pictures_in, view_of
 from facefolds_core.captures.images import Colour
+from facefolds_core.captures.matching import chosen_segment
 from facefolds_core.captures.numbers import matrix_from, read_npy
 from facefolds_core.captures.picture import Picture
 from facefolds_core.captures.recognition import Recognised
@@ -132,25 +133,7 @@ def _sequences(root: Path) -> list[str]:
 
 
 def _chosen(root: Path, wanted: str | None) -> str:
-    names = _sequences(root)
-    if wanted in names:
-        return str(wanted)
-    if wanted is None and len(names) == 1:
-        return names[0]
-    if not names:
-        problem, remedy = "no sequences", _MISSING
-    elif wanted is None:
-        problem, remedy = "several sequences, and none is chosen", "set `segment` of this subject in params.yaml"
-    else:
-        problem, remedy = "no such sequence", "correct `segment` of this subject in params.yaml"
-    raise UserError(
-        problem,
-        file=root / "sequences",
-        place="segment",
-        expected=f"one of {shorten(names, 100)}" if names else None,
-        found=wanted,
-        remedy=remedy,
-    )
+    return chosen_segment(_sequences(root), wanted, root / "sequences", _MISSING, "sequence")
 
 
 def _videos(folder: Path) -> dict[str, Path]:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, gather, inside
+from facefolds_core.captures.matching import chosen_segment
 from facefolds_core.captures.picture import Hdf5Picture, Picture, open_hdf5
 from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
@@ -103,21 +104,8 @@ def _performances(root: Path) -> dict[str, list[Path]]:
 def _files(root: Path, wanted: str | None) -> list[Path]:
     """The files of the performance, and its annotations where the dataset's own folders have them."""
     found = _performances(root)
-    if wanted is None and len(found) == 1:
-        wanted = next(iter(found))
-    if wanted not in found:
-        several = wanted is None and found
-        raise UserError(
-            "several performances, and none is chosen" if several else "no such performance" if found else "no .smc",
-            file=root,
-            place="segment",
-            expected=f"one of {shorten(sorted(found))}" if found else "RenderMe-360's .smc files",
-            found=wanted,
-            remedy="set `segment` of this subject in params.yaml"
-            if found
-            else "point `path` at an .smc file, or at the folder that holds them",
-        )
-    files = found[wanted]
+    missing = "point `path` at an .smc file of RenderMe-360, or at the folder that holds them"
+    files = found[chosen_segment(found, wanted, root, missing, "performance")]
     if is_regular(root):
         other = root.name.replace("_raw.smc", "_anno.smc")
         near = [root.parent / other, root.parent.parent.parent / "anno" / root.parent.name / other]

@@ -146,7 +146,7 @@ def test_what_is_wrong_in_a_file_is_said(
 
 
 def test_a_file_cut_off_and_a_folder_without_any_are_refused(filmed: Path, tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"no \.smc"):
+    with pytest.raises(UserError, match=r"no performances\n(.*\n)*.*an \.smc file"):
         read(tmp_path)
     data = (filmed / "0026_e0_anno.smc").read_bytes()
     (tmp_path / "0026_e0_anno.smc").write_bytes(data[: len(data) // 2])

@@ -1,0 +1,70 @@
+"""Bad transforms.json: each gives one message that names file, place and remedy, and leaves nothing behind."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.captures.fixtures import (
+    edit_transforms,
+    write_transforms,
+)
+from tests.captures.test_bad_captures import Edit, refused
+
+ENTRIES: list[tuple[str, Edit, str, str]] = [
+    ("no path", {"file_path": None}, "a key is missing", "frames[1], file_path"),
+    ("no matrix", {"transform_matrix": None}, "a key is missing", "transform_matrix"),
+    ("3 x 3", {"transform_matrix": np.eye(3).tolist()}, "wrong shape", "transform_matrix"),
+    ("ragged", {"transform_matrix": [[1, 0], [0]]}, "wrong shape", "transform_matrix"),
+    ("words", {"transform_matrix": "identity"}, "wrong shape", "transform_matrix"),
+    ("singular", {"transform_matrix": np.diag([1, 1, 0, 1]).tolist()}, "no rotation", "transform_matrix"),
+    ("nan", {"transform_matrix": (np.eye(4) * np.nan).tolist()}, "not finite", "transform_matrix"),
+    ("no focal length", {"fl_x": None, "fl_y": None}, "no focal length", "frames[1]"),
+    ("focal length 0", {"fl_x": 0}, "singular", "frames[1]"),
+    ("focal word", {"fl_x": "long"}, "not a number", "fl_x"),
+    ("other size", {"w": 400}, "another size", "frames[1] (images/400002.png), w"),
+    ("camera model", {"camera_model": "FOV"}, "camera model", "frames[1]"),
+    ("strong fisheye", {"camera_model": "OPENCV_FISHEYE", "k1": -90.0}, "distortion is too strong", "frames[1]"),
+    ("strong distortion", {"k1": 90.0}, "distortion is too strong", "frames[1]"),
+    ("one time each", {"time": 3.0}, "one time only", "time"),
+]
+
+
+@pytest.mark.parametrize(("edit", "message", "place"), [row[1:] for row in ENTRIES], ids=[row[0] for row in ENTRIES])
+def test_bad_entry_of_transforms(tmp_path: Path, edit: Edit, message: str, place: str) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    edit_transforms(path, 1, **edit)
+    error = refused(tmp_path / "c", "transforms")
+    assert (message in error.message, error.file, place in str(error.place)) == (True, path, True)
+
+
+@pytest.mark.parametrize(
+    "text", ['{"frames": [{', "", "[]", '{"frames": []}', '{"frames": [3]}', '{"frames": {"a": 1}}']
+)
+def test_garbled_transforms(tmp_path: Path, text: str) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    path.write_text(text)
+    assert refused(tmp_path / "c", "transforms").file == path
+
+
+def test_garbled_json_names_line_and_column(tmp_path: Path) -> None:
+    path, _ = write_transforms(tmp_path / "c")
+    path.write_text(json.dumps({"frames": [1, 2]}, indent=1)[:-3])
+    assert str(refused(tmp_path / "c", "transforms").place).startswith("line ")
+
+
+def test_missing_transforms(tmp_path: Path) -> None:
+    (tmp_path / "c").mkdir()
+    error = refused(tmp_path / "c", "transforms")
+    assert error.file == tmp_path / "c"
+    assert "transforms.json" in str(error.expected)
+
+
+def test_no_image_of_transforms_exists(tmp_path: Path) -> None:
+    write_transforms(tmp_path / "c")
+    shutil.rmtree(tmp_path / "c" / "images")
+    assert "none of the images" in refused(tmp_path / "c", "transforms").message
