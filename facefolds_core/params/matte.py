@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Length, Natural, Pixels, Section, Share, Weight
+from facefolds_core.params.base import Count, Factor, Length, Natural, Pixels, Section, Share, Weight
 
 
 class CutOutParams(Section):
@@ -43,14 +43,46 @@ class PlateParams(Section):
     least: Share = 0.05
     """What is smaller than this share of the largest thing is a shadow or a reflection."""
 
-    outline: Natural = 3
-    """Pixels inside of the outline where opacity is found from colours, between plate and subject;"""
+    outline: Natural = 8
+    """Pixels inside of the outline up to which opacity is found from colours, before the plate's (of a thin subject
+    half its thickness at most): loose hair is as wide on pictures of 384;"""
 
-    beyond: Natural = 5
+    beyond: Natural = 6
     """and outside of it: hair."""
 
-    contrast: Share = 0.08
-    """Difference between subject and plate under which colours say little of opacity: it is taken to be lower."""
+    faint: Share = 0.012
+    """Difference of a colour from the plate's from which on a pixel beyond the outline may show a little of the
+    subject, at least; it is `faint_noise` times the pictures' noise where that is more."""
+
+    faint_noise: Factor = 2.5
+    """See `faint`."""
+
+    noise: Weight = 0.01
+    """Standard deviation of the pictures' noise, at least: the median difference from the plate far from the subject
+    where that is more."""
+
+    quiet: Natural = 12
+    """So many pixels beyond the outline the difference is noise."""
+
+    spread: Pixels = 6.0
+    """Standard deviation of the neighbourhood whose colours the subject's are taken to have at a pixel of the outline,
+    pixels."""
+
+    deviation: Weight = 0.01
+    """Standard deviation of these colours, at least: subjects of one colour."""
+
+    alike: Weight = 3.0
+    """Logarithm of how much less likely an opacity is that differs by 1 from those around it: decides where subject
+    and plate have the same colour."""
+
+    beside: Pixels = 1.5
+    """Standard deviation of "around", pixels."""
+
+    solid: Weight = 2.0
+    """Logarithm of how much likelier an opacity of 1 is than others: most of a subject is opaque."""
+
+    steps: Annotated[int, Field(ge=2, le=1001)] = 21
+    """Opacities from 0 to 1 that are compared."""
 
 
 class VoteParams(Section):

@@ -110,15 +110,45 @@ def test_beside_a_plate_opacity_is_found_along_the_outline() -> None:
     assert np.abs(found - opacity).max() < 0.15  # seen: 0.07
 
 
-@pytest.mark.parametrize("given", [{"outline": 0}, {"contrast": 0.0}, {"beyond": 0}])
+@pytest.mark.parametrize("given", [{"outline": 0}, {"deviation": 0.0, "noise": 0.0}, {"beyond": 0}])
 def test_beside_a_plate_no_limit_is_too_low(given: dict[str, float]) -> None:
     """A black square before a grey room that has a black thing beside it."""
     plate = np.full((40, 40, 3), 100, np.uint8)
     plate[12:16, 31:] = 0
     image = plate.copy()
     image[10:30, 10:30] = 0
-    opacity = from_plate(image, plate, PlateParams.model_validate(given))
+    opacity = np.rint(255 * from_plate(image, plate, PlateParams.model_validate(given))) / 255
     assert opacity[10:30, 10:30].min() == 1 and opacity[:, 31:].max() == 0
+
+
+def _before_a_post(hair: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Dark, streaked hair, fringed with single strands, before a bright wall with a post of the hair's colour."""
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:96, :96]
+    depth = 30 - np.hypot(x - 48, y - 48)
+    opacity = np.where(depth > 0, 1.0, (depth > -6) * (rng.random(depth.shape) < 0.3))
+    plate = np.where((abs(x - 20) < 5)[..., None], (45, 40, 38), (220, 210, 190)) + rng.integers(-2, 3, (96, 96, 3))
+    colour = hair + rng.integers(-20, 21, (96, 96, 1))
+    image = opacity[..., None] * colour + (1 - opacity[..., None]) * plate + rng.integers(-2, 3, (96, 96, 3))
+    return image.clip(0, 255).astype(np.uint8), plate.clip(0, 255).astype(np.uint8), opacity
+
+
+def test_loose_hair_before_a_plate_is_strands_even_before_a_post_of_its_colour() -> None:
+    image, plate, opacity = _before_a_post(np.array((60, 48, 40)))
+    found, true = from_plate(image, plate, PlateParams()) > 0.5, opacity > 0.5
+    assert (found & true).sum() / (found | true).sum() > 0.97
+
+
+def test_opacity_before_a_plate_is_on_average_right() -> None:
+    image, plate, opacity = _before_a_post(np.array((60, 48, 40)))
+    loose = (opacity < 1) & (np.hypot(*(np.mgrid[:96, :96] - 48)) < 36)
+    assert abs(from_plate(image, plate, PlateParams())[loose].mean() - opacity[loose].mean()) < 0.1
+
+
+def test_a_thin_subject_before_a_plate_is_opaque_inside() -> None:
+    opacity = np.zeros((64, 64))
+    opacity[10:54, 30:35] = 1
+    found = from_plate(*_before_a_plate(opacity), PlateParams())
+    assert found[14:50, 31:34].min() > 0.9 and found[:, :26].max() < 0.1
 
 
 def test_shadows_and_holes_beside_a_plate_are_none() -> None:

@@ -9,6 +9,7 @@ from scipy import ndimage
 
 from facefolds_core.params import PlateParams
 from facefolds_core.training.mattes.cut_out import grown
+from facefolds_core.training.mattes.known_background import opacity_before
 
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -37,17 +38,13 @@ def _different(image: Image, plate: Image, params: PlateParams) -> Image:
 
 
 def _soft(image: Image, plate: Image, subject: Image, params: PlateParams) -> Array:
-    """I = a F + (1 - a) P around the outline, F the nearest of the subject's own colours, by least squares of RGB."""
-    inside = cv2.erode(subject, np.ones((2 * params.outline + 1,) * 2, np.uint8), borderValue=1) > 0
-    if not inside.any():
-        return subject.astype(np.float32)
-    colours, room = image.astype(np.float32) / 255, plate.astype(np.float32) / 255
-    blur = 0.5 * max(1, params.outline)
-    weight = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), blur)[..., None]
-    own = cv2.GaussianBlur(colours * inside[..., None], (0, 0), blur) / np.maximum(weight, 1e-3)
-    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-    across = own[tuple(nearest)] - room
-    least = max(3 * params.contrast**2, 1e-12)  # where both are the same colour nothing is divided by 0
-    opacity = ((colours - room) * across).sum(-1) / np.maximum((across**2).sum(-1), least)
-    opacity = np.where(grown(subject, params.beyond) > 0, np.clip(opacity, 0, 1), 0)
-    return np.where(inside, 1, opacity).astype(np.float32)
+    """Opacity along the outline, where the plate is what stands behind; 1 within it."""
+    depth = np.asarray(ndimage.distance_transform_edt(np.pad(subject, 1, mode="edge")))[1:-1, 1:-1]
+    inside = depth > min(params.outline, 0.5 * depth.max())
+    difference = np.abs(image.astype(np.float32) - plate).max(-1) / 255
+    quiet = difference[grown(subject, params.quiet) == 0]
+    noise = float(np.median(quiet)) if quiet.size else 0.0
+    differs = difference > max(params.faint, params.faint_noise * noise)
+    unknown = (subject > 0) | (differs & (grown(subject, params.beyond) > 0))
+    colours, room = (part.astype(np.float32) / np.float32(255) for part in (image, plate))
+    return opacity_before(colours, room, inside, unknown, max(params.noise, noise), params)

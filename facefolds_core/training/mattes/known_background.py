@@ -1,0 +1,98 @@
+"""Opacity before a known background: Bayesian matting (Chuang et al. 2001) where B is the clean plate.
+
+A pixel shows I = a F + (1 - a) B. Of the subject's colour F only this is known: nearby it has such a mean and such a
+covariance, so I is normal with mean a m + (1 - a) B and covariance a^2 S + n^2, n the pictures' noise. Pixels are asked
+ring by ring, from the subject's inside outwards; each ring's colours tell the next.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.params import PlateParams
+
+Array = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+TINY = float(np.finfo(np.float32).eps)
+"""No mean is formed by a smaller weight, no variance is smaller."""
+
+
+def opacity_before(image: Array, plate: Array, inside: Mask, unknown: Mask, noise: float, params: PlateParams) -> Array:
+    """(H, W) in [0, 1]: 1 on `inside`, 0 beyond it and `unknown`.
+
+    Args:
+        image, plate: (H, W, 3) in [0, 1].
+        inside: (H, W) surely the subject's, somewhere.
+        unknown: (H, W) where opacity is asked for.
+        noise: standard deviation of both, of values in [0, 1].
+    """
+    opacity, unknown = inside.astype(np.float32), unknown & ~inside
+    colours, known = image.copy(), ~unknown
+    away = np.ceil(np.asarray(ndimage.distance_transform_edt(~inside)))
+    for distance in np.unique(away[unknown]):
+        ring = np.nonzero(unknown & (away == distance))
+        mean, covariance = _nearby(colours, opacity**2 * known, ring, params)
+        sure = known.astype(np.float32)
+        beside = _blurred(opacity * sure, params.beside)[ring]
+        beside /= np.maximum(_blurred(sure, params.beside)[ring], TINY)
+        opacity[ring], colours[ring] = _likeliest(image[ring], plate[ring], mean, covariance, beside, noise, params)
+        known[ring] = True
+    return opacity
+
+
+def _blurred(values: Array, width: float) -> Array:
+    return np.asarray(cv2.GaussianBlur(values, (0, 0), width), np.float32)
+
+
+def _nearby(
+    colours: Array, weight: Array, ring: tuple[NDArray[np.int64], ...], params: PlateParams
+) -> tuple[Array, Array]:
+    """Mean (P, 3) and covariance (P, 3, 3) of the subject's colours around the ring's pixels."""
+    one, other = np.triu_indices(3)
+    products = colours[..., one] * colours[..., other]
+    sums = np.dstack([weight, colours * weight[..., None], products * weight[..., None]])
+    height, width = weight.shape  # of half the size a wide blur is the same, and four times as fast
+    half = (max(1, width // 2), max(1, height // 2))
+    sums = _blurred(np.asarray(cv2.resize(sums, half, interpolation=cv2.INTER_AREA)), params.spread / 2)
+    sums = np.asarray(cv2.resize(sums, (width, height), interpolation=cv2.INTER_LINEAR))
+    if not (sums[..., 0][ring] > TINY).all():  # too far from the inside: as the nearest that is not
+        near = ndimage.distance_transform_edt(sums[..., 0] <= TINY, return_distances=False, return_indices=True)
+        sums = sums[tuple(near)]
+    here = sums[ring]
+    mean = here[:, 1:4] / here[:, :1]
+    covariance = np.empty((len(here), 3, 3), np.float32)
+    covariance[:, one, other] = here[:, 4:] / here[:, :1] - mean[:, one] * mean[:, other]
+    covariance[:, other, one] = covariance[:, one, other]
+    return mean, covariance + params.deviation**2 * np.eye(3, dtype=np.float32)
+
+
+def _likeliest(
+    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, noise: float, params: PlateParams
+) -> tuple[Array, Array]:
+    """Expected opacity (P,), and the subject's colour (P, 3) with it.
+
+    Args:
+        image, plate, mean: (P, 3).
+        covariance: (P, 3, 3).
+        beside: (P,) mean opacity of what is known around.
+        noise: see `opacity_before`.
+    """
+    steps = np.linspace(0, 1, params.steps, dtype=np.float32)
+    variances, axes = np.linalg.eigh(covariance)
+    variances = np.maximum(variances, TINY)
+    across = np.einsum("pij,pi->pj", axes, mean - plate)
+    off = np.einsum("pij,pi->pj", axes, image - plate)
+    spread = steps[:, None, None] ** 2 * variances + (noise**2 + TINY)
+    error = off - steps[:, None, None] * across
+    chance = -0.5 * (error**2 / spread + np.log(spread)).sum(-1)
+    chance -= params.alike * np.abs(steps[:, None] - beside)
+    chance[-1] += params.solid
+    chance = np.exp(chance - chance.max(0))
+    opacity = (chance * steps[:, None]).sum(0) / chance.sum(0)
+    gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + (noise**2 + TINY))
+    colour = mean + np.einsum("pij,pj->pi", axes, gain * (off - opacity[:, None] * across))
+    return opacity.astype(np.float32), np.clip(colour, 0, 1).astype(np.float32)
