@@ -126,9 +126,11 @@ class GeometryParams(Section):
     round_iterations: Count = 60
     """Adam steps of each round, at a quarter of the final texels a side."""
 
-    round_stride: Count = 2
-    """Every so-manieth pixel of each camera is looked at in the rounds: their textures are coarse. With fewer, hair of
-    coarse pictures becomes lumpy."""
+    round_stride: Count = 8
+    """At most every so-manieth pixel of each camera is looked at in the rounds: their textures are coarse;"""
 
-    blur: Pixels = 3.0
+    round_rays: Count = 250000
+    """but so many of all cameras are, where there are as many: with fewer, hair of small pictures becomes lumpy."""
+
+    blur: Pixels = 6.0
     """Smoothing of the layers' motion between rounds, standard deviation, nodes."""

@@ -162,7 +162,7 @@ def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
     chosen = fit.Fit(Chart((0, 0, 0)), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
-    levels = plan(chosen, _params(iterations=400), frames=11)
+    levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
 

@@ -15,6 +15,8 @@ from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.plan import Epochs, plan
 from facefolds_core.training.explicit.state import TextureState
 
+PIXELS = 3_000_000
+
 
 def fitted() -> Fit:
     ones = np.ones((4, 4))
@@ -40,12 +42,12 @@ def params(steps: int = 20) -> ExplicitParams:
 
 @pytest.mark.parametrize("frames", [1, 12, 14])
 def test_few_frames_share_the_iterations_that_are_asked_for(frames: int) -> None:
-    assert sum(level.iterations for level in plan(fitted(), params(), frames)) == params().iterations
+    assert sum(level.iterations for level in plan(fitted(), params(), frames, PIXELS)) == params().iterations
 
 
 @pytest.mark.parametrize(("frames", "steps"), [(24, 20), (200, 20), (1000, 20), (1000, 1)])
 def test_each_of_many_frames_has_its_steps_at_full_resolution(frames: int, steps: int) -> None:
-    last = plan(fitted(), params(steps), frames)[-1]
+    last = plan(fitted(), params(steps), frames, PIXELS)[-1]
     epochs = Epochs(frames, np.random.default_rng(0))
     taken = Counter(epochs.next() for _ in range(last.iterations))
     assert last.texels == (128, 96)
@@ -63,20 +65,20 @@ def test_orders_differ_and_repeat_with_the_seed() -> None:
 
 @pytest.mark.parametrize(("iterations", "pace"), [(183, 1.0), (460, 1.0), (740, 0.5), (1860, 1 / 6)])
 def test_a_longer_training_goes_the_same_way_in_smaller_steps(iterations: int, pace: float) -> None:
-    *rounds, half, last = plan(fitted(), params().model_copy(update={"iterations": iterations}), 1)
+    *rounds, half, last = plan(fitted(), params().model_copy(update={"iterations": iterations}), 1, PIXELS)
     assert all(level.pace == 1 for level in rounds)
     assert half.pace == last.pace == pytest.approx(pace)
 
 
 def test_many_frames_are_trained_at_full_rate() -> None:
-    assert {level.pace for level in plan(fitted(), params(), 200)} == {1.0}
+    assert {level.pace for level in plan(fitted(), params(), 200, PIXELS)} == {1.0}
     doubled = params().model_copy(update={"iterations": 8180})
-    assert plan(fitted(), doubled, 200)[-1].pace == pytest.approx(0.5)
+    assert plan(fitted(), doubled, 200, PIXELS)[-1].pace == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("parts", [1, 2, 4, 7])
 def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
-    level = replace(plan(fitted(), params(), 1)[-1], pace=1 / parts)
+    level = replace(plan(fitted(), params(), 1, PIXELS)[-1], pace=1 / parts)
     smoothed = [i for i in range(168 * parts) if level.smooths(i, 3)]
     assert smoothed == [3 * parts * k for k in range(56)]
 
@@ -88,3 +90,10 @@ def test_decay_and_backgrounds_go_at_the_level_s_pace() -> None:
     assert (state.kept_of_frames, state.background_rate) == (np.float32(0.999), 0.5)
     state.pace = 0.25
     assert state.kept_of_frames == pytest.approx(0.999**0.25) and state.background_rate == 0.125
+
+
+@pytest.mark.parametrize(("pixels", "stride"), [(3_000_000, 8), (2_000_000, 8), (1_440_000, 5), (540_672, 2), (100, 1)])
+def test_rounds_look_at_enough_of_small_pictures(pixels: int, stride: int) -> None:
+    *rounds, half, last = plan(fitted(), params(), 12, pixels)
+    assert {level.stride for level in rounds} == {stride}
+    assert half.stride == last.stride == 1

@@ -129,7 +129,8 @@ def fit_with_surroundings(
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         trainer = Trainer(cameras, own, fit, volume, device)
         trainer.events = [*found, *trainer.events, *warnings]
-        levels = plan(fit, params, scene.num_frames)
+        pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
+        levels = plan(fit, params, scene.num_frames, pixels)
         bar.total = bar.n + sum(level.iterations for level in levels)
         begun = None
         if checkpoints is not None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import ExplicitParams, GeometryParams
 from facefolds_core.training.explicit.fit import Fit
 
 
@@ -58,8 +58,12 @@ class Epochs:
         return self.left.pop()
 
 
-def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
+def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Level]:
     """Rounds of geometry at a quarter of the resolution; half and full resolution, with their steps a frame.
+
+    Args:
+        frames: K.
+        pixels: of all training cameras in one frame.
 
     More steps than those at full rate are smaller ones: they go the same way more finely. Farther on, the layers would
     begin to show each camera its own picture.
@@ -69,9 +73,8 @@ def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
     geometry = params.geometry
-    levels = [
-        Level(size(4), geometry.round_iterations, geometry.round_stride, scale, False) for scale in geometry.rounds
-    ]
+    stride = round_stride(geometry, pixels)
+    levels = [Level(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
     rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
     rest = max(max(params.iterations, params.least_iterations) - rounds, least)
     pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
@@ -79,3 +82,8 @@ def plan(fit: Fit, params: ExplicitParams, frames: int) -> list[Level]:
     levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
     levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
     return levels
+
+
+def round_stride(geometry: GeometryParams, pixels: int) -> int:
+    """Every so-manieth of `pixels` is looked at in the rounds: `round_rays` of them at least, if there are as many."""
+    return max(1, min(geometry.round_stride, pixels // geometry.round_rays))
