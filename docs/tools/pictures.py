@@ -1,16 +1,17 @@
 """The documents' pictures of a subject, and whether they are still what would be made today.
 
-python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg, player.jpg
+python -m docs.tools.pictures              makes face.webp, actor.jpg, limits.jpg, report.jpg, player.jpg, sizes.jpg
 python -m docs.tools.pictures --check      refuses pictures that are not of this asset, these options, or were edited
 
 What each was made from stands in docs/images/made.json; report.jpg needs `facefolds report data/actor` and Chromium,
-player.jpg Chromium and the player that `make view` builds.
+player.jpg and sizes.jpg Chromium and the player that `make view` builds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -42,8 +43,11 @@ FILM |= {"field_of_view": 18.5, "target": [-0.1, 0.0, -0.035], "background": [22
 SHEET: dict[str, Any] = {"quality": 88}
 PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patience": 6000, "quality": 82}
 """CSS pixels: a desktop, and a phone beside it; milliseconds until the player in it plays."""
-PLAYER: dict[str, Any] = {"height": 660, "gap": 20, "width": 1600, "patience": 1500, "quality": 86}
-PLAYER |= {"panes": [[1000, "frame=4"], [1000, "frame=0&spread=1&view=55,10,2.9,0.25,0,-0.05"], [390, "frame=0"]]}
+PLAYER: dict[str, Any] = {"gap": 20, "width": 1600, "patience": 1500, "quality": 86}
+SIZES: dict[str, Any] = {**PLAYER, "gap": 40, "width": 1200}
+PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1&view=55,10,2.9,0.25,0,-0.05"]]}
+PLAYER["panes"] += [[390, 660, "frame=0"]]
+SIZES |= {"panes": [[1440, 900, "frame=0"], [390, 844, "frame=0"], [360, 240, "frame=0"]]}
 """CSS pixels of the windows, and what each shows, as in the player's links; the picture's width; milliseconds for what
 glides."""
 FULL = "document.querySelector('facefolds-player').level === 'full'"
@@ -118,20 +122,18 @@ def page(subject: Path, out: Path) -> None:
     side_by_side(shots, PAGE["gap"], out, PAGE["quality"])
 
 
-def player(subject: Path, out: Path) -> None:
-    """The player's page on a desktop, with its layers pulled apart, and on a phone.
+def player(options: dict[str, Any], subject: Path, out: Path) -> None:
+    """The player's page in several windows side by side: `PLAYER`, `SIZES`.
 
     Raises:
         UserError: if there is no player, or no Chromium.
     """
     with serving(find_player(), {"asset": subject / "asset"}) as address, browser() as started:
         shots = [
-            screen(
-                started, f"{address}?src=asset/#level=full&{view}", (wide, PLAYER["height"]), PLAYER["patience"], FULL
-            )
-            for wide, view in PLAYER["panes"]
+            screen(started, f"{address}?src=asset/#level=full&{view}", size, options["patience"], FULL)
+            for *size, view in options["panes"]
         ]
-    side_by_side(shots, PLAYER["gap"], out, PLAYER["quality"], PLAYER["width"])
+    side_by_side(shots, options["gap"], out, options["quality"], options["width"])
 
 
 @contextmanager
@@ -170,7 +172,8 @@ PICTURES = {
     "actor.jpg": Picture("evaluation/contact_sheet.png", SHEET, sheet),
     "limits.jpg": Picture("asset/manifest.json", LIMITS, limits),
     "report.jpg": Picture("metrics.json", PAGE, page),
-    "player.jpg": Picture("asset/manifest.json", PLAYER, player),
+    "player.jpg": Picture("asset/manifest.json", PLAYER, partial(player, PLAYER)),
+    "sizes.jpg": Picture("asset/manifest.json", SIZES, partial(player, SIZES)),
 }
 
 

@@ -44,6 +44,8 @@ def command(
         Path | None, typer.Argument(help="A folder or file: say what it is, and how it would be used.")
     ] = None,
 ) -> None:
+    """Say which system libraries are missing, and mend what a killed DVC leaves. With a path: what capture lies there,
+    what of it would be used and what not, and the lines for params.yaml."""
     if path is not None:
         with report_user_errors("doctor"):
             _appraise(path)

@@ -77,6 +77,30 @@ def test_fine_texture_keeps_48_db() -> None:
     assert 10 * np.log10(255**2 / (error**2).mean()) > 48  # 48.7 seen
 
 
+@pytest.mark.parametrize("height", [2, 4, 12])
+def test_no_other_chroma_comes_back_nearer(height: int) -> None:
+    """Least squares: what is left over is at right angles to all that could be written."""
+    red = np.random.default_rng(0).integers(120, 136, (height, 10))
+    image = np.stack([red, np.full(red.shape, 128), np.full(red.shape, 128)], -1).astype(np.uint8)
+    luma = 0.2126 * red / 255 + 0.7874 * 128 / 255
+    wanted = (red / 255 - luma) / 1.5748 * 224
+    rows, columns = (interpolation(size) for size in wanted.shape)
+    best = np.linalg.pinv(rows) @ wanted @ np.linalg.pinv(columns).T
+    assert np.abs(rgb_to_yuv420(image)[2].astype(float) - 128 - best).max() <= 0.501
+
+
+def interpolation(size: int) -> np.ndarray:
+    """(size, size / 2): linear look-ups of centred samples, clamped."""
+    at = np.clip((np.arange(size) + 0.5) / 2 - 0.5, 0, size // 2 - 1)
+    return np.maximum(0, 1 - np.abs(at[:, None] - np.arange(size // 2)))
+
+
+def test_chroma_that_would_overshoot_stays_within_its_codes() -> None:
+    image = np.zeros((8, 8, 3), np.uint8)
+    image[:, 3:] = (255, 0, 0)
+    assert rgb_to_yuv420(image)[2].max() <= 240  # unbounded it would be 259
+
+
 def test_alpha_is_at_most_one_off_and_exact_at_the_ends() -> None:
     alpha = np.arange(256, dtype=np.uint8)[None]
     back = luma_to_alpha(alpha_to_luma(alpha))

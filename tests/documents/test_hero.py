@@ -22,6 +22,13 @@ def test_the_whole_take_is_25_frames_a_second() -> None:
     assert (capture.width, capture.height) == (500, 768)
 
 
+def test_what_fits_small_pictures_is_not_asked_of_the_whole_take() -> None:
+    """R^m and R^t: params.yaml's are of pictures of 192 x 128."""
+    params = hero.hero_params({})
+    sections = {**params, **params["subjects"]["hero"]}
+    assert [sections[name]["resolution"] for name in ("decimate", "texture")] == ["auto", "auto"]
+
+
 def test_a_project_of_its_own_that_keeps_what_it_made(tmp_path: Path) -> None:
     for frames in (100, 12):
         hero.write_project(tmp_path, hero.hero_params({"frames": frames}))
