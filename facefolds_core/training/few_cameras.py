@@ -45,5 +45,8 @@ def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[Expli
         texels = max(textures.pixels_per_texel, few.pixels_per_texel)
         stricter["textures"] = textures.model_copy(update={"pixels_per_texel": texels})
     stricter["volume"] = volume.model_copy(update=seen)
-    kind = "few_cameras" if plates else "few_cameras_no_plates"
-    return params.model_copy(update=stricter), (fact(kind, cameras=count, most=few.at_most),)
+    if plates:
+        note = fact("few_cameras", cameras=count, most=few.at_most)
+    else:
+        note = fact("few_cameras_no_plates", cameras=count, most=few.at_most)
+    return params.model_copy(update=stricter), (note,)
