@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from facefolds_core.params.base import Count, Length, Natural, Pixels, Section, Weight
 
 
 class FewCameraParams(Section):
     """Between few cameras hardly anything is determined: the starting volume becomes haze and lumps that show each
-    camera its own picture. Against that these values hold where they are the stricter ones, and only where each camera
-    has a clean plate: without, a price on opacity takes the subject for what stands behind it (`mugsy`)."""
+    camera its own picture. Against that these values hold where they are the stricter ones. Those of opacity and
+    geometry only where each camera has a clean plate: without, a price on opacity takes the subject for what stands
+    behind it (`mugsy`); that of texels only where one has none."""
 
     at_most: Natural = 10
     """Training cameras that are few; 0 is none ever."""
@@ -24,14 +25,18 @@ class FewCameraParams(Section):
     """Cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in cameras)."""
 
     opacity_weight: Weight = 0.003
-    """At least, of `volume.opacity_weight`: haze beside the subject costs more."""
+    """With plates: at least, of `volume.opacity_weight`: haze beside the subject costs more."""
 
     max_halfwidth: Length = 0.008
-    """At most, of `geometry.max_halfwidth`, units: such a volume is blurred everywhere, and layers as far apart as it
-    is thick each show another camera's picture."""
+    """With plates: at most, of `geometry.max_halfwidth`, units: such a volume is blurred everywhere, and layers as far
+    apart as it is thick each show another camera's picture."""
 
     blur: Pixels = 12.0
-    """At least, of `geometry.blur`, nodes: rounds of geometry make lumps of what single cameras want."""
+    """With plates: at least, of `geometry.blur`, nodes: rounds of geometry make lumps of what single cameras want."""
+
+    pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 2.5
+    """Without plates: at least, of `textures.pixels_per_texel`: finer texels show each camera its own picture. Of
+    turning heads `moving.pixels_per_texel` stays."""
 
     @model_validator(mode="after")
     def _shared_is_more(self) -> Self:

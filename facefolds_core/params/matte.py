@@ -18,14 +18,15 @@ class CutOutParams(Section):
     inside: Share = 0.9
     """Where the volume is more opaque, and `erode` farther in, a pixel is the subject's for sure."""
 
-    outside: Share = 0.1
-    """Where it is less opaque, and `dilate` farther out, a pixel is the room's for sure."""
+    outside: Share = 0.3
+    """Where it is less opaque, and `dilate` farther out, a pixel is the room's for sure. Of a cluttered room GrabCut
+    takes whole tiles that reach into the undecided band; of a dark one the volume keeps fog that is more opaque."""
 
-    erode: Natural = 4
-    """Pixels; the volume is blurred."""
+    erode: Share = 0.01
+    """Of the picture's longer side, 4 pixels of 384; the volume is blurred."""
 
-    dilate: Natural = 7
-    """Pixels; the volume may lack hair."""
+    dilate: Share = 0.006
+    """Of the picture's longer side, 2 pixels of 384; the volume may lack hair."""
 
     iterations: Count = 3
     """Of GrabCut."""
@@ -101,8 +102,9 @@ class VoteParams(Section):
     """and only what lies within this of the body can be the subject's, units: in the shadow that the head throws for
     all others, one picture's bookshelf would be undisputed."""
 
-    grow: Natural = 4
-    """A cut-out may reach this far beyond the silhouette of what the pictures agree on, pixels: hair."""
+    grow: Share = 0.01
+    """A cut-out may reach this far beyond the silhouette of what the pictures agree on, in shares of its longer side:
+    hair."""
 
     least: Share = 0.85
     """IoU of a cut-out with that silhouette, in shares of the median picture's, under which the picture is outvoted: it

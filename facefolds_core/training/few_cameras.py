@@ -5,39 +5,48 @@ from __future__ import annotations
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import ExplicitParams
+from facefolds_core.params.base import Section
 
 
 def for_scene(params: ExplicitParams, scene: Scene) -> tuple[ExplicitParams, tuple[Fact, ...]]:
     """The parameters of a training of the scene's cameras, and what is to be said of them; see `for_cameras`."""
     cameras, plates = scene.indices("train"), scene.open_plates()
     known = plates is not None and all((camera, 0) in plates for camera in cameras)
-    return for_cameras(params, len(cameras)) if known else (params, ())
+    return for_cameras(params, len(cameras), known)
 
 
-def for_cameras(params: ExplicitParams, count: int) -> tuple[ExplicitParams, tuple[Fact, ...]]:
-    """The parameters of a training of so many cameras with a clean plate each, and what is to be said of them.
+def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[ExplicitParams, tuple[Fact, ...]]:
+    """The parameters of a training of so many cameras, and what is to be said of them.
 
-    With more than `few_cameras.at_most` they are `params` themselves. Where it is not known what stands behind the
-    subject nobody may ask for this: a price on opacity takes the subject for the room. Applied twice they are as
-    applied once.
+    With more than `few_cameras.at_most` they are `params` themselves. Applied twice they are as applied once.
+
+    Args:
+        plates: whether each has a clean plate. Where it is not known what stands behind the subject a price on opacity
+            takes the subject for the room: then only single views are not believed, and texels are larger.
     """
     few = params.few_cameras
     if count > few.at_most or count <= few.views:
         return params, ()
-    volume, geometry = params.volume, params.geometry
-    stricter = {
-        "volume": volume.model_copy(
-            update={
-                "min_view_share": max(volume.min_view_share, few.views / count),
-                "shared_view_share": max(volume.shared_view_share, min(few.shared_views, count) / count),
-                "opacity_weight": max(volume.opacity_weight, few.opacity_weight),
-            }
-        ),
-        "geometry": geometry.model_copy(
+    volume, geometry, textures = params.volume, params.geometry, params.textures
+    seen = {
+        "min_view_share": max(volume.min_view_share, few.views / count),
+        "shared_view_share": max(volume.shared_view_share, min(few.shared_views, count) / count),
+    }
+    stricter: dict[str, Section] = {}
+    if plates:
+        seen |= {"opacity_weight": max(volume.opacity_weight, few.opacity_weight)}
+        stricter["geometry"] = geometry.model_copy(
             update={
                 "max_halfwidth": min(geometry.max_halfwidth, few.max_halfwidth),
                 "blur": max(geometry.blur, few.blur),
             }
-        ),
-    }
-    return params.model_copy(update=stricter), (fact("few_cameras", cameras=count, most=few.at_most),)
+        )
+    else:
+        texels = max(textures.pixels_per_texel, few.pixels_per_texel)
+        stricter["textures"] = textures.model_copy(update={"pixels_per_texel": texels})
+    stricter["volume"] = volume.model_copy(update=seen)
+    if plates:
+        note = fact("few_cameras", cameras=count, most=few.at_most)
+    else:
+        note = fact("few_cameras_no_plates", cameras=count, most=few.at_most)
+    return params.model_copy(update=stricter), (note,)

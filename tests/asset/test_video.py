@@ -160,6 +160,14 @@ def test_level_and_codec_string_of_vp9() -> None:
     assert CODECS["vp9"].level_and_mime(Stream(b"", (256, 128), Fraction(30), 1e5))[0] == "1.1"
 
 
+def test_the_slowest_preset_asks_no_more_of_decoders(tmp_path: Path) -> None:
+    size, path = (1088, 1632), tmp_path / "v.mp4"
+    black = np.zeros((size[1] * 3 // 2, size[0]), np.uint8)
+    options = CODECS["h264"].options(VideoCodec(preset="veryslow"), 40)
+    encode_video(path, [black], size, Fraction(30), CODECS["h264"], options)
+    assert probe_video(path).level == "4.2"  # with that preset's own 16 reference pictures 5.1
+
+
 def test_header_comes_first(video: Path) -> None:
     data = video.read_bytes()
     assert data.index(b"moov") < data.index(b"mdat")

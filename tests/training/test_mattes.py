@@ -44,11 +44,22 @@ def test_a_cut_out_has_the_pictures_outline_not_the_volumes() -> None:
     rng, (y, x) = np.random.default_rng(0), np.mgrid[:64, :64]
     disc = np.hypot(x - 32, y - 32) < 18
     image = np.where(disc[..., None], (200, 150, 120), (40, 60, 90)) + rng.integers(-8, 9, (64, 64, 3))
-    rough = np.clip(1.2 - np.hypot(x - 34, y - 32) / 20, 0, 1).astype(np.float32)  # blurred, off, too small
+    rough = np.clip(1.2 - np.hypot(x - 34, y - 32) / 24, 0, 1).astype(np.float32)  # blurred, off, of another size
     found = cut_out(image.astype(np.uint8), rough, CutOutParams()) > 0
     assert (found & disc).sum() / (found | disc).sum() > 0.98
     coarse = rough > 0.5
-    assert (coarse & disc).sum() / (coarse | disc).sum() < 0.7
+    assert (coarse & disc).sum() / (coarse | disc).sum() < 0.85
+
+
+@pytest.mark.parametrize("size", [96, 384])
+def test_of_a_lamp_of_the_subjects_colour_only_what_is_near_the_volume_is_cut_out(size: int) -> None:
+    rng, (y, x) = np.random.default_rng(1), np.mgrid[:size, :size] / size * 96
+    away = np.hypot(x - 48, y - 48)
+    shown = (away < 30) | ((abs(y - 48) < 4) & (x > 48))
+    image = np.where(shown[..., None], (110, 75, 55), (60, 90, 140)) + rng.integers(-8, 9, (size, size, 1))
+    volume = np.clip(0.5 + (30 - away) / 4, 0, 1).astype(np.float32)
+    found = cut_out(image.astype(np.uint8), volume, CutOutParams()) > 0
+    assert found[away < 28].all() and not found[away > 33].any()
 
 
 def test_a_picture_that_is_all_subject_or_all_room_is_left_alone() -> None:

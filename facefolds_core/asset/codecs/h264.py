@@ -23,6 +23,10 @@ X264_FIXED = {
 def _options(params: VideoSettings, crf: int) -> dict[str, str]:
     interval = params.keyframe_interval
     fixed = {"keyint": interval, "min-keyint": interval, **X264_FIXED}
+    if params.preset in ("slower", "veryslow"):
+        # 5 reference pictures, as `slow` has: with their 8 and 16 the stream asks for a higher level, and of decoders
+        # for more memory. Textures stand still, so that they hardly gain by them.
+        fixed["ref"] = 5
     quality = {"qp": "0"} if params.lossless else {"crf": str(crf)}
     return {**quality, "preset": params.preset, "x264-params": joined(**fixed)}
 

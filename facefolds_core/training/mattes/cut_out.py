@@ -35,8 +35,8 @@ def cut_out(image: Image, opacity: Array, params: CutOutParams) -> Image:
         opacity: (H, W) of the volume; where it is high or low, and far from where it is neither, it is believed.
     """
     labels = np.where(opacity > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    core = cv2.erode((opacity > params.inside).astype(np.uint8), _disc(params.erode))
-    near = cv2.dilate((opacity > params.outside).astype(np.uint8), _disc(params.dilate))
+    core = cv2.erode((opacity > params.inside).astype(np.uint8), _disc(pixels(params.erode, opacity)))
+    near = cv2.dilate((opacity > params.outside).astype(np.uint8), _disc(pixels(params.dilate, opacity)))
     labels[core > 0], labels[near == 0] = cv2.GC_FGD, cv2.GC_BGD
     subject = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     if not subject.all() and subject.any():
@@ -46,6 +46,11 @@ def cut_out(image: Image, opacity: Array, params: CutOutParams) -> Image:
         cv2.grabCut(picture, labels, (0, 0, 1, 1), models[0], models[1], params.iterations, cv2.GC_INIT_WITH_MASK)
         subject = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     return np.asarray(subject, np.uint8)
+
+
+def pixels(share: float, picture: Array | Image) -> int:
+    """A share of a picture's longer side, (H, W): what is blurred is as blurred on a small picture."""
+    return round(share * float(max(picture.shape)))
 
 
 def _disc(radius: int) -> Image:

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VoteParams
-from facefolds_core.training.mattes.cut_out import grown, opacity_in
+from facefolds_core.training.mattes.cut_out import grown, opacity_in, pixels
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.fit import Volume
 from facefolds_core.training.volume.subject import positions
@@ -54,5 +54,5 @@ def outvoted(
         silhouette = (opacity_in(hull, camera) > 0.5).astype(np.uint8)
         union = int((silhouette | picture).sum())
         agreement[number] = int((silhouette & picture).sum()) / union if union else 1.0
-        mended.append(picture & grown(silhouette, params.grow))
+        mended.append(picture & grown(silhouette, pixels(params.grow, picture)))
     return mended, agreement
