@@ -112,7 +112,8 @@ def gather(
     Raises:
         UserError: if no camera has both calibration and pictures, calibrations cannot be, or sizes do not fit.
     """
-    used, facts = cameras_with_pictures(calibrations, photos, root)
+    used, bare, strange = cameras_with_pictures(calibrations, photos, root)
+    facts = [fact("no_images", camera=name) for name in bare] + [fact("uncalibrated", camera=name) for name in strange]
     sizes = {}
     for one in used:
         frame, picture = next(iter(photos[one.name].items()))

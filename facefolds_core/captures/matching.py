@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from facefolds_core.errors import UserError
-from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.facts import shorten
 
 
 class Named(Protocol):
@@ -53,24 +53,18 @@ def chosen_segment(names: Collection[str], wanted: str | None, place: Path, miss
 
 
 def cameras_with_pictures(
-    calibrations: Sequence[N],
-    photos: Mapping[str, Mapping[str, Any]],
-    root: Path,
-    facts: tuple[str, str] = ("no_images", "uncalibrated"),
-) -> tuple[list[N], list[Fact]]:
-    """Cameras with both calibration and pictures, and facts on the others.
+    calibrations: Sequence[N], photos: Mapping[str, Mapping[str, Any]], root: Path
+) -> tuple[list[N], list[str], list[str]]:
+    """Cameras with both calibration and pictures; names of those without pictures; of those without a calibration.
 
     Args:
         photos: camera -> frame -> picture.
-        facts: kinds of fact of a camera without pictures, and of pictures without a calibration.
 
     Raises:
         UserError: if there is no such camera.
     """
     known = {one.name for one in calibrations}
     used = [one for one in calibrations if photos.get(one.name)]
-    found = [fact(facts[0], camera=one.name) for one in calibrations if not photos.get(one.name)]
-    found += [fact(facts[1], camera=name) for name in photos if name not in known and photos[name]]
     if not used:
         raise UserError(
             "no camera has both pictures and a calibration",
@@ -79,4 +73,5 @@ def cameras_with_pictures(
             found=shorten(list(photos), 5) or "none",
             remedy="copy calibration and pictures of the same subject",
         )
-    return used, found
+    bare = [one.name for one in calibrations if not photos.get(one.name)]
+    return used, bare, [name for name in photos if name not in known and photos[name]]

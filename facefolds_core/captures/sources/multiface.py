@@ -65,8 +65,9 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
     calibration = read_krt(root / "KRT")
     segment = _segment(root, subject.segment)
     photos = _photos(root / "images" / segment)
-    kinds = ("camera_without_images", "camera_without_calibration")
-    used, left_out = cameras_with_pictures(calibration, photos, root, kinds)
+    used, bare, strange = cameras_with_pictures(calibration, photos, root)
+    left_out = [fact("camera_without_images", camera=name) for name in bare]
+    left_out += [fact("camera_without_calibration", camera=name) for name in strange]
     names = sorted({frame for camera in used for frame in photos[camera.name]})
     listed = _listed(root / "frame_list.txt", segment)
     left_out += [fact("frame_without_images", frame=name) for name in listed if name not in names]
