@@ -82,7 +82,7 @@ WORDS = {
     "few_cameras": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of them "
     "sees is empty, layers lie closer and move more smoothly",
     "few_cameras_no_plates": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of "
-    "them sees is empty, texels are larger; clean plates would help",
+    "them sees is empty, texels of a still head are large; clean plates would help",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "

@@ -79,9 +79,10 @@ def _join_models(graph: grimp.ImportGraph, root: Path) -> None:
 
 
 def digest_of_packages(*names: str) -> str:
-    """Of what all modules of the core's packages `names` do: results of other code are not taken over."""
+    """Of what the core's packages and modules `names` do: results of other code are not taken over."""
     here = Path(__file__).parent
-    files = sorted(path for name in names for path in (here / name).rglob("*.py"))
+    alone = [here / f"{name}.py" for name in names if (here / f"{name}.py").is_file()]
+    files = sorted([*alone, *(path for name in names for path in (here / name).rglob("*.py"))])
     return hashlib.sha256("".join(map(digest_of_file, files)).encode()).hexdigest()[:16]
 
 

@@ -132,7 +132,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
 @contextmanager
 def kept_parts(kept: Path | None, scratch: Path, params: CompressParams) -> Iterator[Parts]:
     """Encoded parts in `kept`, of which those that this run needs stay; or in a folder of `scratch` that goes."""
-    common = digest_of_packages("asset", "packaging", "export").encode()
+    common = digest_of_packages("asset", "packaging", "export", "spacing").encode()
     with TemporaryDirectory(dir=scratch, prefix=".parts-") if kept is None else nullcontext(kept) as folder:
         stream = params.stream
         parts = Parts(Path(folder), common, stream.megabytes << 20, stream.encoders)

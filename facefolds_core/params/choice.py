@@ -18,7 +18,7 @@ class ChoiceParams(Section):
     """The least candidate is taken whose PSNR against the photos lies at most this far below the best one's, dB,"""
 
     fidelity: Decibels = 42.5
-    """and whose pictures have this PSNR to those of the finest one, dB: as much as the codec leaves
+    """and whose pictures have this PSNR to those of the finest one, dB: about as much as the codec leaves
     (`compress.video.target_psnr`). Where the model itself is far from the photos, these alone would let detail go."""
 
     cameras: Count = 4

@@ -22,10 +22,10 @@ class CutOutParams(Section):
     """Where it is less opaque, and `dilate` farther out, a pixel is the room's for sure. Of a cluttered room GrabCut
     takes whole tiles that reach into the undecided band; of a dark one the volume keeps fog that is more opaque."""
 
-    erode: Share = 0.01
+    erode: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     """Of the picture's longer side, 4 pixels of 384; the volume is blurred."""
 
-    dilate: Share = 0.006
+    dilate: Annotated[float, Field(ge=0, lt=0.5)] = 0.006
     """Of the picture's longer side, 2 pixels of 384; the volume may lack hair."""
 
     iterations: Count = 3
@@ -102,7 +102,7 @@ class VoteParams(Section):
     """and only what lies within this of the body can be the subject's, units: in the shadow that the head throws for
     all others, one picture's bookshelf would be undisputed."""
 
-    grow: Share = 0.01
+    grow: Annotated[float, Field(ge=0, lt=0.5)] = 0.01
     """A cut-out may reach this far beyond the silhouette of what the pictures agree on, in shares of its longer side:
     hair."""
 

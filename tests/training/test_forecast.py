@@ -52,6 +52,12 @@ def test_a_head_that_turns_has_finer_texels(scene: Scene) -> None:
     assert forecast(turning, params()).seconds / forecast(still, params()).seconds > 0.8 * finer**2
 
 
+def test_few_cameras_without_plates_have_larger_texels(scene: Scene) -> None:
+    many = take(scene, 960, 600)
+    few = replace(many, splits=("train",) * 8 + ("out",) * 16)
+    assert forecast(few, params()).disk < 0.5 * forecast(many, params()).disk
+
+
 def test_what_cannot_fit_is_refused_with_numbers(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="memory") as caught:
         check_forecast(Forecast(3, 10**15, 0, 1.0), params(), None)

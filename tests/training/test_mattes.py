@@ -162,6 +162,24 @@ def test_a_thin_subject_before_a_plate_is_opaque_inside() -> None:
     assert found[14:50, 31:34].min() > 0.9 and found[:, :26].max() < 0.1
 
 
+def test_a_hand_of_another_colour_beside_a_body_is_opaque() -> None:
+    """Its inside is its own: judged by the body's colours alone it would be half transparent."""
+    image, plate = np.full((96, 96, 3), 235.0), np.full((96, 96, 3), 235.0)
+    image[10:90, 8:60] = (50, 40, 35)
+    image[30:80, 74:88] = (200, 150, 120)
+    rng = np.random.default_rng(0)
+    noisy = [(one + rng.normal(0, 2, one.shape)).clip(0, 255).astype(np.uint8) for one in (image, plate)]
+    assert from_plate(noisy[0], noisy[1], PlateParams())[34:76, 76:86].min() > 0.9
+
+
+def test_what_the_picture_cuts_off_is_opaque_up_to_its_border() -> None:
+    image, plate = _before_a_plate(np.ones((64, 64)))
+    image[:, :20], image[:, 44:], image[:20] = plate[:, :20], plate[:, 44:], plate[:20]
+    image[40::4], image[41::4] = (230, 230, 230), (30, 30, 60)
+    image[40:, :20], image[40:, 44:] = plate[40:, :20], plate[40:, 44:]
+    assert from_plate(image, plate, PlateParams())[48:, 26:38].min() > 0.95
+
+
 def test_shadows_and_holes_beside_a_plate_are_none() -> None:
     """A hole where the subject has the room's colour; a small thing that moved in the room."""
     y, x = np.mgrid[:64, :64]

@@ -13,7 +13,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import MovingParams
-from facefolds_core.training.explicit.views import MovingRays, trace_views
+from facefolds_core.training.explicit.views import MovingRays, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
 from tests.scenes import CENTRE, make_scene
@@ -109,3 +109,8 @@ def test_perceptrons_rays_come_from_the_cameras_of_their_frame(scene: Scene) -> 
         (x, y), _ = camera.project((o + d).numpy().astype(float))
         assert x % 1 == pytest.approx(0.5, abs=2e-3) and y % 1 == pytest.approx(0.5, abs=2e-3)
         assert rgb.numpy() * 255 == pytest.approx(store.image(c, int(t))[int(y), int(x)], abs=0.01)
+
+
+@pytest.mark.parametrize("stride", range(1, 10))
+def test_cameras_begin_at_different_pixels(stride: int) -> None:
+    assert {first_pixel(camera, stride) for camera in range(stride)} == set(range(stride))

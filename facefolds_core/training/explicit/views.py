@@ -53,8 +53,7 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool
     belt = manifolds.chart.numbers
     for position, index in enumerate(scene.indices("train")):
         origins, directions = scene.cameras[index].rays()
-        first = position * 7 % stride
-        chosen = np.arange(first, scene.height * scene.width, stride)
+        chosen = np.arange(first_pixel(position, stride), scene.height * scene.width, stride)
         offsets = np.ascontiguousarray(origins.reshape(-1, 3)[chosen] - centre)
         directions = np.ascontiguousarray(directions.reshape(-1, 3)[chosen])
         distance = trace(offsets, directions)
@@ -182,7 +181,9 @@ class MovingRays:
     def _traced(self, frame: int, phase: int, parts: int) -> Views:
         """Every `parts`-th of the pixels that there are, from number `phase` on."""
         size, stride = self._scene.height * self._scene.width, self._stride
-        chosen = [np.arange(c * 7 % stride + stride * phase, size, stride * parts) for c in range(len(self._cameras))]
+        chosen = [
+            np.arange(first_pixel(c, stride) + stride * phase, size, stride * parts) for c in range(len(self._cameras))
+        ]
         rays = [self._rays(camera, frame, pixels) for camera, pixels in zip(self._cameras, chosen, strict=True)]
         offsets, directions = (np.concatenate(arrays) for arrays in zip(*rays, strict=True))
         distance = self._trace(offsets, directions)
@@ -198,6 +199,11 @@ class MovingRays:
         places = np.stack([pixels % seen.width + 0.5, pixels // seen.width + 0.5], -1)
         origins, directions = seen.rays(places)
         return origins - self._centre, directions
+
+
+def first_pixel(camera: int, stride: int) -> int:
+    """Where every `stride`-th pixel of a camera begins: another one in each of up to `stride` cameras."""
+    return camera * (7 if stride % 7 else 5) % stride
 
 
 def rays_of(

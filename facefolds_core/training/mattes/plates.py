@@ -14,6 +14,9 @@ from facefolds_core.training.mattes.known_background import opacity_before
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
+CLOSED = 2
+"""Pixels: gaps of twice that are closed."""
+
 
 def from_plate(image: Image, plate: Image, params: PlateParams) -> Array:
     """(H, W) opacity of the subject in [0, 1].
@@ -29,7 +32,9 @@ def _different(image: Image, plate: Image, params: PlateParams) -> Image:
     """(H, W) 1 where picture and plate differ, without holes and small things."""
     one, two = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.blur) / 255 for part in (image, plate))
     difference = np.abs(one - two).max(-1)
-    found = ndimage.binary_closing(difference > params.different, iterations=2)
+    # Beyond the picture's border what is cut off goes on: else closing would gnaw at it.
+    found = ndimage.binary_closing(np.pad(difference > params.different, CLOSED, mode="edge"), iterations=CLOSED)
+    found = found[CLOSED:-CLOSED, CLOSED:-CLOSED]
     labels, count = ndimage.label(ndimage.binary_fill_holes(found))
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     kept = sizes >= params.least * sizes[1:].max(initial=0)
@@ -40,7 +45,9 @@ def _different(image: Image, plate: Image, params: PlateParams) -> Image:
 def _soft(image: Image, plate: Image, subject: Image, params: PlateParams) -> Array:
     """Opacity along the outline, where the plate is what stands behind; 1 within it."""
     depth = np.asarray(ndimage.distance_transform_edt(np.pad(subject, 1, mode="edge")))[1:-1, 1:-1]
-    inside = depth > min(params.outline, 0.5 * depth.max())
+    labels, count = ndimage.label(subject)
+    deepest = np.asarray(ndimage.maximum(depth, labels, np.arange(count + 1)))  # of a hand, not of the body beside it
+    inside = depth > np.minimum(params.outline, 0.5 * deepest[labels])
     difference = np.abs(image.astype(np.float32) - plate).max(-1) / 255
     quiet = difference[grown(subject, params.quiet) == 0]
     noise = float(np.median(quiet)) if quiet.size else 0.0

@@ -13,6 +13,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import pixels_of_texel
 from facefolds_core.training.explicit.state import model_bytes
+from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.patience import check_space
 
 
@@ -44,7 +45,7 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
         left: frames that are still to be fitted to a base that is there; None where there is none.
     """
     segments = params.segments
-    finer = (params.textures.pixels_per_texel / pixels_of_texel(scene, params)) ** 2
+    finer = (params.textures.pixels_per_texel / pixels_of_texel(scene, for_scene(params, scene)[0])) ** 2
     texels = round(segments.texels_per_pixel * finer * scene.width * scene.height)
     most = int(segments.memory_megabytes * 1e6 / (segments.texel_bytes * texels))
     frames = scene.num_frames
