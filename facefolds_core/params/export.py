@@ -152,7 +152,7 @@ class BakeParams(Section):
     iterations: Natural = 2
     """Passes over the training cameras' rays, in each frame; 0 leaves the textures as `texture` made them."""
 
-    hold: Weight = 0.005
+    hold: Weight = 0.008
     """How dear a change of a texel from one frame to the next is, against the error that keeping still makes in
     training views (export/hold.py); larger values make smaller videos. 0 lets all texels tremble."""
 

@@ -22,7 +22,8 @@ class FewCameraParams(Section):
     """Cameras that must see a voxel (`volume.min_view_share`, in cameras): of eight, a tenth is less than one."""
 
     shared_views: Count = 5
-    """Cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in cameras)."""
+    """With plates: cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in
+    cameras). Without, one more than `views`: thinner fog in a room that is not known became no subject at all."""
 
     opacity_weight: Weight = 0.003
     """With plates: at least, of `volume.opacity_weight`: haze beside the subject costs more."""

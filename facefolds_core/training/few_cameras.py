@@ -30,11 +30,12 @@ def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[Expli
     volume, geometry, textures = params.volume, params.geometry, params.textures
     seen = {
         "min_view_share": max(volume.min_view_share, few.views / count),
-        "shared_view_share": max(volume.shared_view_share, min(few.shared_views, count) / count),
+        "shared_view_share": max(volume.shared_view_share, min(few.views + 1, count) / count),
     }
     stricter: dict[str, Section] = {}
     if plates:
-        seen |= {"opacity_weight": max(volume.opacity_weight, few.opacity_weight)}
+        seen["shared_view_share"] = max(volume.shared_view_share, min(few.shared_views, count) / count)
+        seen["opacity_weight"] = max(volume.opacity_weight, few.opacity_weight)
         stricter["geometry"] = geometry.model_copy(
             update={
                 "max_halfwidth": min(geometry.max_halfwidth, few.max_halfwidth),

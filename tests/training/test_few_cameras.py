@@ -60,3 +60,9 @@ def test_plates_are_there_when_each_training_camera_has_one(tmp_path: Path) -> N
     assert for_scene(PARAMS, scene) == without
     write_frames(scene.folder / "plates.arrow", plate.shape, [(camera, 0, plate) for camera in train])
     assert for_scene(PARAMS, scene) == with_plates
+
+
+@pytest.mark.parametrize(("plates", "shares"), [(True, [1, 5 / 6, 0.625, 0.5]), (False, [1, 0.5, 0.375, 0.35])])
+def test_fog_is_thinned_more_where_the_room_is_known(plates: bool, shares: list[float]) -> None:
+    found = [for_cameras(PARAMS, cameras, plates)[0].volume.shared_view_share for cameras in (3, 6, 8, 10)]
+    assert found == pytest.approx(shares)
