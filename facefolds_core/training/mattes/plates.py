@@ -14,9 +14,6 @@ from facefolds_core.training.mattes.known_background import opacity_before
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
-CLOSED = 2
-"""Pixels: gaps of twice that are closed."""
-
 
 def from_plate(image: Image, plate: Image, params: PlateParams) -> Array:
     """(H, W) opacity of the subject in [0, 1].
@@ -33,8 +30,7 @@ def _different(image: Image, plate: Image, params: PlateParams) -> Image:
     one, two = (cv2.GaussianBlur(part.astype(np.float32), (0, 0), params.blur) / 255 for part in (image, plate))
     difference = np.abs(one - two).max(-1)
     # Beyond the picture's border what is cut off goes on: else closing would gnaw at it.
-    found = ndimage.binary_closing(np.pad(difference > params.different, CLOSED, mode="edge"), iterations=CLOSED)
-    found = found[CLOSED:-CLOSED, CLOSED:-CLOSED]
+    found = ndimage.binary_closing(np.pad(difference > params.different, 2, mode="edge"), iterations=2)[2:-2, 2:-2]
     labels, count = ndimage.label(ndimage.binary_fill_holes(found))
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
     kept = sizes >= params.least * sizes[1:].max(initial=0)
