@@ -28,13 +28,13 @@ def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[Expli
     if count > few.at_most or count <= few.views:
         return params, ()
     volume, geometry, textures = params.volume, params.geometry, params.textures
+    shared = min(few.shared_views, count) if plates else few.views + 1
     seen = {
         "min_view_share": max(volume.min_view_share, few.views / count),
-        "shared_view_share": max(volume.shared_view_share, min(few.views + 1, count) / count),
+        "shared_view_share": max(volume.shared_view_share, shared / count),
     }
     stricter: dict[str, Section] = {}
     if plates:
-        seen["shared_view_share"] = max(volume.shared_view_share, min(few.shared_views, count) / count)
         seen["opacity_weight"] = max(volume.opacity_weight, few.opacity_weight)
         stricter["geometry"] = geometry.model_copy(
             update={
