@@ -102,7 +102,7 @@ def export_asset(
         stores = (sampled / steps.TEXTURES, resampled / steps.TEXTURES)
         wanted = sorted({level.mesh_resolution for level in params.compress.levels})
         meshes = steps.decimate_all(surfaces, grids, scene, stores[0], params.decimate, wanted)
-        resample_store(*stores, steps.texels_for(scene, meshes.meshes, stores[0], params.texture)[0])
+        resample_store(*stores, steps.texels_for(scene, meshes.meshes, grids, stores[0], params.texture)[0])
         views = scene.views_of("train", params.bake.moving_views)
         steps.bake(views, grids, meshes.meshes, *stores, params.bake, baked)
         made = Export.of(grids, meshes.meshes, baked / steps.TEXTURES, meshes.coarser)

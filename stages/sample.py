@@ -54,7 +54,7 @@ def sample(folders: SubjectFolders) -> str:
         write_grids(temporary / "grids.npz", grids)
     u0, u1, v0, v1 = grids.windows[0]
     return (
-        f"{grids.num_layers} layers of {params.resolution} x {params.resolution} samples ({grids.valid.mean():.1%} "
+        f"{grids.num_layers} layers of {grids.resolution} x {grids.resolution} samples ({grids.valid.mean():.1%} "
         f"valid) over u {u0:.2f}..{u1:.2f}, v {v0:.2f}..{v1:.2f}, {model.num_frames} texture frames, "
         f"in {folders.samples}"
     )

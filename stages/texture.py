@@ -7,7 +7,7 @@ import typer
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage
 from facefolds_core.export.steps import TEXTURES, texels_for
-from facefolds_core.export.stores import read_meshes
+from facefolds_core.export.stores import read_grids, read_meshes
 from facefolds_core.export.textures import resample_store
 from facefolds_core.files import atomic_folder
 from facefolds_core.params import TextureParams
@@ -17,7 +17,8 @@ from stages.common import run_stage, write_choice
 
 def texture(folders: SubjectFolders) -> str:
     params, samples = read_stage(TextureParams, folders.config), folders.samples / TEXTURES
-    size, chosen = texels_for(read_scene(folders.scene), read_meshes(folders.meshes / "meshes.npz"), samples, params)
+    meshes, grids = read_meshes(folders.meshes / "meshes.npz"), read_grids(folders.samples / "grids.npz")
+    size, chosen = texels_for(read_scene(folders.scene), meshes, grids, samples, params)
     with atomic_folder(folders.resampled) as temporary:
         kept = folders.checkpoints / "resampled"
         source = resample_store(samples, temporary / TEXTURES, size, kept)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.export.stores import Grids
 from facefolds_core.export.textures import resample
 from facefolds_core.facts import Fact, fact
 from facefolds_core.frame_store import FrameStore
@@ -18,6 +19,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import ChoiceParams, MeshChoiceParams, TextureChoiceParams
 from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.spacing import spread
 
 Texture = NDArray[np.uint8]
@@ -48,6 +50,26 @@ def looks_of(scene: Scene, params: ChoiceParams) -> tuple[Split, list[Look]]:
         for k in spread(seen, params.frames, ends=False):
             looks.append(Look(scene.camera_in_head(camera, k), k, store.image(camera, k) / 255.0))
     return split, looks
+
+
+def _photo(
+    scene: Scene, look: Look, hits: Hits, pixels: NDArray[np.intp], images: Sequence[Texture], grids: Grids
+) -> Any:
+    """(M, 3): the photo at pixels without what the reflection adds there, which textures do not show.
+
+    Args:
+        hits: of the look's camera.
+        images: textures of its frame.
+    """
+    photo = look.photo.reshape(-1, 3)[pixels]
+    if grids.reflection is None:
+        return photo
+    to_room = None if scene.poses is None else scene.poses.at(look.frame).rotation
+    windows = [grids.window(i) for i in range(grids.num_layers)]
+    added = reflected_colours(hits, look.camera, windows, grids.reflection, to_room)
+    shine = composite(hits, images, added=added)[0] - composite(hits, images)[0]
+    matte: NDArray[np.float64] = photo - shine.reshape(-1, 3)[pixels]
+    return matte
 
 
 Picture = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -98,18 +120,26 @@ def _least(
 
 
 def choose_meshes(
-    scene: Scene, ladder: Mapping[int, Sequence[TexturedMesh]], textures: FrameStore, params: MeshChoiceParams
+    scene: Scene,
+    ladder: Mapping[int, Sequence[TexturedMesh]],
+    grids: Grids,
+    textures: FrameStore,
+    params: MeshChoiceParams,
 ) -> tuple[int, Fact]:
     """R^m: the least of `params.candidates` that is good enough, and why.
 
     Args:
         ladder: of each candidate the meshes of all layers.
-        textures: as they were sampled.
+        grids, textures: as they were sampled.
     """
     split, looks = looks_of(scene, params)
     rng, finest = np.random.default_rng(0), ladder[max(params.candidates)]
-    pixels = [cast_layers(look.camera, finest).choose(rng, params.rays) for look in looks]
     images = {look.frame: _images(textures, look.frame) for look in looks}
+    pixels, photos = list[NDArray[np.intp]](), list[NDArray[np.float64]]()
+    for look in looks:
+        hits = cast_layers(look.camera, finest)
+        pixels.append(hits.choose(rng, params.rays))
+        photos.append(_photo(scene, look, hits, pixels[-1], images[look.frame], grids))
 
     def pictures(candidate: int) -> list[Picture]:
         return [
@@ -117,29 +147,28 @@ def choose_meshes(
             for look, at in zip(looks, pixels, strict=True)
         ]
 
-    photos = [look.photo.reshape(-1, 3)[at] for look, at in zip(looks, pixels, strict=True)]
     chosen, found = _least("decimate.resolution", params.candidates, pictures, photos, params)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
 
 
 def choose_texels(
-    scene: Scene, meshes: Sequence[TexturedMesh], textures: FrameStore, params: TextureChoiceParams
+    scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore, params: TextureChoiceParams
 ) -> tuple[int, Fact]:
     """R^t: the least of `params.candidates` that is good enough, and why; none is finer than the samples.
 
     Args:
         meshes: of all layers.
-        textures: as they were sampled.
+        grids, textures: as they were sampled.
     """
     candidates = sorted({c for c in params.candidates if c < textures.height} | {textures.height})
     split, looks = looks_of(scene, params)
     rng, near, photos = np.random.default_rng(0), list[Hits](), list[NDArray[np.float64]]()
+    images = {look.frame: _images(textures, look.frame) for look in looks}
     for look in looks:
         hits = cast_layers(look.camera, meshes)
         pixels = hits.choose(rng, params.rays)
         near.append(hits.at(pixels))
-        photos.append(look.photo.reshape(-1, 3)[pixels])
-    images = {look.frame: _images(textures, look.frame) for look in looks}
+        photos.append(_photo(scene, look, hits, pixels, images[look.frame], grids))
 
     def pictures(candidate: int) -> list[Picture]:
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}

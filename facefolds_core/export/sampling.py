@@ -5,6 +5,7 @@ Only the model's own interface is used (`protocol.LayeredModel`), so that any mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
@@ -28,6 +29,16 @@ DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
 
 Array = NDArray[np.float64]
+
+
+def samples_for(model: LayeredModel, window: Window, least: int) -> int:
+    """R of `sample.resolution: auto`: no texel of the model over the window is lost."""
+    grid = model.texel_grid()
+    if grid is None:
+        return least
+    own, (rows, columns) = grid.window, grid.shape
+    height, width = (window[1] - window[0]) / (own[1] - own[0]), (window[3] - window[2]) / (own[3] - own[2])
+    return max(least, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6))
 
 
 def sample_grids(model: LayeredModel, resolution: int, window: Window, progress: bool = True) -> Grids:

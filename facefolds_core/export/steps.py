@@ -69,12 +69,13 @@ def sample_model(
         kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
         keys: the key frames of a take in segments, for `params.opacity`; None where all frames were trained at once.
     """
-    from facefolds_core.export.sampling import sample_grids, write_textures
+    from facefolds_core.export.sampling import sample_grids, samples_for, write_textures
     from facefolds_core.export.window import visible_window
 
     among = keys if params.opacity == "key_frames" else None
     window = visible_window(model, cameras, params.auto_window, among) if params.window == "auto" else model.window
-    grids = sample_grids(model, params.resolution, window)
+    r = samples_for(model, window, params.least) if params.resolution == "auto" else params.resolution
+    grids = sample_grids(model, r, window)
     opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
 
@@ -115,16 +116,18 @@ def decimate_all(
     given = params.resolution
     tried = params.auto.candidates if given == "auto" else (given,)
     ladder = decimate(surfaces, grids, params, sorted({*tried, *levels}))
-    chosen, why = choose_meshes(scene, ladder, FrameStore(samples), params.auto) if given == "auto" else (given, None)
+    chosen, why = (
+        (given, None) if given != "auto" else choose_meshes(scene, ladder, grids, FrameStore(samples), params.auto)
+    )
     return Decimated(ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why)
 
 
 def texels_for(
-    scene: Scene, meshes: Sequence[TexturedMesh], samples: Path, params: TextureParams
+    scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, samples: Path, params: TextureParams
 ) -> tuple[int, Fact | None]:
     """R^t, and how it was chosen; None where it was given. `samples`: see `decimate_all`."""
     if params.resolution == "auto":
-        return choose_texels(scene, meshes, FrameStore(samples), params.auto)
+        return choose_texels(scene, meshes, grids, FrameStore(samples), params.auto)
     return params.resolution, None
 
 

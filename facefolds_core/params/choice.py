@@ -55,4 +55,4 @@ class TextureChoiceParams(ChoiceParams):
         *(128, 192, 256),
         *(384, 512),
     )
-    """R^t that are tried, as far as `sample.resolution` has as many."""
+    """R^t that are tried, below that of the samples, which is tried, too."""

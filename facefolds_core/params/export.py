@@ -34,8 +34,13 @@ class AutoWindowParams(Section):
 class SampleParams(Section):
     """Each layer's surface at the nodes of a grid of directions."""
 
-    resolution: TextureSide = 512
-    """R; each layer is sampled at R x R directions over the window."""
+    resolution: Literal["auto"] | TextureSide = "auto"
+    """R; each layer is sampled at R x R directions over the window. "auto": the least multiple of 64 with at least as
+    many rows and columns as the model's own texels have there, and `least`."""
+
+    least: TextureSide = 512
+    """R that `auto` takes at least: textures of 256 x 256 that were fitted to 512 x 512 samples take fewer bytes than
+    those that were fitted to 256 x 256."""
 
     window: Literal["full", "auto"] = "auto"
     """"full" is all that the model has (the paper: the whole hemisphere); "auto" is the part of it outside which no

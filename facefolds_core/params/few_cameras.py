@@ -36,8 +36,7 @@ class FewCameraParams(Section):
     """With plates: at least, of `geometry.blur`, nodes: rounds of geometry make lumps of what single cameras want."""
 
     pixels_per_texel: Annotated[float, Field(ge=0.1, le=1000)] = 2.5
-    """Without plates: at least, of `textures.pixels_per_texel`: finer texels show each camera its own picture. Of
-    turning heads `moving.pixels_per_texel` stays."""
+    """Without plates: at least, of `textures.pixels_per_texel`: finer texels show each camera its own picture."""
 
     @model_validator(mode="after")
     def _shared_is_more(self) -> Self:

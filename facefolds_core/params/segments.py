@@ -16,7 +16,7 @@ class SegmentParams(Section):
     """Takes of at most so many frames are trained at once, where `memory_megabytes` are enough for it; longer ones in
     segments. 0 trains every take in segments."""
 
-    memory_megabytes: Count = 6144
+    memory_megabytes: Count = 8192
     """For the textures of a training at once, all its frames together; the rays of 24 cameras of 768 x 512 need 400
     more, Python and its libraries 500. It decides which takes are trained in segments, and how many key frames there
     may be: a fixed number, so that a take gives the same model on every machine."""
@@ -28,9 +28,9 @@ class SegmentParams(Section):
     floor_megabytes: Count = 700
     """Memory that every training takes beside textures and rays: Python, its libraries, the volume."""
 
-    texels_per_pixel: Factor = 1.7
-    """Texels of the textures, a pixel of one camera's picture: what is reckoned with before they are known. Measured,
-    of heads that fill the picture."""
+    texels_per_pixel: Factor = 3.8
+    """Texels of the textures, a pixel of one camera's picture, if a texel is one pixel: what is reckoned with before
+    they are known. Measured, of heads that fill the picture."""
 
     key_frames: Annotated[int, Field(ge=1, le=10_000)] = 24
     """Frames of which the base is made, at most: surfaces, layers, shared colour, backgrounds, reflection. The first

@@ -88,6 +88,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "export/poisson.py": ("MIN_SAMPLES",),
         "rendering/camera_paths.py": ("STEEPEST",),
         "training/adam.py": ("EPSILON",),
+        "training/explicit/reflection.py": ("TILT_STEP",),
         "training/volume/subject.py": ("EMPTY",),
         "rendering/opengl.py": ALL,
         "rendering/raster.py": ALL,
@@ -133,6 +134,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
     "how much is done at a time: memory and speed, never the result": {
         "gpu.py": ("THREADS", "_most"),
         "training/explicit/state_gpu.py": ("SUMS",),
+        "training/explicit/reflection_maps.py": ("AT_ONCE",),
         "training/volume/steps_gpu.py": ("SUMS", "AT_ONCE"),
         "model/radial_gpu.py": ("LAYERS",),
         "export/sampling.py": ("DIRECTIONS_AT_ONCE",),

@@ -20,7 +20,9 @@ from facefolds_core.export.stores import Grids
 from facefolds_core.facts import fact
 from facefolds_core.files import read_json
 from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import (
     DecimateParams,
     MeshChoiceParams,
@@ -30,6 +32,7 @@ from facefolds_core.params import (
 )
 from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reflection import reflected_colours
 from stages.common import write_choice
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import make_scene
@@ -66,20 +69,29 @@ def surfaces(grids: Grids, method: str) -> steps.Surfaces:
     return [reconstruct(gather_samples(grids, i, None), params, i).surface for i in range(grids.num_layers)]
 
 
+def matte(reflection: ReflectionMaps | None = None) -> Grids:
+    """Of one layer, all but its window and reflection left out."""
+    nothing, window = np.zeros((1, 2, 2, 3), np.float32), [[-0.7, 0.7, -0.7, 0.7]]
+    one = np.ones((1, 2, 2), np.uint8)
+    return Grids(nothing, nothing, one > 0, one, np.array(window), Chart((0.0, 0.0, 0.0)), reflection)
+
+
 @dataclass(frozen=True)
 class Filmed:
     scene: Scene
     textures: FrameStore
 
 
-def film(folder: Path, period: float, noise: float = 0.0) -> Filmed:
+def film(folder: Path, period: float, noise: float = 0.0, shining: ReflectionMaps | None = None) -> Filmed:
     """Photos of the ball with waves of so many texels, and its texture; with noise on the photos (of 255)."""
     scene, texture = make_scene(folder, cameras=5, size=96, frames=1), stripes(period)
     write_frames(folder / "textures.arrow", (SIDE, SIDE, 4), [(0, 0, texture)])
     rng = np.random.default_rng(1)
     rows = []
     for i, camera in enumerate(scene.cameras):
-        photo = 255 * composite(cast_layers(camera, [ball(64)]), [texture])[0]
+        hits, window = cast_layers(camera, [ball(64)]), matte().window(0)
+        added = None if shining is None else reflected_colours(hits, camera, [window], shining)
+        photo = 255 * composite(hits, [texture], added=added)[0]
         rows.append((i, 0, np.rint(photo + rng.normal(0, noise, photo.shape)).clip(0, 255).astype(np.uint8)))
     write_frames(folder / "frames.arrow", rows[0][2].shape, rows)
     return Filmed(scene, FrameStore(folder / "textures.arrow"))
@@ -91,25 +103,39 @@ TEXELS = TextureChoiceParams(candidates=(16, 32, 48, 64))
 @pytest.mark.parametrize("period, least", [(32.0, 32), (16.0, 48), (5.0, 64)])
 def test_textures_are_no_finer_than_what_they_show(tmp_path: Path, period: float, least: int) -> None:
     filmed = film(tmp_path, period, noise=20.0)
-    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)[0] == least
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)[0] == least
 
 
 def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path) -> None:
     filmed = film(tmp_path, 8.0, noise=60.0)
     loose = TEXELS.model_copy(update={"fidelity": 0.0, "within": 0.1})
-    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, loose)[0] == 32
-    assert choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)[0] == 64
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, loose)[0] == 32
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)[0] == 64
 
 
 def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path) -> None:
     filmed = film(tmp_path, 16.0, noise=20.0)
     params = MeshChoiceParams(candidates=(8, 16, 32, 64), fidelity=35.0)
     ladder = {n: [ball(n)] for n in (8, 16, 32, 64)}
-    chosen, why = choose_meshes(filmed.scene, ladder, filmed.textures, params)
+    chosen, why = choose_meshes(filmed.scene, ladder, matte(), filmed.textures, params)
     flat = {n: [ball(4)] for n in (8, 16, 32)} | {64: [ball(64)]}
     assert chosen == 32
-    assert choose_meshes(filmed.scene, flat, filmed.textures, params)[0] == 64
+    assert choose_meshes(filmed.scene, flat, matte(), filmed.textures, params)[0] == 64
     assert f"took {chosen} of" in str(why) and "split train" in str(why)
+
+
+def test_what_photos_reflect_is_not_counted_against_textures(tmp_path: Path) -> None:
+    """They differ by it from every candidate: taken away, photos are those of a matte ball, to their rounding."""
+    rng = np.random.default_rng(0)
+    normals = np.stack([np.ones((6, 6)), *rng.uniform(-0.3, 0.3, (2, 6, 6))], -1)
+    parts = (np.full((6, 6), 0.2), np.full((6, 6, 3), 0.1), normals, rng.random((8, 8, 3)))
+    shining = ReflectionMaps((-0.7, 0.7, -0.7, 0.7), *(part.astype(np.float32) for part in parts))
+    filmed = film(tmp_path, 16.0, shining=shining)
+    matched, unmatched = (
+        max(choose_texels(filmed.scene, [ball(64)], matte(maps), filmed.textures, TEXELS)[1].values["psnr"])
+        for maps in (shining, None)
+    )
+    assert matched > 50 > 30 > unmatched
 
 
 @pytest.mark.parametrize("unseen", ["nothing is opaque", "no photo is there"])
@@ -125,7 +151,7 @@ def test_where_nothing_can_be_compared_the_finest_is_taken(tmp_path: Path, unsee
         rows = [(i, 0, filmed.scene.open_frames().image(i, 0).copy()) for i in range(1, 5)]
         write_frames(filmed.scene.folder / "frames.arrow", rows[0][2].shape, rows)
         filmed = Filmed(replace(filmed.scene, splits=splits), filmed.textures)
-    chosen, why = choose_texels(filmed.scene, [ball(64)], filmed.textures, TEXELS)
+    chosen, why = choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)
     assert chosen == 64 and why.values["tried"] == [64]
 
 
@@ -141,7 +167,7 @@ def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path) -> No
 
 def test_numbers_fix_both(tmp_path: Path) -> None:
     filmed = film(tmp_path, 32.0)
-    size, why = steps.texels_for(filmed.scene, [ball(8)], filmed.textures.path, TextureParams(resolution=40))
+    size, why = steps.texels_for(filmed.scene, [ball(8)], matte(), filmed.textures.path, TextureParams(resolution=40))
     assert (size, why) == (40, None)
 
 

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
-from facefolds_core.export.sampling import grid_normals, sample_grids, texture_rows, write_textures
+from facefolds_core.export.sampling import grid_normals, sample_grids, samples_for, texture_rows, write_textures
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, row_strides, texel_uv, uv_to_directions
@@ -152,6 +152,21 @@ class OfTexels(Ellipsoids):
     def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
         rgb, alpha = super().texture(uv, layer, time)
         return rgb * (0.5 if time == self.changed else 1.0), alpha
+
+
+@dataclass(frozen=True)
+class Fine(Ellipsoids):
+    """Of 700 x 300 texels."""
+
+    def texel_grid(self) -> TexelGrid:  # type: ignore[override]
+        return TexelGrid((-0.5, 0.5, -0.4, 0.4), (700, 300))
+
+
+def test_samples_are_no_coarser_than_the_models_texels() -> None:
+    whole, upper, narrow = (-0.5, 0.5, -0.4, 0.4), (0.0, 0.5, -0.4, 0.4), (-0.32, 0.32, -0.1, 0.1)
+    assert [samples_for(Fine(), window, 256) for window in (whole, upper, narrow)] == [704, 384, 448]
+    assert samples_for(Fine(), whole, 1024) == 1024
+    assert samples_for(Ellipsoids(), whole, 512) == 512
 
 
 def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,19 +6,24 @@ import errno
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.track import Track
 from facefolds_core.model.tensor_files import write_tensors
+from facefolds_core.params import ReflectionParams
 from facefolds_core.training import patience
 from facefolds_core.training.explicit.checkpoints import STATE
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.segments.loop import base_of
 from facefolds_core.training.segments.plan import TakePlan, plan_take
+from tests.geometry.test_track import about
 from tests.scenes import make_scene
 from tests.training.test_segments import FRAMES, params
 
@@ -76,6 +81,33 @@ def test_a_base_that_is_cut_off_goes_on_where_it_was(
         assert make(scene, plan, tmp_path, **OFTEN) == expected
     assert len(left) == STEPS - after
     assert [path.name for path in tmp_path.glob("begun-*")] == []
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_base_with_a_reflection_goes_on_where_it_was(
+    turns: bool, whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
+) -> None:
+    """Cut off in the round of geometry after its first fit, and after it was decided that there is one."""
+    scene, plan, _ = whole
+    turned = Track.of([about((0, 0, 1), 5.0 * k) for k in range(FRAMES)], np.zeros((FRAMES, 3)))
+    scene = replace(scene, poses=turned) if turns else scene
+    lit = params(**OFTEN).model_copy(
+        update={"reflection": ReflectionParams(texels=4, environment_texels=4, begin="rounds")}
+    )
+
+    def base(folder: Path) -> bytes:
+        made = base_of(plan, scene, lit, folder, folder / "log", None)
+        assert made.textures.reflection is not None
+        return (made.folder / "model.safetensors").read_bytes()
+
+    with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", lambda *_: 1.0):
+        expected = base(tmp_path / "whole")
+        for after in (8, 25):
+            with counted(most=after), pytest.raises(KeyboardInterrupt):
+                base(tmp_path / f"{after}")
+            with counted() as left:
+                assert base(tmp_path / f"{after}") == expected
+            assert len(left) == STEPS - after
 
 
 def test_another_machine_goes_on_from_a_folder_that_is_shared(

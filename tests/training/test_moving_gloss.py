@@ -18,7 +18,7 @@ from facefolds_core.params import ReflectionParams
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.reflection import Seen
+from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
@@ -76,6 +76,29 @@ def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Sc
     assert step > 1 and len({turn.tobytes() for turn in some.turns}) == 5
     for field in fields(Seen):
         np.testing.assert_array_equal(getattr(some, field.name), getattr(every, field.name)[::step])
+
+
+def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
+    """In each frame another picture of the room, that of the model at the layer in the middle."""
+    turns = Track.of([about((0, 0, 1), 20.0 * k) for k in range(2)], np.zeros((2, 3)))
+    source = rays(replace(scene, frame_ids=tuple("ab"), poses=turns), share=150)
+    state = TextureState((8, 8), 3, 2, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    window, rng = (-0.6, 0.6, -0.6, 0.6), np.random.default_rng(0)
+    given = ReflectionParams(texels=6, environment_texels=5)
+    gloss = GlossFit(layers().chart, window, given, turns)
+    views, _ = source.part(1, 0, 1)
+    gloss.light(state, views, 1)
+    assert len(state.shine) == 0  # nothing is known yet
+    surface = surface_normals(np.full((20, 20), 0.33), layers().chart, window, (6, 6), 1.0)
+    light = rng.random((5, 5, 3), np.float32)
+    gloss.maps = replace(Maps.blank(surface, given), environment=light)
+    gloss.light(state, views, 1)
+    st = (torch.from_numpy(views.codes[:, 1].astype(np.float32)) - 1) / 65534
+    held = views.codes[:, 1, 0] > 0
+    turn = torch.from_numpy(turns.at(1).rotation.astype(np.float32))
+    expected = gloss.maps.model().added(st, torch.from_numpy(views.directions), turn).detach().numpy()
+    assert held.mean() > 0.8
+    np.testing.assert_allclose(state.shine[held], expected[held], atol=2e-5)
 
 
 @pytest.mark.slow

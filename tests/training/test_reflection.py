@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numba
 import numpy as np
@@ -15,17 +15,17 @@ from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit import reference
-from facefolds_core.training.explicit.reflection import (
+from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded
+from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
+from facefolds_core.training.explicit.reflection_maps import (
     Maps,
     Seen,
-    centred,
-    fit_maps,
-    gain_on_cameras,
-    grounded,
     surface_normals,
+    tangents,
+    tilted,
     values_at,
 )
-from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
+from facefolds_core.training.explicit.views import Views
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 PARAMS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
@@ -33,10 +33,11 @@ PARAMS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
 
 def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8), environment: int = 8) -> Maps:
     rng = np.random.default_rng(seed)
-    normals = np.stack([np.ones(shape), *(0.3 * rng.standard_normal((2, *shape)))], -1)
+    surface = np.stack([np.ones(shape), *(0.3 * rng.standard_normal((2, *shape)))], -1)
+    surface /= np.linalg.norm(surface, axis=-1, keepdims=True)
     gloss, offset = rng.random(shape), 0.2 * rng.random((*shape, 3))
     light = rng.random((environment, environment, 3))
-    return Maps(*(np.asarray(x, np.float32) for x in (gloss, offset, normals, light)))
+    return Maps(*(np.asarray(x, np.float32) for x in (gloss, offset, surface, np.zeros((*shape, 2)), light)))
 
 
 def _rays(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -117,8 +118,7 @@ def test_normal_equations_are_those_of_a_dense_matrix() -> None:
 
 def _start(truth: Maps) -> Maps:
     """The right normals, nothing else known."""
-    blank = Maps.blank(WINDOW, PARAMS)
-    return Maps(blank.gloss, blank.offset, truth.normals, blank.environment)
+    return Maps.blank(truth.normals, PARAMS)
 
 
 def _seen(maps: Maps, strength: float, noise: float = 0.01, turned: bool = False) -> Seen:
@@ -144,7 +144,7 @@ def test_a_known_reflection_is_found(turned: bool) -> None:
 
 def test_light_begins_at_nothing_and_the_sum_stays() -> None:
     maps, (st, along) = _random_maps(3), _rays(500)
-    lit = Maps(maps.gloss, maps.offset, maps.normals, maps.environment - np.float32(0.7))
+    lit = replace(maps, environment=maps.environment - np.float32(0.7))
     found = grounded(lit)
     assert found.environment.min() == 0
     np.testing.assert_allclose(found.added(_looked(st, along)), lit.added(_looked(st, along)), atol=1e-5)
@@ -176,9 +176,48 @@ def test_the_fit_does_not_depend_on_threads() -> None:
             found.append(fit_maps(seen, truth, 3, PARAMS))
     finally:
         numba.set_num_threads(before)
-    assert all(np.array_equal(getattr(found[0], n), getattr(found[1], n)) for n in ("gloss", "offset", "environment"))
+    names = [field.name for field in fields(Maps)]
+    assert all(np.array_equal(getattr(found[0], name), getattr(found[1], name)) for name in names)
 
 
 def test_normals_of_a_sphere_are_its_directions() -> None:
     normals = surface_normals(np.full((40, 40), 0.3), Chart((0, 0, 0)), WINDOW, (6, 6), 2.0)
     np.testing.assert_allclose(normals, uv_to_directions(texel_uv(6, 6, WINDOW)), atol=2e-3)
+
+
+def test_tangents_are_at_right_angles_to_the_normal_and_to_each_other() -> None:
+    normals = np.random.default_rng(0).standard_normal((500, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    first, second = tangents(normals.astype(np.float32))
+    axes = np.stack([normals, first, second], 1)[normals[:, 0] > -0.99]
+    np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-4)
+    np.testing.assert_array_equal(tangents(np.float32([1, 0, 0])), np.eye(3)[1:])
+
+
+def test_normals_lean_as_the_reflection_asks_for() -> None:
+    """Given the surface of a truth that leans by 0.15 in a random direction everywhere."""
+    given, rng = _random_maps(3), np.random.default_rng(5)
+    angle = rng.uniform(0, 2 * np.pi, given.gloss.shape)
+    tilt = np.asarray(0.15 * np.stack([np.cos(angle), np.sin(angle)], -1), np.float32)
+    truth = replace(given, tilt=tilt)
+    seen, start = _seen(truth, 1.0), replace(given, tilt=np.zeros_like(tilt))
+    found = fit_maps(seen, start, 12, PARAMS.model_copy(update={"normal_smoothness": 0.01}))
+    assert np.median(np.linalg.norm(found.tilt - tilt, axis=-1)) < 0.05
+    assert np.abs(found.tilt).max() <= PARAMS.max_tilt
+
+
+def test_normals_stay_where_they_are_asked_to() -> None:
+    truth = _random_maps(3)
+    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, PARAMS.model_copy(update={"normals": False}))
+    np.testing.assert_array_equal(found.tilt, 0)
+    np.testing.assert_allclose(found.normals, tilted(truth.surface, 0 * truth.tilt))
+
+
+def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
+    codes = np.zeros((3, 5, 2), np.uint16)
+    codes[0, :] = 1 + np.arange(5)[:, None] * 1000
+    codes[1, [0, 4]] = [[1, 65535], [65535, 1]]
+    codes[2, 1:] = codes[0, 1:] * (np.arange(1, 5) != 2)[:, None]
+    views = Views(codes, np.zeros(3, np.int32), np.zeros(3, np.int32), np.eye(3, dtype=np.float32))
+    st = Seen.middle(views, np.eye(3, dtype=np.float32)).st
+    np.testing.assert_allclose(st, [[2000 / 65534] * 2, [0, 1], [1000 / 65534] * 2], atol=1e-6)

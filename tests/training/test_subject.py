@@ -123,15 +123,12 @@ def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> N
     assert found.losses == PARAMS.losses
 
 
-def test_behind_a_turning_head_backgrounds_learn_more_slowly_and_its_layers_lie_farther_apart(tmp_path: Path) -> None:
+def test_behind_a_turning_head_backgrounds_learn_more_slowly(tmp_path: Path) -> None:
     still = make_scene(tmp_path, size=16)
     assert for_poses(PARAMS, still) is PARAMS
     turning = replace(still, poses=Track.of([np.eye(3)] * still.num_frames, np.zeros((still.num_frames, 3))))
     found = for_poses(PARAMS, turning)
     assert found.background.rate == PARAMS.moving.background_rate < PARAMS.background.rate
-    assert (
-        found.geometry.max_halfwidth_pixels == PARAMS.moving.max_halfwidth_pixels > PARAMS.geometry.max_halfwidth_pixels
-    )
     slow = ExplicitParams.model_validate({"background": {"rate": 0.01}})
     assert for_poses(slow, turning).background.rate == 0.01
 

@@ -12,6 +12,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.params import SegmentParams
 from facefolds_core.training.explicit.attempt import Attempt
 from facefolds_core.training.explicit.plan import Epochs, Level
+from facefolds_core.training.explicit.reflection_maps import Maps
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.log import log_metrics
@@ -51,7 +53,7 @@ class Checkpoints:
         self.before, self._began, self._next = 0.0, time.perf_counter(), 0.0
 
     def follow(self, trainer: Trainer) -> None:
-        """Write one from time to time, where all that is trained is in it: a reflection that is there is not."""
+        """Write one from time to time."""
         self._wait(0.0)
         trainer.keep = self._keep
 
@@ -79,7 +81,7 @@ class Checkpoints:
 
     def _keep(self, trainer: Trainer, at: Attempt) -> None:
         start = time.perf_counter()
-        if start < self._next or trainer.gloss.maps is not None:
+        if start < self._next:
             return
         try:
             self._write(trainer, at)
@@ -100,6 +102,7 @@ class Checkpoints:
             "psnr": trainer.psnr,
             "logged": trainer.logged,
             "events": [event.to_json() for event in trainer.events],
+            "reflection": trainer.gloss.on,
             "random": trainer.random.bit_generator.state,
         }
         with atomic_folder(self.folder) as temporary:
@@ -118,10 +121,14 @@ class Checkpoints:
         saved = [torch.from_numpy(np.array(arrays[f"saved{i}"])) for i in range(len(GRIDS) + 1)]
         grids = {name: arrays[name] for name in (*GRIDS, "steps")}
         middle, background = (torch.from_numpy(np.array(arrays[name])) for name in ("middle", "background"))
+        lit = [f"reflection_{field.name}" for field in fields(Maps)]
+        maps = Maps(*(np.array(arrays[name]) for name in lit)) if lit[0] in arrays else None
+        shine, on = np.array(arrays["shine"]), bool(about["reflection"])
         trainer.iteration, trainer.rays = about["counts"]
         trainer.rate, trainer.psnr = about["rate"], about["psnr"]
         trainer.logged, trainer.events, trainer.random, trainer.middle = logged, events, random, middle
         state = trainer.take_up(levels[level], background)
+        trainer.gloss.on, trainer.gloss.maps, state.shine = on, maps, shine
         for name, values in grids.items():
             torch.as_tensor(getattr(state, name)).numpy()[:] = values
         self.before = float(about["seconds"])
@@ -132,7 +139,14 @@ def _arrays(trainer: Trainer, state: TextureState, at: Attempt) -> dict[str, NDA
     """As they are, no copies."""
     found = {name: getattr(state, name).numpy() for name in GRIDS}
     found |= {f"saved{i}": values.numpy() for i, values in enumerate(at.saved)}
-    found |= {"background": state.background.numpy(), "middle": trainer.middle.numpy(), "steps": state.steps}
+    if trainer.gloss.maps is not None:
+        found |= {f"reflection_{name}": values for name, values in vars(trainer.gloss.maps).items()}
+    found |= {
+        "shine": state.shine,
+        "background": state.background.numpy(),
+        "middle": trainer.middle.numpy(),
+        "steps": state.steps,
+    }
     return found
 
 

@@ -96,7 +96,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
-    texels = texel_count(scene, window, radius, pixels_of_texel(scene, params))
+    texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         chart=chart,
         window=window,
@@ -106,14 +106,14 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source, most, pixels_of_texel(scene, params)), *notes),
+        reasons=(*_reasons(params, losses[chart], source, most), *notes),
         notes=notes,
         losses=losses,
         volume_psnr=volume.psnr,
     )
 
 
-def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, pixels: float) -> tuple[Fact, ...]:
+def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float) -> tuple[Fact, ...]:
     """One a choice."""
     start, geometry = params.start, params.geometry
     return (
@@ -121,7 +121,7 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, pix
         fact("window_chosen", opacity=start.subject_opacity, margin=start.window_margin),
         middle,
         fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
-        fact("texels_chosen", pixels=pixels),
+        fact("texels_chosen", pixels=params.textures.pixels_per_texel),
     )
 
 
@@ -193,11 +193,6 @@ def extrapolate(radii: Array) -> Array:
         for _ in range(8):
             filled = np.where(missing, ndimage.gaussian_filter(filled, sigma, mode="nearest"), radii)
     return filled
-
-
-def pixels_of_texel(scene: Scene, params: ExplicitParams) -> float:
-    """How many pixels a texel of the finest textures is to be."""
-    return params.textures.pixels_per_texel if scene.poses is None else params.moving.pixels_per_texel
 
 
 def texel_count(scene: Scene, window: Window, radius: float, pixels_per_texel: float) -> tuple[int, int]:

@@ -16,15 +16,8 @@ from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
-from facefolds_core.training.explicit.reflection import (
-    Maps,
-    Seen,
-    centred,
-    fit_maps,
-    gain_on_cameras,
-    grounded,
-    surface_normals,
-)
+from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded
+from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays, StillRays, Views
 
@@ -37,13 +30,12 @@ class GlossFit:
         on: whether there is one.
 
     Args:
-        poses: of a head that turns, in the frames of the training. It has a reflection at the end alone (`begin`): that
-            of each ray is another one in each frame, and textures are trained without.
+        poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
     """
 
     def __init__(self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None) -> None:
         self.chart, self.window, self.params, self.poses = chart, window, params, poses
-        self.on = params.enabled and (poses is None or params.begin == "end")
+        self.on = params.enabled
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
@@ -51,12 +43,20 @@ class GlossFit:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
-        blank = Maps.blank(self.window, self.params)
-        radii = middle.cpu().numpy().astype(np.float64)
-        self._normals = surface_normals(radii, self.chart, self.window, blank.gloss.shape[:2], self.params.normal_blur)
+        radii, shape = middle.cpu().numpy().astype(np.float64), map_shape(self.window, self.params.texels)
+        self._normals = surface_normals(radii, self.chart, self.window, shape, self.params.normal_blur)
         if self.maps is not None:
-            self.maps = replace(self.maps, normals=self._normals)
-            self._shine(state, self.look(state, source, images))
+            self.maps = replace(self.maps, surface=self._normals)
+            if self.poses is None:
+                self._shine(state, self.look(state, source, images))
+
+    def light(self, state: TextureState, views: Views, frame: int) -> None:
+        """Before a step on the rays of one frame: what the reflection adds to each, if they are others in each frame.
+
+        They reflect where they cross the layer nearest to the middle one."""
+        if self.poses is None or self.maps is None:
+            return
+        state.shine = self.maps.on_rays(views, self.poses.at(frame).rotation)
 
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
@@ -83,7 +83,7 @@ class GlossFit:
         used = self._used(seen)
         first = self.maps is None
         assert self._normals is not None
-        start = replace(Maps.blank(self.window, self.params), normals=self._normals) if first else self.maps
+        start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
         rounds = self.params.first_rounds if first else self.params.rounds
         maps = grounded(fit_maps(used, start, rounds, self.params))
@@ -94,7 +94,7 @@ class GlossFit:
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
         assert self._normals is not None
-        start = replace(Maps.blank(self.window, self.params), normals=self._normals)
+        start = Maps.blank(self._normals, self.params)
         gain = gain_on_cameras(self._used(seen), start, self.params)
         self.on = gain >= self.params.min_gain
         if not self.on:

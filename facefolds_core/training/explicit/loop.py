@@ -79,9 +79,7 @@ def for_poses(params: ExplicitParams, scene: Scene) -> ExplicitParams:
         return params
     rate = min(params.background.rate, params.moving.background_rate)
     background = params.background.model_copy(update={"rate": rate})
-    most = params.moving.max_halfwidth_pixels
-    geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": most})
-    return params.model_copy(update={"background": background, "geometry": geometry})
+    return params.model_copy(update={"background": background})
 
 
 @dataclass(frozen=True)

@@ -12,144 +12,29 @@ with. Whether there is any is asked of cameras that a fit did not see.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.linalg import solveh_banded
 
-from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.sphere_uv import Window, texel_uv
-from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
-from facefolds_core.training.explicit.reflection_kernel import normal_equations, reflect, reflect_turned, sample
+from facefolds_core.training.explicit.reflection_kernel import normal_equations
+from facefolds_core.training.explicit.reflection_maps import Array, Maps, Seen, values_at
 
-Array = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Seen:
-    """P rays, mean over frames.
-
-    Attributes:
-        camera: (P,).
-        directions: (P, 3) unit vectors in the head's frame.
-        st: (P, 2) place of what shows.
-        opacity: (P,).
-        residual: (P, 3) photo minus rendering without reflections.
-        turns: (P, 3, 3) of each ray from the head's axes to those of the room, which the light is fixed to; None where
-            the head stands still.
-    """
-
-    camera: NDArray[np.int32]
-    directions: Array
-    st: Array
-    opacity: Array
-    residual: Array
-    turns: Array | None = None
-
-    @classmethod
-    def of(
-        cls, camera: NDArray[np.int32], directions: Array, sums: Array, frames: int, turn: Array | None = None
-    ) -> Seen:
-        """From the sums (P, 6) of `reflection_kernel.look` over some frames; `turn`: (3, 3) of all its rays."""
-        st = np.asarray(sums[:, 4:] / np.maximum(sums[:, 3:4], 1e-6), np.float32)
-        mean = np.asarray(sums / frames, np.float32)
-        turns = None if turn is None else np.repeat(turn[None].astype(np.float32), len(st), 0)
-        return cls(camera, directions, st, mean[:, 3], mean[:, :3], turns)
-
-    @classmethod
-    def together(cls, parts: Sequence[Seen]) -> Seen:
-        """The rays of several, which all have turns."""
-        names = [field.name for field in fields(cls)]
-        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-
-    def part(self, chosen: NDArray[Any]) -> Seen:
-        return Seen(
-            self.camera[chosen],
-            self.directions[chosen],
-            self.st[chosen],
-            self.opacity[chosen],
-            self.residual[chosen],
-            None if self.turns is None else self.turns[chosen],
-        )
-
-
-@dataclass(frozen=True)
-class Maps:
-    """Values of `model.reflection.Reflection`, float32."""
-
-    gloss: Array
-    offset: Array
-    normals: Array
-    environment: Array
-
-    @classmethod
-    def blank(cls, window: Window, params: ReflectionParams) -> Maps:
-        """The same gloss everywhere, and no light; maps with texels as wide as high."""
-        u0, u1, v0, v1 = window
-        scale = params.texels / max(u1 - u0, v1 - v0)
-        h, w = max(2, round(scale * (u1 - u0))), max(2, round(scale * (v1 - v0)))
-        e = params.environment_texels
-        return cls(
-            *(np.full(s, v, np.float32) for s, v in (((h, w), 1), ((h, w, 3), 0), ((h, w, 3), 1), ((e, e, 3), 0)))
-        )
-
-    def positions(self, seen: Seen) -> Array:
-        """(P, 2) in the environment."""
-        out = np.empty((len(seen.st), 2), np.float32)
-        st, directions = np.ascontiguousarray(seen.st), np.ascontiguousarray(seen.directions)
-        if seen.turns is None:
-            reflect(st, directions, self.normals, out)
-        else:
-            reflect_turned(st, directions, np.ascontiguousarray(seen.turns), self.normals, out)
-        return out
-
-    def added(self, seen: Seen) -> Array:
-        """(P, 3), as `Reflection.added`."""
-        light, st = values_at(self.environment, self.positions(seen)), seen.st
-        return np.asarray(values_at(self.gloss[..., None], st) * light - values_at(self.offset, st), np.float32)
-
-    def model(self) -> Reflection:
-        h, w = self.gloss.shape
-        module = Reflection(ReflectionShape((h, w), len(self.environment)))
-        with torch.no_grad():
-            for name in ("gloss", "offset", "normals", "environment"):
-                getattr(module, name).copy_(torch.from_numpy(getattr(self, name)))
-        return module
-
-
-def surface_normals(
-    middle: NDArray[np.float64], chart: Chart, window: Window, shape: tuple[int, int], blur: float
-) -> Array:
-    """(h, w, 3) unit normals, outwards, of the surface with radii `middle` (rows, columns at its nodes), smoothed by
-    `blur` nodes."""
-    radii = ndimage.gaussian_filter(middle, blur, mode="nearest")
-    rows, columns = radii.shape
-    u0, u1, v0, v1 = window
-    uv = np.stack(np.meshgrid(np.linspace(u1, u0, rows), np.linspace(v0, v1, columns), indexing="ij"), -1)
-    points = chart.points(uv, radii)
-    normals = np.cross(np.gradient(points, axis=0), np.gradient(points, axis=1))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    h, w = shape
-    places = np.meshgrid((np.arange(h) + 0.5) / h * (rows - 1), (np.arange(w) + 0.5) / w * (columns - 1), indexing="ij")
-    found = np.stack([ndimage.map_coordinates(normals[..., q], places, order=1) for q in range(3)], -1)
-    outwards = (found * chart.directions(texel_uv(h, w, window))).sum(-1, keepdims=True)
-    found *= np.where(outwards < 0, -1, 1) / np.linalg.norm(found, axis=-1, keepdims=True)
-    return np.asarray(found, np.float32)
+TILT_STEP = 0.01
+"""By which normals lean to find how the reflection follows them: under a tenth of a texel of the environment."""
 
 
 def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> Maps:
-    """Gloss, offset and environment that explain the residuals; the normals are those of `start`."""
+    """Gloss, offset, environment and the tilt of the normals that explain the residuals; the surface is that of
+    `start`."""
     o, clip = seen.opacity, params.max_residual
     wanted = seen.residual.clip(-clip, clip)
-    places = start.positions(seen)
-    gloss, offset, environment = start.gloss, start.offset, start.environment
+    maps = start
     for _ in range(rounds):
+        places = maps.positions(seen)
+        gloss, offset, environment = maps.gloss, maps.offset, maps.environment
         reflecting = o * values_at(gloss[..., None], seen.st)[:, 0]
         target = wanted + o[:, None] * values_at(offset, seen.st)
         environment = _solve(
@@ -163,7 +48,26 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> 
         gloss, environment, light = gloss / mean, environment * mean, light * mean
         left = o[:, None] * values_at(gloss[..., None], seen.st) * light - wanted
         offset = _solve(seen.st, o * o, o[:, None] * left, gloss.shape, params.gloss_smoothness)
-    return replace(start, gloss=gloss, offset=offset, environment=environment)
+        maps = replace(maps, gloss=gloss, offset=offset, environment=environment)
+        if params.normals:
+            for axis in (0, 1):
+                maps = _lean(maps, seen, wanted, axis, params)
+    return maps
+
+
+def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: ReflectionParams) -> Maps:
+    """The same with another tilt along one tangent: a Gauss-Newton step, kept within `max_tilt`."""
+    step = np.zeros((1, 1, 2), np.float32)
+    step[..., axis] = TILT_STEP
+    now, own = seen.opacity[:, None] * maps.added(seen), maps.tilt[..., axis : axis + 1]
+    further = seen.opacity[:, None] * replace(maps, tilt=maps.tilt + step).added(seen)
+    slope = (further - now) / np.float32(TILT_STEP)
+    target = wanted - now + slope * values_at(own, seen.st)
+    weight = (slope * slope).sum(1)
+    found = _solve(seen.st, weight, (slope * target).sum(1, keepdims=True), own.shape[:2], params.normal_smoothness)
+    tilt = maps.tilt.copy()
+    tilt[..., axis] = found[..., 0].clip(-params.max_tilt, params.max_tilt)
+    return replace(maps, tilt=tilt)
 
 
 def grounded(maps: Maps) -> Maps:
@@ -182,6 +86,10 @@ def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
 
 def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
+    smoother = {
+        name: params.asked_smoothness * getattr(params, name) for name in ("gloss_smoothness", "environment_smoothness")
+    }
+    params = params.model_copy(update=smoother)
     before = after = 0.0
     for fold in range(params.folds):
         out = seen.camera % params.folds == fold
@@ -194,13 +102,6 @@ def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
         before += float((clipped**2).sum())
         after += float(((clipped - added) ** 2).sum())
     return 10 * float(np.log10(before / after)) if after > 0 and before > 0 else 0.0
-
-
-def values_at(image: Array, st: Array) -> Array:
-    """(h, w, C) at (P, 2) -> (P, C)."""
-    out = np.empty((len(st), image.shape[2]), np.float32)
-    sample(np.ascontiguousarray(image), np.ascontiguousarray(st), out)
-    return out
 
 
 def _solve(st: Array, weight: Array, wish: Array, shape: tuple[int, ...], smoothness: float) -> Array:

@@ -168,6 +168,7 @@ class Trainer:
         for i in range(at.step, level.iterations):
             frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
+            self.gloss.light(self.state, views, frame)
             rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
             error = self.state.step(
                 views,

@@ -23,9 +23,10 @@ from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, read_spec
 from facefolds_core.model.tensor_files import read_tensors, write_tensors
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
+from facefolds_core.training.explicit.reflection_maps import Maps
 from facefolds_core.training.patience import is_full, patiently
 from facefolds_core.training.trained import Trained
 
@@ -57,6 +58,11 @@ class Base:
     textures: GridTextures
     surroundings: Surroundings
     fingerprint: str
+
+    def lit(self, params: ReflectionParams) -> Maps | None:
+        """The reflection that frames are fitted with: none if the base's layers were trained without."""
+        reflection = self.textures.reflection
+        return None if reflection is None or params.begin == "end" else Maps.of(reflection)
 
     def mixed(self, shares: NDArray[np.float64]) -> tuple[Tensor, Tensor]:
         """Mean of the key frames' colour [H, W, 3] and alpha [H, W, N], with shares (n,)."""
@@ -136,9 +142,6 @@ def train_base(
     """
     kept = (folder.parent if begun is None else begun) / f"{BEGUN}{folder.name}"
     forget_begun(kept.parent, kept.name)
-    # The frames are fitted without a reflection, which is added to what they then show.
-    reflection = params.reflection.model_copy(update={"begin": "end"})
-    params = params.model_copy(update={"reflection": reflection})
     trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder, kept)
 
     def write() -> None:

@@ -11,7 +11,6 @@ import psutil
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.fit import pixels_of_texel
 from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.patience import check_space
@@ -45,8 +44,8 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
         left: frames that are still to be fitted to a base that is there; None where there is none.
     """
     segments = params.segments
-    finer = (params.textures.pixels_per_texel / pixels_of_texel(scene, for_scene(params, scene)[0])) ** 2
-    texels = round(segments.texels_per_pixel * finer * scene.width * scene.height)
+    side = for_scene(params, scene)[0].textures.pixels_per_texel
+    texels = round(segments.texels_per_pixel * scene.width * scene.height / side**2)
     most = int(segments.memory_megabytes * 1e6 / (segments.texel_bytes * texels))
     frames = scene.num_frames
     at_once = frames <= min(segments.joint_frames, most) and left is None
@@ -101,8 +100,9 @@ def _seconds(params: ExplicitParams, steps: int, texels: int) -> float:
 
 
 def _ray_bytes(params: ExplicitParams) -> int:
-    """A ray that may meet the subject: codes, camera, pixel, direction; background, and the pictures of a frame."""
-    return 4 * params.layers + 20 + 12 + 6
+    """A ray that may meet the subject: codes, camera, pixel, direction; what is reflected, background, and the pictures
+    of a frame."""
+    return 4 * params.layers + 20 + 12 + 12 + 6
 
 
 def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) -> None:

@@ -45,11 +45,18 @@ class FrameFitter:
         base: see there.
         params: of the training.
         device: of the textures.
-        views: crossings of the rays of a still head, if they are known.
+        views: crossings of the rays of a still head, if they are known,
+        shine: and what the reflection adds to each (`shine_of`).
     """
 
     def __init__(
-        self, scene: Scene, base: Base, params: ExplicitParams, device: Device, views: Views | None = None
+        self,
+        scene: Scene,
+        base: Base,
+        params: ExplicitParams,
+        device: Device,
+        views: Views | None = None,
+        shine: NDArray[np.float32] | None = None,
     ) -> None:
         self.scene, self.base, self.gpu = scene, base, device.gpu
         still = params.background.model_copy(update={"rate": 0.0})
@@ -62,9 +69,11 @@ class FrameFitter:
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
-        self.still = None
+        self.still, self.maps = None, base.lit(params.reflection)
         if scene.poses is None:
-            self.still = StillRays(views or trace_views(scene, base.manifolds, 1, self.gpu))
+            views = views or trace_views(scene, base.manifolds, 1, self.gpu)
+            self.still = StillRays(views)
+            self.state.shine = shine_of(base, params, views) if shine is None else shine
 
     def fit(self, frame: int, shares: NDArray[np.float64], seed: bytes) -> FittedFrame:
         """Args:
@@ -88,6 +97,8 @@ class FrameFitter:
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
+            if self.maps is not None and self.scene.poses is not None:
+                state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
             errors.append(state.step(seen, which, images, 0, weights, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
@@ -121,6 +132,12 @@ class FrameFitter:
         to = self.params.textures
         rate = self.base.surroundings.rate * self.params.segments.rate * (1 - (1 - to.final_rate) * progress)
         return np.array([0, 0, 0, rate * to.frame_rate, rate * to.frame_rate * to.alpha_rate], np.float32)
+
+
+def shine_of(base: Base, params: ExplicitParams, views: Views) -> NDArray[np.float32]:
+    """(P, 3) what the reflection adds to the rays of a still head; (0, 3) where frames are fitted without."""
+    maps = base.lit(params.reflection)
+    return np.zeros((0, 3), np.float32) if maps is None else maps.on_rays(views)
 
 
 def _diverged(scene: Scene, frame: int) -> UserError:

@@ -6,11 +6,12 @@ import os
 import pickle
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import ExplicitParams
@@ -18,7 +19,9 @@ from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.views import Views, trace_views
 from facefolds_core.training.segments.base import Base, read_base, with_its_cameras
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.frames import FrameFitter
+from facefolds_core.training.segments.frames import FrameFitter, shine_of
+
+SHINE = "shine"
 
 
 @dataclass(frozen=True)
@@ -39,10 +42,10 @@ class Fitting:
     fingerprint: str
     folder: Path
 
-    def fitter(self, views: Views | None = None) -> FrameFitter:
-        """Args: `views`: crossings of the rays of a still head, if they are known."""
-        base = read_base(self.base, self.fingerprint)
-        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, choose(self.params.device), views)
+    def fitter(self, views: Views | None = None, shine: NDArray[np.float32] | None = None) -> FrameFitter:
+        """Args: of a still head, if they are known, `views`: crossings of its rays, `shine`: see `FrameFitter`."""
+        base, device = read_base(self.base, self.fingerprint), choose(self.params.device)
+        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, device, views, shine)
 
     def cache(self) -> SegmentCache:
         return SegmentCache(self.folder)
@@ -55,11 +58,10 @@ def handed(fitting: Fitting, base: Base) -> Iterator[list[int]]:
         shapes: dict[str, tuple[int, str, tuple[int, ...]]] = {}
         if fitting.scene.poses is None:
             views = trace_views(with_its_cameras(fitting.scene, base), base.manifolds, 1)
-            for field in fields(views):
-                array = getattr(views, field.name)
+            for name, array in (*vars(views).items(), (SHINE, shine_of(base, fitting.params, views))):
                 file = stack.enter_context(TemporaryFile())
                 array.tofile(file)
-                shapes[field.name] = (file.fileno(), array.dtype.str, array.shape)
+                shapes[name] = (file.fileno(), array.dtype.str, array.shape)
             del views
         about = stack.enter_context(TemporaryFile())
         pickle.dump((fitting, shapes), about)
@@ -67,14 +69,16 @@ def handed(fitting: Fitting, base: Base) -> Iterator[list[int]]:
         yield [about.fileno(), *(handle for handle, _, _ in shapes.values())]
 
 
-def taken(handle: int) -> tuple[Fitting, Views | None]:
+def taken(handle: int) -> tuple[Fitting, Views | None, NDArray[np.float32] | None]:
     """In the worker: what was handed to it, arrays mapped."""
     fitting, shapes = pickle.loads(os.pread(handle, os.fstat(handle).st_size, 0))
     if not shapes:
-        return fitting, None
+        return fitting, None, None
     arrays = {}
     for name, (number, dtype, shape) in shapes.items():
         with os.fdopen(number, "rb") as file:
-            # "c": kernels are compiled for arrays that can be written to.
-            arrays[name] = np.memmap(file, dtype, "c", shape=shape).view(np.ndarray)
-    return fitting, Views(**arrays)
+            # "c": kernels are compiled for arrays that can be written to. An empty file cannot be mapped.
+            mapped = np.memmap(file, dtype, "c", shape=shape) if np.prod(shape) else np.zeros(shape, dtype)
+            arrays[name] = mapped.view(np.ndarray)
+    shine = arrays.pop(SHINE)
+    return fitting, Views(**arrays), shine

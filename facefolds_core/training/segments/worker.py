@@ -22,8 +22,8 @@ from facefolds_core.training.segments.messages import Failed, FrameDone, Segment
 
 def work(connection: Connection, handle: int) -> None:
     """Fit segments until None comes."""
-    fitting, views = taken(handle)
-    fitter, cache = fitting.fitter(views), fitting.cache()
+    fitting, views, shine = taken(handle)
+    fitter, cache = fitting.fitter(views, shine), fitting.cache()
     while (segment := connection.recv()) is not None:
         rays = fit_segment(segment, fitter, cache, lambda: connection.send(FrameDone()))
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
