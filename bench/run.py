@@ -63,8 +63,7 @@ class Project:
                 said = [line for line in "\n".join(running.communicate()).splitlines() if line.strip()]
             if running.returncode:
                 errors = " ".join([line for line in said if line.startswith(f"{stage}: ")] or said[-3:])[:300]
-                message = errors or f"ended with {running.returncode}"
-                raise UserError(message, place=f"{stage} of {self.subject}", file=self.root)
+                raise UserError(errors or f"ended with {running.returncode}", place=f"{stage} of {self.subject}", file=self.root)
 
 
 def own_params(subject: str, changes: Sections, path: Path = ROOT / "params.yaml") -> dict[str, Any]:
@@ -94,8 +93,7 @@ def training_of(folders: SubjectFolders) -> dict[str, Any]:
 def score_model(
     folder: Path, scene: Scene, times: Mapping[int, float], perceptual: Perceptual, device: torch.device
 ) -> Iterator[tuple[str, int, Means]]:
-    """The model without its view branch, as `evaluate` scores its variant `diffuse`: on the cameras for validation, or
-    on the held-out ones where there are none.
+    """What of the model ships (its reflection, no view branch), on the cameras for validation, else the held-out ones.
 
     Args:
         folder: of the model.
@@ -105,14 +103,16 @@ def score_model(
         camera, frame, values by METRICS and SUBJECT_METRICS.
     """
     model = load_model(folder, device)
-    truths, masks = scene.open_frames(), scene.open_masks()
+    truths, masks, poses = scene.open_frames(), scene.open_masks(), scene.poses
+    variant = 1 if model.reflection_maps() is None else 0
     for index in scene.indices(scene.choice_split):
         view = None
         for k, time in times.items():
             if (index, k) in truths:
-                if view is None or scene.poses is not None:
-                    view = ModelView(model, scene.camera_in_head(index, k))
+                if view is None or poses is not None:
+                    turn = None if poses is None else poses.at(k).rotation
+                    view = ModelView(model, scene.camera_in_head(index, k), turn)
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
-                picture = shown(view.render(time)[1])
+                picture = shown(view.render(time)[variant])
                 values = score_images({"": picture}, truths.image(index, k) / 255.0, mask, perceptual)[""]
                 yield scene.cameras[index].name, k, values
