@@ -63,7 +63,8 @@ class Project:
                 said = [line for line in "\n".join(running.communicate()).splitlines() if line.strip()]
             if running.returncode:
                 errors = " ".join([line for line in said if line.startswith(f"{stage}: ")] or said[-3:])[:300]
-                raise UserError(errors or f"ended with {running.returncode}", place=f"{stage} of {self.subject}", file=self.root)
+                words = errors or f"ended with {running.returncode}"
+                raise UserError(words, place=f"{stage} of {self.subject}", file=self.root)
 
 
 def own_params(subject: str, changes: Sections, path: Path = ROOT / "params.yaml") -> dict[str, Any]:
@@ -109,9 +110,8 @@ def score_model(
         view = None
         for k, time in times.items():
             if (index, k) in truths:
-                if view is None or poses is not None:
-                    turn = None if poses is None else poses.at(k).rotation
-                    view = ModelView(model, scene.camera_in_head(index, k), turn)
+                turn = None if poses is None else poses.at(k).rotation
+                view = ModelView(model, scene.camera_in_head(index, k), turn) if view is None or poses else view
                 mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and (index, k) in masks else None
                 picture = shown(view.render(time)[variant])
                 values = score_images({"": picture}, truths.image(index, k) / 255.0, mask, perceptual)[""]

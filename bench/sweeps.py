@@ -33,6 +33,7 @@ from facefolds_core.asset import read_asset
 from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import read_json, write_json
+from facefolds_core.params import SampleParams
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.sweeps.experiments import runs_of
@@ -80,8 +81,7 @@ SWEEPS: dict[str, Sweep] = {
 def changes(name: str, value: int, subject: str) -> dict[str, Any]:
     """Keys of a cell, under its subject; coarser levels of detail are not measured and left out.
 
-    Textures finer than the subject's samples would show no more: then it is sampled as finely, and its surfaces keep
-    the vertices that they had.
+    For textures finer than the subject's samples it is sampled as finely; its surfaces keep the vertices they had.
 
     Raises:
         UserError: if there is no such subject.
@@ -89,15 +89,15 @@ def changes(name: str, value: int, subject: str) -> dict[str, Any]:
     params = own_params(subject, {})
     entry = params["subjects"][subject]
     found = {**SWEEPS[name].fixed, SWEEPS[name].key: value, "compress.levels": []}
-    samples = {**params["sample"], **entry.get("sample", {})}.get("resolution", 512)
+    given = {**params["sample"], **entry.get("sample", {})}.get("resolution", "auto")
+    samples = SampleParams().least if given == "auto" else given
     if name == "texture" and value > samples:
         found |= {"sample.resolution": value, "reconstruct.resolution": samples}
     if name in RATES:
-        found |= {"compress.video.target_psnr": None}
-        found |= {"capture.frames": RATE_FRAMES} if entry["source"] == "actor" else {}
-    if entry["source"] != "actor":
-        found["path"] = entry["path"]  # a relative one leads nowhere from an experiment's folder
-    return found
+        filmed = {"capture.frames": RATE_FRAMES} if entry["source"] == "actor" else {}
+        found |= {"compress.video.target_psnr": None, **filmed}
+    # A relative path leads nowhere from an experiment's folder.
+    return found if entry["source"] == "actor" else {**found, "path": entry["path"]}
 
 
 def queue_cell(name: str, value: int, subject: str) -> None:

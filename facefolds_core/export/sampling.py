@@ -32,13 +32,13 @@ Array = NDArray[np.float64]
 
 
 def samples_for(model: LayeredModel, window: Window, least: int) -> int:
-    """R of `sample.resolution: auto`: no texel of the model over the window is lost."""
+    """R of `sample.resolution: auto`: no texel of the model over the window is lost, up to 4096."""
     grid = model.texel_grid()
     if grid is None:
         return least
     own, (rows, columns) = grid.window, grid.shape
     height, width = (window[1] - window[0]) / (own[1] - own[0]), (window[3] - window[2]) / (own[3] - own[2])
-    return max(least, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6))
+    return max(least, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
 
 
 def sample_grids(model: LayeredModel, resolution: int, window: Window, progress: bool = True) -> Grids:

@@ -7,7 +7,7 @@ At the place (s, t) of a layer, in the direction d of the ray, with n the unit n
 E is one small picture for all layers and frames: the light that comes from each direction, in the equal-area
 projection of the sphere with the subject's front (+x) in its middle and its back (-x) on the circle around it. gloss,
 offset and n are coarse maps over the window, shared by layers and frames. The offset is the mean of gloss E over the
-training rays that see the place, so that the layers hold what a model without reflections would show.
+training rays that see the place, so that the layers hold what the cameras see on average, matte.
 """
 
 from __future__ import annotations

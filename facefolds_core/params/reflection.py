@@ -58,7 +58,7 @@ class ReflectionParams(Section):
     """Looked at in a fit, at most: some hundred for each unknown."""
 
     rounds: Count = 4
-    """Times that environment, gloss and offset are solved for in turn, in a fit."""
+    """Times that environment, gloss, offset and normals are solved for in turn, in a fit."""
 
     first_rounds: Count = 12
     """The same in the first fit, which has nothing to start from, and in those that tell whether it helps."""
@@ -73,9 +73,9 @@ class ReflectionParams(Section):
     """The cameras are left out in so many groups, in turn, to tell whether the reflection helps."""
 
     asked_smoothness: Factor = 10.0
-    """Both smoothnesses times this in the fits by which it is decided: few cameras, of which some are left out, and
-    textures that are still coarse do not determine finer maps (of 13 cameras of `studio` -0.3 dB with 1, 0.5 with 10;
-    in the end it gains 2)."""
+    """The smoothnesses of gloss and environment times this in the fits by which it is decided: few cameras, of which
+    some are left out, and textures that are still coarse do not determine finer maps (of 13 cameras of `studio` -0.3 dB
+    with 1, 0.5 with 10; in the end it gains 2)."""
 
     min_gain: Annotated[float, Field(ge=0, le=100)] = 0.05
     """dB on rays of cameras left out of a fit, after the rounds of geometry; with less there is no reflection."""

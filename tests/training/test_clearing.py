@@ -86,6 +86,22 @@ def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> No
     assert not painted_room(state, OneRay(), shown, 1, kept).any()
 
 
+def test_what_only_shines_is_no_paint_of_the_room() -> None:
+    """Texels as grey as the room, which reflect 0.4 on the right half, where the picture has 0.6."""
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})
+    right = np.arange(1024) % 32 >= 16
+    state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)
+    state.colour[0], state.layers[0, ..., 3] = 0.2, 8.0
+    shown = Shown(np.where(right, 153, 51).astype(np.uint8)[None, :, None].repeat(3, 2))
+    assert painted_room(state, OneRay(), shown, 1, params.pruning).all()
+
+    def light(state: TextureState, views: Views, frame: int) -> None:
+        state.shine = np.where(right, 0.4, 0.0).astype(np.float32)[:, None].repeat(3, 1)
+
+    poor = painted_room(state, OneRay(), shown, 1, params.pruning, None, light).view(32, 32)
+    assert poor[:, :8].all() and not poor[:, 16:].any()
+
+
 def _half_room(params: ExplicitParams) -> tuple[TextureState, Shown]:
     """A room of grey 0.2, and opaque texels that show 0.245 everywhere: a gain of 0.002."""
     state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)

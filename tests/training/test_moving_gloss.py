@@ -101,6 +101,17 @@ def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
     np.testing.assert_allclose(state.shine[held], expected[held], atol=2e-5)
 
 
+def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
+    """Not in the corner of the window, where a mean over no opacity lies."""
+    source = rays(scene, share=150)
+    views, _ = source.part(0, 0, 1)
+    seen = Seen.middle(views)
+    half = replace(seen, st=0 * seen.st + 0.25, opacity=np.linspace(0, 1, len(seen.st), dtype=np.float32))
+    found = half.filled(views).st
+    np.testing.assert_allclose(found[0], seen.st[0], atol=1e-6)
+    np.testing.assert_allclose(found[-1], 0.25, atol=1e-6)
+
+
 @pytest.mark.slow
 def test_it_is_looked_for(scene: Scene, tmp_path: Path) -> None:
     reflection = ReflectionParams(texels=4, environment_texels=4)

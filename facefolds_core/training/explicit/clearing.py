@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -12,7 +14,13 @@ from facefolds_core.params import ExplicitParams, PruningParams
 from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.silhouettes import Silhouettes
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Pictures, Rays
+from facefolds_core.training.explicit.views import Pictures, Rays, Views
+
+Light = Callable[[TextureState, Views, int], None]
+
+
+def _as_it_is(state: TextureState, views: Views, frame: int) -> None:
+    """`state.shine` is of the views."""
 
 
 def clear_texels(
@@ -22,6 +30,7 @@ def clear_texels(
     passes: int,
     params: ExplicitParams,
     outlines: Silhouettes | None = None,
+    light: Light = _as_it_is,
 ) -> list[Fact]:
     """Make them transparent; what is to be said of it.
 
@@ -29,11 +38,12 @@ def clear_texels(
         rays: of the training cameras, looked at in `passes` parts.
         images: of the same.
         outlines: of the subject in some of them; None if nothing is known.
+        light: sets `state.shine` to what is added to the rays of some views in a frame.
     """
     least, found = params.pruning.texel_opacity, list[Fact]()
     hidden = state.contributions(rays, passes) < least
     hidden |= state.beside(params.start.beside_opacity)
-    hidden |= painted_room(state, rays, images, passes, params.pruning, outlines)
+    hidden |= painted_room(state, rays, images, passes, params.pruning, outlines, light)
     state.hide(hidden)
     apart, count = specks(_opacity(state), params.pruning)
     if count:
@@ -52,11 +62,12 @@ def painted_room(
     passes: int,
     params: PruningParams,
     outlines: Silhouettes | None = None,
+    light: Light = _as_it_is,
 ) -> torch.Tensor:
     """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background.
 
     A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
-    black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show over the
+    black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show, lit, over the
     background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. Where rays
     lie beside the subject's `outlines` for the most part, `beside_gain` counts instead of `room_gain`.
     """
@@ -67,7 +78,7 @@ def painted_room(
         background = state.background.cpu().numpy()
         for frame in spread(range(len(state.steps)), params.room_frames):
             picture = images.frame(frame)
-            seen, camera, pixel = _look(state, rays, picture, passes, frame)
+            seen, camera, pixel = _look(state, rays, picture, passes, frame, light)
             bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
             better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
             gain.add(seen, better)
@@ -96,13 +107,16 @@ def _beside(
 
 
 def _look(
-    state: TextureState, rays: Rays, picture: NDArray[np.uint8], passes: int, frame: int
+    state: TextureState, rays: Rays, picture: NDArray[np.uint8], passes: int, frame: int, light: Light = _as_it_is
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-    """What rays of a frame see, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,); picture
+    """What rays of a frame see, lit, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,); picture
     (C, pixels, 3) of the frame."""
     views, chosen = rays.part(frame, 0, passes)
     seen = np.zeros((len(views.pixel), 6), np.float32)
     state.look(views, picture, frame, seen)
+    light(state, views, frame)
+    if len(state.shine):
+        seen[:, :3] -= seen[:, 3:4] * state.shine
     return seen[chosen], views.camera[chosen], views.pixel[chosen]
 
 

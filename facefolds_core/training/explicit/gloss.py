@@ -81,6 +81,8 @@ class GlossFit:
 
     def _fit(self, state: TextureState, seen: Seen, done: bool) -> None:
         used = self._used(seen)
+        if not np.isfinite(used.residual).all():
+            return  # the textures diverge: the next step says so
         first = self.maps is None
         assert self._normals is not None
         start = Maps.blank(self._normals, self.params) if first else self.maps
@@ -114,7 +116,7 @@ class GlossFit:
         frames = spread(range(len(state.steps)), self.params.frames)
         for frame in frames:
             state.look(views, images.frame(frame), frame, sums)
-        return Seen.of(views.camera, views.directions, sums, len(frames))
+        return Seen.of(views.camera, views.directions, sums, len(frames)).filled(views)
 
     def _look_in_turns(self, state: TextureState, source: Rays, images: Pictures, poses: Track) -> Seen:
         """Of some rays of each of some frames, as many as a fit takes: in each frame the room shines from elsewhere.

@@ -5,9 +5,9 @@ difference from the rendering without reflections is, mean over frames,
 
     R = o (gloss(s, t) E(r) - m(s, t)),
 
-linear in each of gloss, E and m: they are solved for in turn, each a banded system, with smooth maps. m takes up what
-does not depend on the view. Between fits the reflection is a given colour of each ray, which the textures are trained
-with. Whether there is any is asked of cameras that a fit did not see.
+linear in each of gloss, E and m: they are solved for in turn, each a banded system, with smooth maps; then the normals
+lean, by Gauss-Newton steps. m takes up what does not depend on the view. Between fits the reflection is a given colour
+of each ray, which the textures are trained with. Whether there is any is asked of cameras that a fit did not see.
 """
 
 from __future__ import annotations

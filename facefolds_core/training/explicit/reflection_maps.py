@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,11 @@ class Seen:
         turns = None if turn is None else np.broadcast_to(turn.astype(np.float32), (count, 3, 3))
         nothing = np.zeros((count, 3), np.float32)
         return cls(views.camera, views.directions, st, np.ones(count, np.float32), nothing, turns)
+
+    def filled(self, views: Views) -> Seen:
+        """The same rays; as far as they are clear, they are taken to cross the layer in the middle."""
+        opacity = self.opacity[:, None]
+        return replace(self, st=opacity * self.st + (1 - opacity) * Seen.middle(views).st)
 
     @classmethod
     def together(cls, parts: Sequence[Seen]) -> Seen:
@@ -164,7 +169,7 @@ def map_shape(window: Window, longest: int) -> tuple[int, int]:
 
 def tangents(normals: Array) -> tuple[Array, Array]:
     """Two unit tangents (..., 3) at right angles of unit normals (..., 3): +y and +z, turned as +x is to become the
-    normal by the shortest way, so that they change slowly but near -x."""
+    normal by the shortest way, so that they change slowly; within 4 degrees of -x they are shorter."""
     x, y, z = (normals[..., q] for q in range(3))
     share = 1 / np.maximum(1 + x, np.float32(1e-3))
     twist = -y * z * share

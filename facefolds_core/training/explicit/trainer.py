@@ -72,12 +72,14 @@ class Trainer:
         if begun is None:
             self._prepare(level)
         assert self.state is not None and self.views is not None
+        lit = self.gloss.maps, self.state.shine
         at = begun or Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
         while at.tries < self.params.divergence.attempts:
             if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
                 return
             self.state.restore(at.saved)
+            self.gloss.maps, self.state.shine = lit
             self.rate /= self.params.divergence.slow_down
             self.events.append(fact("diverged", level=number, rate=self.rate))
             bar.write(f"train: {self.events[-1]}")
@@ -227,7 +229,9 @@ class Trainer:
         state.forget_moments()
         assert self.views is not None
         outlines = silhouettes(self.scene, self.volume, self.params)
-        self.events += clear_texels(state, self.views, self.images, self._stride(), self.params, outlines)
+        self.events += clear_texels(
+            state, self.views, self.images, self._stride(), self.params, outlines, self.gloss.light
+        )
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.

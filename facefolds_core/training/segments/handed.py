@@ -62,7 +62,7 @@ def handed(fitting: Fitting, base: Base) -> Iterator[list[int]]:
                 file = stack.enter_context(TemporaryFile())
                 array.tofile(file)
                 shapes[name] = (file.fileno(), array.dtype.str, array.shape)
-            del views
+            del views, array
         about = stack.enter_context(TemporaryFile())
         pickle.dump((fitting, shapes), about)
         about.flush()
