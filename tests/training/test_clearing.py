@@ -102,6 +102,30 @@ def test_what_only_shines_is_no_paint_of_the_room() -> None:
     assert poor[:, :8].all() and not poor[:, 16:].any()
 
 
+class Turning(OneRay):
+    """In frame 1 half as many rays."""
+
+    def part(self, frame: int, phase: int, parts: int) -> tuple[Views, np.ndarray]:
+        views, rays = super().part(frame, phase, parts)
+        chosen = rays[:: frame + 1]
+        return views.part(chosen), np.arange(len(chosen))
+
+
+def test_a_turning_heads_rays_are_lit_in_each_frame_anew() -> None:
+    """What shines is that of the rays at hand, also where the outline is known in another frame."""
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2, "room_frames": 1, "beside_gain": 0.01}})
+    state = TextureState((32, 32), 1, 2, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)
+    state.colour[0], state.layers[0, ..., 3] = 0.2, 8.0
+    beside = Silhouettes(1, np.array([0]), np.zeros((1, 1024), np.uint8))
+
+    def light(state: TextureState, views: Views, frame: int) -> None:
+        state.shine = np.full((len(views.pixel), 3), 0.4, np.float32)
+
+    lit, bare = (Shown(np.full((1, 1024, 3), value, np.uint8)) for value in (153, 51))
+    assert not painted_room(state, Turning(), lit, 1, params.pruning, beside, light).any()
+    assert painted_room(state, Turning(), bare, 1, params.pruning, beside, light).all()
+
+
 def _half_room(params: ExplicitParams) -> tuple[TextureState, Shown]:
     """A room of grey 0.2, and opaque texels that show 0.245 everywhere: a gain of 0.002."""
     state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)

@@ -86,16 +86,16 @@ def painted_room(
         if params.room_gain > 0:
             poor = gain.blurred() < params.room_gain * mass.blurred()
         if outlines is not None and params.beside_gain > 0:
-            beside = _beside(state, rays, images, passes, outlines) < params.beside_share
+            beside = _beside(state, rays, images, passes, outlines, light) < params.beside_share
             poor |= beside & (gain.blurred() < params.beside_gain * mass.blurred())
     return torch.from_numpy(np.kron(poor, np.ones((size, size), bool))[:h, :w].reshape(-1, 1))
 
 
 def _beside(
-    state: TextureState, rays: Rays, images: Pictures, passes: int, outlines: Silhouettes
+    state: TextureState, rays: Rays, images: Pictures, passes: int, outlines: Silhouettes, light: Light
 ) -> NDArray[np.float64]:
     """Of each cell, how much of what it shows lies on the subject in pictures whose outline is known; 1 if nothing."""
-    seen, camera, pixel = _look(state, rays, images.frame(outlines.frame), passes, outlines.frame)
+    seen, camera, pixel = _look(state, rays, images.frame(outlines.frame), passes, outlines.frame, light)
     share = outlines.of(camera, pixel)
     known = np.isfinite(share)
     size = state.params.pruning.room_texels
@@ -107,7 +107,7 @@ def _beside(
 
 
 def _look(
-    state: TextureState, rays: Rays, picture: NDArray[np.uint8], passes: int, frame: int, light: Light = _as_it_is
+    state: TextureState, rays: Rays, picture: NDArray[np.uint8], passes: int, frame: int, light: Light
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
     """What rays of a frame see, lit, (R, 6) as `TextureState.look` gives it, and their cameras and pixels (R,); picture
     (C, pixels, 3) of the frame."""

@@ -69,9 +69,8 @@ class Seen:
         return cls(views.camera, views.directions, st, np.ones(count, np.float32), nothing, turns)
 
     def filled(self, views: Views) -> Seen:
-        """The same rays; as far as they are clear, they are taken to cross the layer in the middle."""
-        opacity = self.opacity[:, None]
-        return replace(self, st=opacity * self.st + (1 - opacity) * Seen.middle(views).st)
+        """The same rays; those that are clear, and show no place, are taken to reflect at the layer in the middle."""
+        return replace(self, st=np.where(self.opacity[:, None] < 0.1, Seen.middle(views).st, self.st))
 
     @classmethod
     def together(cls, parts: Sequence[Seen]) -> Seen:
