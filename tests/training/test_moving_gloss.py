@@ -20,6 +20,7 @@ from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, surface_normals
 from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.views import StillRays, trace_views
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
 from tests.training.test_moving import TURNED, layers, rays
@@ -111,6 +112,18 @@ def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
     clear = half.opacity < 0.1
     np.testing.assert_array_equal(found[clear], seen.st[clear])
     np.testing.assert_array_equal(found[~clear], 0.25)
+
+
+def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
+    """No gloss would be found then, and without gloss no light ever after."""
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    source = StillRays(trace_views(scene, layers(), 1))
+    gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None)
+    gloss.follow(state, source, Noise(), layers().middle.detach())
+    for logit, fitted in ((-5.0, False), (5.0, True)):
+        state.layers[0, ..., 3] = logit
+        gloss.fit(state, source, Noise(), done=False)
+        assert (gloss.maps is not None) == fitted
 
 
 @pytest.mark.slow

@@ -83,6 +83,8 @@ class GlossFit:
         used = self._used(seen)
         if not np.isfinite(used.residual).all():
             return  # the textures diverge: the next step says so
+        if not len(used.st):
+            return  # nothing is opaque yet: a gloss of 0 would stay 0
         first = self.maps is None
         assert self._normals is not None
         start = Maps.blank(self._normals, self.params) if first else self.maps
