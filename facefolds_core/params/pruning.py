@@ -18,12 +18,16 @@ class PruningParams(Section):
 
     room_gain: Weight = 0.001
     """Directions in which the layers show the training pictures by less than this better than the bare background does
-    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none."""
+    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none. The
+    background is what was learnt, or what is seen beside the layers and drawn on below them, whichever is nearer."""
+
+    room_opacity: Share = 0.05
+    """Pixels show what is beside the layers where these are less opaque than this."""
 
     room_frames: Count = 3
     """Frames that are looked at for that,"""
 
-    room_texels: Count = 4
+    room_texels: Count = 2
     """in squares of so many texels a side."""
 
     beside_gain: Weight = 0.003

@@ -86,6 +86,25 @@ def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> No
     assert not painted_room(state, OneRay(), shown, 1, kept).any()
 
 
+def test_paint_like_the_room_goes_where_no_background_was_learnt_behind_it() -> None:
+    """The same room, with opaque paint like it in the middle columns and a subject of 0.6 in the middle rows; the
+    background was never learnt behind either."""
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})
+    row, column = np.divmod(np.arange(1024), 32)
+    subject = (row >= 8) & (row < 24) & (column >= 20)
+    opaque = subject | ((column >= 6) & (column < 14))
+    picture = np.where(subject, 0.6, 0.2)
+    background = torch.from_numpy(np.where(opaque, 0.0, 0.2)).float()[None, :, None].repeat(1, 1, 3)
+    state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), background, params)
+    state.colour[0] = torch.from_numpy(picture).float()[:, None]
+    state.layers[0, ..., 3] = torch.from_numpy(np.where(opaque, 8.0, -8.0)).float()[:, None]
+    shown = Shown(np.rint(255 * picture)[None, :, None].repeat(3, 2).astype(np.uint8))
+    paint = (slice(None), slice(6, 14))
+    assert not painted_room(state, OneRay(), shown, 1, params.pruning).view(32, 32)[paint].any()
+    poor = painted_room(state, OneRay(), shown, 1, params.pruning, size=(32, 32)).view(32, 32)
+    assert poor[paint].all() and not poor[10:22, 22:].any()
+
+
 def test_what_only_shines_is_no_paint_of_the_room() -> None:
     """Texels as grey as the room, which reflect 0.4 on the right half, where the picture has 0.6."""
     params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})

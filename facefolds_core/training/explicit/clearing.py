@@ -12,6 +12,7 @@ from scipy import ndimage
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import ExplicitParams, PruningParams
 from facefolds_core.spacing import spread
+from facefolds_core.training.explicit.behind import filled_in
 from facefolds_core.training.explicit.silhouettes import Silhouettes
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays, Views
@@ -31,6 +32,7 @@ def clear_texels(
     params: ExplicitParams,
     outlines: Silhouettes | None = None,
     light: Light = _as_it_is,
+    size: tuple[int, int] | None = None,
 ) -> list[Fact]:
     """Make them transparent; what is to be said of it.
 
@@ -39,11 +41,12 @@ def clear_texels(
         images: of the same.
         outlines: of the subject in some of them; None if nothing is known.
         light: sets `state.shine` to what is added to the rays of some views in a frame.
+        size: H, W of pictures; None where nothing is to be asked of what is seen beside the layers.
     """
     least, found = params.pruning.texel_opacity, list[Fact]()
     hidden = state.contributions(rays, passes) < least
     hidden |= state.beside(params.start.beside_opacity)
-    hidden |= painted_room(state, rays, images, passes, params.pruning, outlines, light)
+    hidden |= painted_room(state, rays, images, passes, params.pruning, outlines, light, size)
     state.hide(hidden)
     apart, count = specks(_opacity(state), params.pruning)
     if count:
@@ -63,32 +66,37 @@ def painted_room(
     params: PruningParams,
     outlines: Silhouettes | None = None,
     light: Light = _as_it_is,
+    size: tuple[int, int] | None = None,
 ) -> torch.Tensor:
     """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background.
 
     A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
     black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show, lit, over the
-    background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. Where rays
-    lie beside the subject's `outlines` for the most part, `beside_gain` counts instead of `room_gain`.
+    background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. B is what
+    was learnt, or what pictures of `size` show beside the layers (behind opaque ones nothing was learnt), whichever is
+    nearer to I. Where rays lie beside the subject's `outlines` for the most part, `beside_gain` counts instead of
+    `room_gain`.
     """
-    (h, w), size = state.shape, params.room_texels
-    poor = np.zeros((-(-h // size), -(-w // size)), bool)
+    (h, w), side = state.shape, params.room_texels
+    poor = np.zeros((-(-h // side), -(-w // side)), bool)
     if params.room_gain > 0 or (params.beside_gain > 0 and outlines is not None):
-        gain, mass = _Cells(state.shape, size), _Cells(state.shape, size)
-        background = state.background.cpu().numpy()
+        gain, mass = _Cells(state.shape, side), _Cells(state.shape, side)
         for frame in spread(range(len(state.steps)), params.room_frames):
             picture = images.frame(frame)
             seen, camera, pixel = _look(state, rays, picture, passes, frame, light)
-            bare = picture[camera, pixel].astype(np.float32) / 255 - background[camera, pixel]
-            better = (bare**2).mean(1) - (seen[:, :3] ** 2).mean(1)
-            gain.add(seen, better)
+            image = picture[camera, pixel].astype(np.float32) / 255
+            bare = ((image - state.background.cpu().numpy()[camera, pixel]) ** 2).mean(1)
+            if size is not None:
+                beside = filled_in(picture, camera, pixel, seen[:, 3] > params.room_opacity, size)
+                bare = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1))
+            gain.add(seen, bare - (seen[:, :3] ** 2).mean(1))
             mass.add(seen, np.ones(len(seen)))
         if params.room_gain > 0:
             poor = gain.blurred() < params.room_gain * mass.blurred()
         if outlines is not None and params.beside_gain > 0:
-            beside = _beside(state, rays, images, passes, outlines, light) < params.beside_share
-            poor |= beside & (gain.blurred() < params.beside_gain * mass.blurred())
-    return torch.from_numpy(np.kron(poor, np.ones((size, size), bool))[:h, :w].reshape(-1, 1))
+            outside = _beside(state, rays, images, passes, outlines, light) < params.beside_share
+            poor |= outside & (gain.blurred() < params.beside_gain * mass.blurred())
+    return torch.from_numpy(np.kron(poor, np.ones((side, side), bool))[:h, :w].reshape(-1, 1))
 
 
 def _beside(

@@ -229,8 +229,9 @@ class Trainer:
         state.forget_moments()
         assert self.views is not None
         outlines = silhouettes(self.scene, self.volume, self.params)
+        size = self.scene.height, self.scene.width
         self.events += clear_texels(
-            state, self.views, self.images, self._stride(), self.params, outlines, self.gloss.light
+            state, self.views, self.images, self._stride(), self.params, outlines, self.gloss.light, size
         )
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
