@@ -16,10 +16,11 @@ class FewCameraParams(Section):
     behind it (`mugsy`); that of texels only where one has none."""
 
     at_most: Natural = 10
-    """Training cameras that are few; 0 is none ever."""
+    """Training cameras that are few; 0 is none ever. All but `views` is of these."""
 
     views: Count = 2
-    """Cameras that must see a voxel (`volume.min_view_share`, in cameras): of eight, a tenth is less than one."""
+    """Cameras that must see a voxel at least, however many there are (`volume.min_view_share`, in cameras): a share of
+    few is less than one."""
 
     shared_views: Count = 5
     """With plates: cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in

@@ -18,10 +18,13 @@ class PruningParams(Section):
 
     room_gain: Weight = 0.001
     """Directions in which the layers show the training pictures by less than this better than the bare background does
-    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none. The
-    background is what was learnt, or what is seen beside the layers and drawn on below them, whichever is nearer."""
+    (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none."""
 
-    room_opacity: Share = 0.05
+    beside_layers_gain: Weight = 0.0003
+    """The same, with the background that was learnt or what is seen beside the layers and drawn on below them,
+    whichever is nearer: where layers are opaque nothing is learnt. 0: what was learnt alone counts."""
+
+    beside_layers_opacity: Share = 0.05
     """Pixels show what is beside the layers where these are less opaque than this."""
 
     room_frames: Count = 3

@@ -41,7 +41,7 @@ class VolumeParams(Section):
     """The box lies within this distance of the origin, units: a head, hair, neck and the upper chest; cameras are about
     1 away."""
 
-    min_view_share: Share = 0.1
+    min_view_share: Share = 0.06
     """Voxels that a smaller share of the training cameras sees are empty: what only one camera sees can be anything."""
 
     shared_view_share: Share = 0.35

@@ -18,19 +18,23 @@ def for_scene(params: ExplicitParams, scene: Scene) -> tuple[ExplicitParams, tup
 def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[ExplicitParams, tuple[Fact, ...]]:
     """The parameters of a training of so many cameras, and what is to be said of them.
 
-    With more than `few_cameras.at_most` they are `params` themselves. Applied twice they are as applied once.
+    A voxel must be seen by `few_cameras.views` of them; with more than `few_cameras.at_most` nothing else changes.
+    Applied twice they are as applied once.
 
     Args:
         plates: whether each has a clean plate. Where it is not known what stands behind the subject a price on opacity
             takes the subject for the room: then only single views are not believed, and texels are larger.
     """
     few = params.few_cameras
-    if count > few.at_most or count <= few.views:
-        return params, ()
     volume, geometry, textures = params.volume, params.geometry, params.textures
+    if count <= few.views:
+        return params, ()
+    least = max(volume.min_view_share, few.views / count)
+    if count > few.at_most:
+        return params.model_copy(update={"volume": volume.model_copy(update={"min_view_share": least})}), ()
     shared = min(few.shared_views, count) if plates else few.views + 1
     seen = {
-        "min_view_share": max(volume.min_view_share, few.views / count),
+        "min_view_share": least,
         "shared_view_share": max(volume.shared_view_share, shared / count),
     }
     stricter: dict[str, Section] = {}

@@ -103,6 +103,8 @@ def test_paint_like_the_room_goes_where_no_background_was_learnt_behind_it() -> 
     assert not painted_room(state, OneRay(), shown, 1, params.pruning).view(32, 32)[paint].any()
     poor = painted_room(state, OneRay(), shown, 1, params.pruning, size=(32, 32)).view(32, 32)
     assert poor[paint].all() and not poor[10:22, 22:].any()
+    off = params.pruning.model_copy(update={"beside_layers_gain": 0.0})
+    assert not painted_room(state, OneRay(), shown, 1, off, size=(32, 32)).view(32, 32)[paint].any()
 
 
 def test_what_only_shines_is_no_paint_of_the_room() -> None:

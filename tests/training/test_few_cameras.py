@@ -17,7 +17,16 @@ PARAMS = ExplicitParams()
 
 @pytest.mark.parametrize("plates", [True, False])
 def test_the_parameters_of_many_cameras_are_left_as_they_are(plates: bool) -> None:
-    assert for_cameras(PARAMS, PARAMS.few_cameras.at_most + 1, plates) == (PARAMS, ())
+    assert for_cameras(PARAMS, 40, plates) == (PARAMS, ())
+
+
+@pytest.mark.parametrize("plates", [True, False])
+@pytest.mark.parametrize("cameras", [11, 22, 30])
+def test_of_many_cameras_two_must_see_a_voxel_and_nothing_else_changes(cameras: int, plates: bool) -> None:
+    found, notes = for_cameras(PARAMS, cameras, plates)
+    assert found.volume.min_view_share == 2 / cameras and not notes
+    volume = found.volume.model_copy(update={"min_view_share": PARAMS.volume.min_view_share})
+    assert found.model_copy(update={"volume": volume}) == PARAMS
 
 
 @pytest.mark.parametrize("plates", [True, False])

@@ -119,6 +119,7 @@ def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> N
     found = for_notes(PARAMS, notes)
     assert found.background.rate == 0 < PARAMS.background.rate
     assert found.pruning.room_gain == 0 < PARAMS.pruning.room_gain
+    assert found.pruning.beside_layers_gain == 0 < PARAMS.pruning.beside_layers_gain
     assert found.geometry.max_halfwidth_pixels == np.inf > PARAMS.geometry.max_halfwidth_pixels
     assert found.losses == PARAMS.losses
 

@@ -73,30 +73,45 @@ def painted_room(
     A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
     black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show, lit, over the
     background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. B is what
-    was learnt, or what pictures of `size` show beside the layers (behind opaque ones nothing was learnt), whichever is
-    nearer to I. Where rays lie beside the subject's `outlines` for the most part, `beside_gain` counts instead of
-    `room_gain`.
+    was learnt, and it takes a gain of `room_gain`, or where rays lie beside the subject's `outlines` for the most part
+    of `beside_gain`, to stay. Behind opaque layers nothing was learnt: where B may also be what pictures of `size` show
+    beside the layers, whichever is nearer to I, it takes `beside_layers_gain`.
     """
     (h, w), side = state.shape, params.room_texels
     poor = np.zeros((-(-h // side), -(-w // side)), bool)
-    if params.room_gain > 0 or (params.beside_gain > 0 and outlines is not None):
-        gain, mass = _Cells(state.shape, side), _Cells(state.shape, side)
-        for frame in spread(range(len(state.steps)), params.room_frames):
-            picture = images.frame(frame)
-            seen, camera, pixel = _look(state, rays, picture, passes, frame, light)
-            image = picture[camera, pixel].astype(np.float32) / 255
-            bare = ((image - state.background.cpu().numpy()[camera, pixel]) ** 2).mean(1)
-            if size is not None:
-                beside = filled_in(picture, camera, pixel, seen[:, 3] > params.room_opacity, size)
-                bare = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1))
-            gain.add(seen, bare - (seen[:, :3] ** 2).mean(1))
-            mass.add(seen, np.ones(len(seen)))
+    around = size if params.beside_layers_gain > 0 else None
+    if params.room_gain > 0 or around is not None or (params.beside_gain > 0 and outlines is not None):
+        gain, least, mass = _gains(state, rays, images, passes, light, around)
         if params.room_gain > 0:
-            poor = gain.blurred() < params.room_gain * mass.blurred()
+            poor = gain < params.room_gain * mass
+        if around is not None:
+            poor |= least < params.beside_layers_gain * mass
         if outlines is not None and params.beside_gain > 0:
             outside = _beside(state, rays, images, passes, outlines, light) < params.beside_share
-            poor |= outside & (gain.blurred() < params.beside_gain * mass.blurred())
+            poor |= outside & (gain < params.beside_gain * mass)
     return torch.from_numpy(np.kron(poor, np.ones((side, side), bool))[:h, :w].reshape(-1, 1))
+
+
+def _gains(
+    state: TextureState, rays: Rays, images: Pictures, passes: int, light: Light, size: tuple[int, int] | None
+) -> tuple[NDArray[np.float64], ...]:
+    """Of each cell the gain over what was learnt, that over what is seen beside the layers too (the same where `size`
+    is None), and the opacity that both are weighted by."""
+    params = state.params.pruning
+    gain, least, mass = (_Cells(state.shape, params.room_texels) for _ in range(3))
+    background = state.background.cpu().numpy()
+    for frame in spread(range(len(state.steps)), params.room_frames):
+        picture = images.frame(frame)
+        seen, camera, pixel = _look(state, rays, picture, passes, frame, light)
+        image, shown = picture[camera, pixel].astype(np.float32) / 255, (seen[:, :3] ** 2).mean(1)
+        bare = ((image - background[camera, pixel]) ** 2).mean(1)
+        gain.add(seen, bare - shown)
+        mass.add(seen, np.ones(len(seen)))
+        if size is not None:
+            beside = filled_in(picture, camera, pixel, seen[:, 3] > params.beside_layers_opacity, size)
+            bare = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1))
+        least.add(seen, bare - shown)
+    return gain.blurred(), least.blurred(), mass.blurred()
 
 
 def _beside(

@@ -68,7 +68,8 @@ def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
     if not any(note.kind == "fog" for note in notes):
         return params
     background = params.background.model_copy(update={"rate": 0.0})
-    pruning = params.pruning.model_copy(update={"room_gain": 0.0, "beside_gain": 0.0})
+    off = {"room_gain": 0.0, "beside_gain": 0.0, "beside_layers_gain": 0.0}
+    pruning = params.pruning.model_copy(update=off)
     geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": math.inf})
     return params.model_copy(update={"background": background, "pruning": pruning, "geometry": geometry})
 
