@@ -27,7 +27,8 @@ EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "
 """Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; the outermost training cameras lie
 at 72."""
 EXTREME_ELEVATION = 5.0
-MAX_AZIMUTH = 120.0  # where the head's centre is found a little off, +-85 degrees lie beyond the usual 90
+MAX_AZIMUTH = 120.0
+"""Where the head's centre is found a little off, +-85 degrees lie beyond the usual 90."""
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,13 @@ class RoomParams(Section):
     needed_below: Annotated[float, Field(ge=0, le=100)] = 28.0
     """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. Before plain
     walls it has 30 to 33 and an outer zone explains nothing better, but takes up hair and highlights of the subject;
-    before near, bright or patterned ones it has 20 to 26 (docs/research/2026-11-22-rooms.md)."""
+    before near, bright or patterned ones it has 20 to 26 (docs/research/2026-11-22-rooms.md). Then it is asked:"""
+
+    asked_cameras: Count = 6
+    """one of so many training cameras, at least one, is left out of two fits of the coarse level,"""
+
+    least_gain: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    """and there is an outer zone only if it shows these better by so much, dB. -100: always."""
 
     seen_rays: Factor = 1.0
     """Colours of voxels that fewer rays have reached are those of their neighbours: behind the head there would be

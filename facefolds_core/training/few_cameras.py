@@ -12,16 +12,20 @@ def for_scene(params: ExplicitParams, scene: Scene) -> tuple[ExplicitParams, tup
     """The parameters of a training of the scene's cameras, and what is to be said of them; see `for_cameras`."""
     cameras, plates = scene.indices("train"), scene.open_plates()
     known = plates is not None and all((camera, 0) in plates for camera in cameras)
-    return for_cameras(params, len(cameras), known)
+    return for_cameras(params, len(cameras), known, turns=scene.poses is not None)
 
 
-def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[ExplicitParams, tuple[Fact, ...]]:
+def for_cameras(
+    params: ExplicitParams, count: int, plates: bool, turns: bool = False
+) -> tuple[ExplicitParams, tuple[Fact, ...]]:
     """The parameters of a training of so many cameras, and what is to be said of them.
 
     A voxel must be seen by `few_cameras.views` of them; with more than `few_cameras.at_most` nothing else changes.
     Applied twice they are as applied once.
 
     Args:
+        turns: whether the head does: then one of many cameras sees it from several sides, and a share of the views,
+            which are counted in each frame of the volume, is enough.
         plates: whether each has a clean plate. Where it is not known what stands behind the subject a price on opacity
             takes the subject for the room: then only single views are not believed, and texels are larger.
     """
@@ -30,6 +34,8 @@ def for_cameras(params: ExplicitParams, count: int, plates: bool) -> tuple[Expli
     if count <= few.views:
         return params, ()
     least = max(volume.min_view_share, few.views / count)
+    if count > few.at_most and turns:
+        return params, ()
     if count > few.at_most:
         return params.model_copy(update={"volume": volume.model_copy(update={"min_view_share": least})}), ()
     shared = min(few.shared_views, count) if plates else few.views + 1

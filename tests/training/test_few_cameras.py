@@ -27,6 +27,7 @@ def test_of_many_cameras_two_must_see_a_voxel_and_nothing_else_changes(cameras: 
     assert found.volume.min_view_share == 2 / cameras and not notes
     volume = found.volume.model_copy(update={"min_view_share": PARAMS.volume.min_view_share})
     assert found.model_copy(update={"volume": volume}) == PARAMS
+    assert for_cameras(PARAMS, cameras, plates, turns=True) == (PARAMS, ())
 
 
 @pytest.mark.parametrize("plates", [True, False])

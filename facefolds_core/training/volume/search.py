@@ -13,6 +13,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams, StartParams
 from facefolds_core.training.few_cameras import for_scene
+from facefolds_core.training.volume.asked import room_gain
 from facefolds_core.training.volume.fit import Volume, VolumeFit
 from facefolds_core.training.volume.outline import thickness, visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
@@ -34,9 +35,13 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     # With mattes the room is known where the subject is not: an outer zone would take up the subject.
     cut_out = all(view.photo.matte is not None for view in plain.views)
     if plain.psnr < params.room.needed_below and not cut_out:
-        notes.append(fact("room_fitted", psnr=plain.psnr, under=params.room.needed_below))
-        found = _clear_of_fog(_with_room(scene, params, bar, notes), params.start, notes)
-        return found, tuple(notes)
+        gain, asked = room_gain(scene, params, bar), params.room
+        about = {"psnr": plain.psnr, "under": asked.needed_below, "gain": gain}
+        if gain >= asked.least_gain:
+            notes.append(fact("room_fitted", **about))
+            found = _clear_of_fog(_with_room(scene, params, bar, notes), params.start, notes)
+            return found, tuple(notes)
+        notes.append(fact("room_not_fitted", **about, least=asked.least_gain))
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
