@@ -84,7 +84,8 @@ WORDS = {
     "few_cameras_no_plates": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of "
     "them sees is empty, texels of a still head are large; clean plates would help",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
-    "room is fitted, too, which gains {gain:.1f} dB on cameras that its fit did not see",
+    "room is fitted, too",
+    "room_gains": "a room with parallax gains {gain:.1f} dB on cameras that its fit did not see",
     "room_not_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}); a "
     "room with parallax would gain {gain:.1f} dB on cameras that its fit did not see, under {least:g}: there is none",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "

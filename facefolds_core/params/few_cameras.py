@@ -20,7 +20,7 @@ class FewCameraParams(Section):
 
     views: Count = 2
     """Cameras that must see a voxel at least, however many there are (`volume.min_view_share`, in cameras): a share of
-    few is less than one."""
+    few is less than one. Of a turning head before more than `at_most` the share of its views alone counts."""
 
     shared_views: Count = 5
     """With plates: cameras from which on the fog of the start is as thick as anywhere (`volume.shared_view_share`, in

@@ -22,7 +22,8 @@ class PruningParams(Section):
 
     beside_layers_gain: Weight = 0.0003
     """The same, with the background that was learnt or what is seen beside the layers and drawn on below them,
-    whichever is nearer: where layers are opaque nothing is learnt. 0: what was learnt alone counts."""
+    whichever is nearer: where layers are opaque nothing is learnt. 0: what was learnt alone counts. Nothing is cleared
+    for looking like the room where this, `room_gain` and `beside_gain` are 0."""
 
     beside_layers_opacity: Share = 0.05
     """Pixels show what is beside the layers where these are less opaque than this."""

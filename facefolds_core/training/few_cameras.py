@@ -20,8 +20,8 @@ def for_cameras(
 ) -> tuple[ExplicitParams, tuple[Fact, ...]]:
     """The parameters of a training of so many cameras, and what is to be said of them.
 
-    A voxel must be seen by `few_cameras.views` of them; with more than `few_cameras.at_most` nothing else changes.
-    Applied twice they are as applied once.
+    A voxel must be seen by `few_cameras.views` of them, but for turning heads before more than `few_cameras.at_most`,
+    with which nothing else changes; `views` cameras or fewer are left as they are. Applied twice they are as applied once.
 
     Args:
         turns: whether the head does: then one of many cameras sees it from several sides, and a share of the views,
@@ -36,13 +36,15 @@ def for_cameras(
     least = max(volume.min_view_share, few.views / count)
     if count > few.at_most and turns:
         return params, ()
+    shared = min(max(few.shared_views, few.views + 1), count) if plates else few.views + 1
     if count > few.at_most:
-        return params.model_copy(update={"volume": volume.model_copy(update={"min_view_share": least})}), ()
-    shared = min(few.shared_views, count) if plates else few.views + 1
+        shared = few.views + 1
     seen = {
         "min_view_share": least,
         "shared_view_share": max(volume.shared_view_share, shared / count),
     }
+    if count > few.at_most:
+        return params.model_copy(update={"volume": volume.model_copy(update=seen)}), ()
     stricter: dict[str, Section] = {}
     if plates:
         seen["opacity_weight"] = max(volume.opacity_weight, few.opacity_weight)

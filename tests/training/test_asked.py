@@ -51,7 +51,14 @@ def test_those_that_are_left_out_lie_among_the_others(tmp_path: Path, cameras: i
     assert cameras == 3 or (train[0] not in out and train[-1] not in out)
 
 
-@pytest.mark.parametrize(("gain", "kind"), [(-0.5, "room_not_fitted"), (0.5, "room_fitted")])
+def test_never_all_cameras_are_left_out_and_one_or_two_are_not_asked(tmp_path: Path) -> None:
+    assert len(left_out(make_scene(tmp_path / "four", OPAQUE, cameras=5, size=4, frames=1), 1)) == 3
+    for cameras in (2, 3):  # one of them is held out
+        scene = make_scene(tmp_path / str(cameras), OPAQUE, cameras=cameras, size=4, frames=1)
+        assert room_gain(scene, PARAMS, tqdm(disable=True, total=0)) == 0
+
+
+@pytest.mark.parametrize(("gain", "kind"), [(-0.5, "room_not_fitted"), (0.5, "room_gains")])
 def test_there_is_a_room_where_it_gains(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gain: float, kind: str
 ) -> None:

@@ -56,3 +56,9 @@ def test_cameras_are_filled_apart() -> None:
     filled = filled_in(pictures, camera, pixel, np.isin(pixel, (44, 45)), (10, 10))
     assert filled.shape == (2, 100, 3)
     assert np.allclose(filled[0], 0.2) and np.allclose(filled[1], 0.8)
+
+
+def test_before_a_picture_that_is_covered_nothing_is_known() -> None:
+    pixel = np.arange(100)
+    filled = filled_in(np.zeros((1, 100, 3), np.uint8), pixel * 0, pixel, np.ones(100, bool), (10, 10))
+    assert np.isinf(filled).all()

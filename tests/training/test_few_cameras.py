@@ -30,6 +30,14 @@ def test_of_many_cameras_two_must_see_a_voxel_and_nothing_else_changes(cameras: 
     assert for_cameras(PARAMS, cameras, plates, turns=True) == (PARAMS, ())
 
 
+@pytest.mark.parametrize(("views", "cameras", "at_most"), [(8, 22, 10), (7, 20, 10), (2, 3, 0), (2, 5, 0), (6, 9, 10)])
+@pytest.mark.parametrize("plates", [True, False])
+def test_fog_is_thick_where_one_camera_more_sees_it(views: int, cameras: int, at_most: int, plates: bool) -> None:
+    few = PARAMS.few_cameras.model_copy(update={"views": views, "at_most": at_most, "shared_views": views + 1})
+    volume = for_cameras(PARAMS.model_copy(update={"few_cameras": few}), cameras, plates)[0].volume
+    assert volume.min_view_share < volume.shared_view_share <= 1
+
+
 @pytest.mark.parametrize("plates", [True, False])
 @pytest.mark.parametrize("cameras", [3, 5, 8, 10])
 def test_of_few_cameras_two_must_see_a_voxel(cameras: int, plates: bool) -> None:

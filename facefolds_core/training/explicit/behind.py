@@ -17,7 +17,7 @@ def filled_in(
     opaque: NDArray[np.bool_],
     size: tuple[int, int],
 ) -> Image:
-    """(C, H W, 3) in [0, 1]: pictures, and `fill`ed in what layers cover in them.
+    """(C, H W, 3) in [0, 1]: pictures, and `fill`ed in what layers cover in them; infinite where they cover all.
 
     Args:
         pictures: (C, H W, 3), of one frame.
@@ -29,7 +29,10 @@ def filled_in(
     for position, flat in enumerate(pictures):
         mine = camera == position
         clear = ~covered(pixel[mine], opaque[mine], size)
-        filled[position] = fill(flat.reshape(*size, 3).astype(np.float32) / 255, clear).reshape(-1, 3)
+        if clear.any():
+            filled[position] = fill(flat.reshape(*size, 3).astype(np.float32) / 255, clear).reshape(-1, 3)
+        else:
+            filled[position] = np.inf
     return filled
 
 

@@ -36,12 +36,12 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     cut_out = all(view.photo.matte is not None for view in plain.views)
     if plain.psnr < params.room.needed_below and not cut_out:
         gain, asked = room_gain(scene, params, bar), params.room
-        about = {"psnr": plain.psnr, "under": asked.needed_below, "gain": gain}
+        about = {"psnr": plain.psnr, "under": asked.needed_below}
         if gain >= asked.least_gain:
-            notes.append(fact("room_fitted", **about))
+            notes += [fact("room_fitted", **about), fact("room_gains", gain=gain)]
             found = _clear_of_fog(_with_room(scene, params, bar, notes), params.start, notes)
             return found, tuple(notes)
-        notes.append(fact("room_not_fitted", **about, least=asked.least_gain))
+        notes.append(fact("room_not_fitted", **about, gain=gain, least=asked.least_gain))
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
