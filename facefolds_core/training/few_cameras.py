@@ -21,13 +21,14 @@ def for_cameras(
     """The parameters of a training of so many cameras, and what is to be said of them.
 
     A voxel must be seen by `few_cameras.views` of them, but for turning heads before more than `few_cameras.at_most`,
-    with which nothing else changes; `views` cameras or fewer are left as they are. Applied twice they are as applied once.
+    with which nothing else changes; `views` cameras or fewer are left as they are. Applied twice they are as applied
+    once.
 
     Args:
-        turns: whether the head does: then one of many cameras sees it from several sides, and a share of the views,
-            which are counted in each frame of the volume, is enough.
         plates: whether each has a clean plate. Where it is not known what stands behind the subject a price on opacity
             takes the subject for the room: then only single views are not believed, and texels are larger.
+        turns: whether the head does: then one of many cameras sees it from several sides, and a share of the views,
+            which are counted in each frame of the volume, is enough.
     """
     few = params.few_cameras
     volume, geometry, textures = params.volume, params.geometry, params.textures
