@@ -24,11 +24,9 @@ from facefolds_core.params import CaptureParams, NormalizeParams, Subject
 from facefolds_core.source_code import digest_of_file
 
 EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "-85": -85.0}
-"""Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; the outermost training cameras lie
-at 72."""
+"""Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; training cameras reach 72."""
 EXTREME_ELEVATION = 5.0
-MAX_AZIMUTH = 120.0
-"""Where the head's centre is found a little off, +-85 degrees lie beyond the usual 90."""
+PLAN = NormalizeParams(max_azimuth=120)  # where the head's centre is found a little off, +-85 degrees are beyond 90
 
 
 @dataclass(frozen=True)
@@ -75,8 +73,7 @@ def shoot(film: Film, cache: Path) -> Shots:
         with TemporaryDirectory() as raw:
             write_capture(raw, params, options=film.options, rig=ActorRig((*rig, *extremes)))
             capture = read_multiface(Path(raw), subject, params.frame_rate)
-            plan = NormalizeParams(max_azimuth=MAX_AZIMUTH)
-            write_plan(plan_scene(capture, "actor", subject, plan, folder), plan)
+            write_plan(plan_scene(capture, "actor", subject, PLAN, folder), PLAN)
     return read_shots(folder)
 
 
