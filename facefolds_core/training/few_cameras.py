@@ -32,19 +32,15 @@ def for_cameras(
     """
     few = params.few_cameras
     volume, geometry, textures = params.volume, params.geometry, params.textures
-    if count <= few.views:
+    many = count > few.at_most
+    if count <= few.views or (many and turns):
         return params, ()
-    least = max(volume.min_view_share, few.views / count)
-    if count > few.at_most and turns:
-        return params, ()
-    shared = min(max(few.shared_views, few.views + 1), count) if plates else few.views + 1
-    if count > few.at_most:
-        shared = few.views + 1
+    shared = few.views + 1 if many or not plates else min(max(few.shared_views, few.views + 1), count)
     seen = {
-        "min_view_share": least,
+        "min_view_share": max(volume.min_view_share, few.views / count),
         "shared_view_share": max(volume.shared_view_share, shared / count),
     }
-    if count > few.at_most:
+    if many:
         return params.model_copy(update={"volume": volume.model_copy(update=seen)}), ()
     stricter: dict[str, Section] = {}
     if plates:
