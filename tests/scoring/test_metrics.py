@@ -1,4 +1,4 @@
-"""PSNR and SSIM against closed forms and torchmetrics."""
+"""PSNR and SSIM against closed forms and torchmetrics; SSIM of high frequencies."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 import torch
 from torchmetrics.functional.image import peak_signal_noise_ratio, structural_similarity_index_measure
 
+from facefolds_core.scoring.detail import ssim_high
 from facefolds_core.scoring.metrics import MAX_PSNR, psnr, shown, ssim, ssim_map
 
 
@@ -67,6 +68,7 @@ def test_empty_masks_have_no_scores() -> None:
     empty = np.zeros(truth.shape[:2])
     assert psnr(image, truth, empty) is None
     assert ssim(image, truth, empty) is None
+    assert ssim_high(image, truth, empty) is None
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.1, 0.5])
@@ -105,6 +107,29 @@ def test_ssim_of_an_image_smaller_than_its_window_is_finite() -> None:
     image, truth = pair(3, 2)
     assert ssim_map(image, truth).shape == (3, 2)
     assert np.isfinite(ssim_map(image, truth)).all()
+
+
+def test_ssim_of_high_frequencies_ignores_what_a_wide_blur_keeps() -> None:
+    """A shift and a slope of brightness are low frequencies; waves of four pixels are not."""
+    _, truth = pair(64, 64)
+    x = np.arange(64)
+    slope = (0.002 * x)[None, :, None]
+    waves = 0.1 * np.sin(np.pi * x / 2)[None, :, None]
+    assert ssim_high(truth, truth) == pytest.approx(1, abs=1e-12)
+    smooth, wavy = ssim_high(truth + 0.1 + slope, truth), ssim_high(truth + waves, truth)
+    assert smooth is not None and smooth > 0.999
+    assert wavy is not None and wavy < 0.6
+
+
+def test_ssim_of_high_frequencies_ignores_what_the_mask_hides() -> None:
+    image, truth = pair(64, 64)
+    mask = np.zeros(truth.shape[:2])
+    mask[:32] = 1
+    changed = image.copy()
+    changed[32:] = 1 - changed[32:]
+    assert ssim_high(changed, truth, mask) == ssim_high(image, truth, mask)
+    ones = np.ones(truth.shape[:2])
+    assert ssim_high(image, truth, ones) == pytest.approx(ssim_high(image, truth), abs=1e-12)
 
 
 def test_shown_clips_and_rounds_to_eight_bits() -> None:
