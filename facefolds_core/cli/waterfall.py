@@ -8,15 +8,17 @@ from typing import Annotated
 
 import typer
 
-from facefolds_core.captures.scene import read_scene
+from facefolds_core.captures.chosen_mattes import scored_scene
 from facefolds_core.cli.report import evaluated_subjects
-from facefolds_core.config import read_train
+from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
+from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.waterfall import waterfall
+from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.scoring.waterfall import Step, waterfall
 from facefolds_core.spacing import spread
 
 
@@ -30,14 +32,27 @@ def command(
     """Score every step of the export, from the model to the files that ship: waterfall/waterfall.json."""
     with report_user_errors("waterfall"):
         for folders in map(SubjectFolders, subjects or evaluated_subjects(data)):
-            scene = read_scene(folders.scene)
-            model = load_model(folders.model, device_of(read_train(folders.config)))
-            steps = waterfall(scene, model, folders, spread(range(scene.num_frames), frames))
+            scene, device = scored_scene(folders), device_of(read_train(folders.config))
+            model, perceptual = load_model(folders.model, device), find_perceptual(device)
+            numbers, params = spread(range(scene.num_frames), frames), read_stage(EvaluateParams, folders.config)
+            steps = waterfall(scene, model, folders, numbers, perceptual, params)
             with atomic_folder(folders.waterfall.parent) as temporary:
                 write_json(
                     temporary / folders.waterfall.name,
                     {"subject": folders.root.name, "steps": [asdict(step) for step in steps]},
                 )
-            for step in steps:
-                size = step.mesh_bytes + step.texture_bytes
-                typer.echo(f"{folders.root.name} {step.name:10s} {step.psnr:6.2f} dB {size:12d} bytes")
+            typer.echo("\n".join(lines(folders.root.name, steps)))
+
+
+def lines(subject: str, steps: list[Step]) -> list[str]:
+    """A step each, aligned, below what the columns are."""
+    width = max(len(subject), len("subject"))
+    head = f"{'subject':{width}s} {'step':9s}  PSNR, dB  to model    SSIM  SSIM of high  ST-LPIPS         bytes"
+    return [head, *(f"{subject:{width}s} {_cells(step)}" for step in steps)]
+
+
+def _cells(step: Step) -> str:
+    to_model = f"{step.psnr_to_model:8.2f}" if step.psnr_to_model is not None else f"{'-':>8s}"
+    st_lpips = f"{step.st_lpips:8.4f}" if step.st_lpips is not None else f"{'-':>8s}"
+    figures = f"{step.psnr:8.2f}  {to_model}  {step.ssim:.4f}  {step.ssim_high:12.4f}  {st_lpips}"
+    return f"{step.name:9s}  {figures}  {step.mesh_bytes + step.texture_bytes:12d}"

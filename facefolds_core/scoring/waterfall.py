@@ -1,55 +1,62 @@
-"""What each step of the export loses: from the model to the files that ship.
+"""What each step of the export loses: from the model to the files that ship, as `evaluate` scores them.
 
 It is measured on the cameras for validation, and on the held-out ones where there are none.
 
-Every step is rendered from what its stage left in data/<subject>, so the steps are those of the asset that is there.
+Every step is rendered from what its stage left in data/<subject>: the steps are those of the asset that is there. All
+are shown with the reflection that layers and frames share:
+- the model with its own (`ModelView`);
+- `sampled` to `baked` with the maps that `sample` took from it (`samples/grids.npz`): float32, before they are coded,
+  looked up at each step's own hits by the reference renderer (`rendering.reflection`);
+- `shipped` with the asset's, decoded from its picture of 8 bits.
+
+Where the export has none, the model is shown without what depends on the direction: its view branch ships with nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import Scene
-from facefolds_core.export.decimation import exact_st
-from facefolds_core.export.sheets import full_meshes
-from facefolds_core.export.stores import holds_sheets, read_grids, read_meshes, read_sheets, read_surfaces
-from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.cameras import Camera
-from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.errors import UserError
+from facefolds_core.export.stores import read_grids
 from facefolds_core.model import RadianceManifolds
+from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
-from facefolds_core.rendering import Hits, composite
-from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.scoring.detail import ssim_high
 from facefolds_core.scoring.evaluation import frame_rate_factor
-from facefolds_core.scoring.metrics import Array, psnr, shown
-from facefolds_core.scoring.model_view import ModelView
+from facefolds_core.scoring.export_steps import Eye, Source, shipped_step, steps_on_disk
+from facefolds_core.scoring.images import Rendering, Values, region_of, region_scores
+from facefolds_core.scoring.metrics import psnr, shown
+from facefolds_core.scoring.perceptual import Perceptual
+from facefolds_core.scoring.posed import PosedView
+from facefolds_core.scoring.truths import Truths
 
 STEPS = ("model", "sampled", "meshed", "decimated", "resampled", "baked", "shipped")
-"""The model without its view branch; its sampled textures on its exact surfaces; on the reconstructed surfaces; on the
-decimated meshes; textures resampled to R^t; textures fitted to the meshes; Draco and video."""
-
-Frame = Callable[[int], Sequence[NDArray[np.uint8]]]
+"""The model; its sampled textures on its exact surfaces; on the reconstructed surfaces; on the decimated meshes;
+textures resampled to R^t; textures fitted to the meshes; Draco, video, and the reflection in 8 bits."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step, mean over all held-out images.
+    """One step, mean over all images, against the photos, over the subject (docs/reference/metrics.md).
 
     Attributes:
         name: of STEPS.
-        psnr: against the photos, dB, over the subject where the capture has masks.
-        psnr_to_model: against the step `model`, dB, over the same pixels; None for that step.
+        psnr: dB.
+        psnr_to_model: against the step `model` in place of the photos; None for that step.
         triangles: of all layers; 0 where there are none.
-        mesh_bytes, texture_bytes: of the files that ship; before, of the bare arrays (positions, texture coordinates,
-            indices; 8-bit RGBA of all frames).
+        mesh_bytes, texture_bytes: of the files that ship, the reflection among the textures; before, of the bare arrays
+            (positions, texture coordinates, indices; 8-bit RGBA of all frames).
+        ssim, ssim_high: SSIM, and that of high frequencies.
+        st_lpips: None where the package of its weights is not installed.
     """
 
     name: str
@@ -58,124 +65,89 @@ class Step:
     triangles: int
     mesh_bytes: int
     texture_bytes: int
+    ssim: float
+    ssim_high: float
+    st_lpips: float | None
 
 
-@dataclass(frozen=True)
-class _Source:
-    """What a step renders: `hits` of a camera, and textures of a frame."""
-
-    name: str
-    hits: Callable[[Camera], Hits]
-    frame: Frame
-    triangles: int
-    mesh_bytes: int
-    texture_bytes: int
-
-
-def waterfall(scene: Scene, model: RadianceManifolds, folders: SubjectFolders, frames: Sequence[int]) -> list[Step]:
-    """All steps of `STEPS`, in order.
+def waterfall(
+    scene: Scene,
+    model: RadianceManifolds,
+    folders: SubjectFolders,
+    frames: Sequence[int],
+    perceptual: Perceptual,
+    params: EvaluateParams | None = None,
+) -> list[Step]:
+    """All steps of `STEPS`, in order; shows a progress bar.
 
     Args:
         folders: of the subject, with all export stages run.
         frames: indices of the frames that are rendered, where the camera has a photo.
+        perceptual: of which ST-LPIPS is measured.
+        params: what shows where a rendering is transparent; by default black.
 
     Raises:
-        UserError: if there is no photo to compare with.
+        UserError: if a stage's file is missing or damaged, or there is no photo of the subject to compare with.
     """
-    sources = list(_sources(scene, model, folders))
-    truths, masks = scene.open_frames(), scene.open_masks()
-    to_truth: dict[str, list[float]] = {name: [] for name in STEPS}
-    to_model: dict[str, list[float]] = {name: [] for name in STEPS}
-    cameras = scene.indices(scene.choice_split)
-    with progress(total=len(cameras) * len(frames), desc="waterfall", unit="image") as bar:
-        for index in cameras:
-            for k in frames:
-                if k == frames[0] or scene.poses is not None:
-                    camera = scene.camera_in_head(index, k)
-                    view = ModelView(model, camera)
-                    hits = [source.hits(camera) for source in sources]
-                truth = truths.image(index, k) / 255.0
-                has_mask = masks is not None and (index, k) in masks
-                mask = masks.image(index, k)[..., 0] / 255.0 if masks is not None and has_mask else None
-                reference = shown(view.render(float(k))[1])
-                _add(to_truth["model"], reference, truth, mask)
-                for source, found in zip(sources, hits, strict=True):
-                    picture = shown(composite(found, source.frame(k))[0])
-                    _add(to_truth[source.name], picture, truth, mask)
-                    _add(to_model[source.name], picture, reference, mask)
+    background = (EvaluateParams() if params is None else params).background
+    grids, asset, truths = read_grids(folders.samples / "grids.npz"), read_asset(folders.asset), Truths(scene)
+    factor = frame_rate_factor(scene, asset)
+    sources = [*steps_on_disk(grids, model, folders), shipped_step(asset, factor)]
+    caster, perceptual = AssetCaster(asset), replace(perceptual, lpips=None, cvvdp=None)
+    keys = [(c, k) for c in scene.indices(scene.choice_split) for k in frames if (c, k) in truths]
+    kind = truths.matte_kind(keys)
+    found: dict[str, list[Values]] = {name: [] for name in STEPS}
+    with progress(total=len(keys), desc="waterfall", unit="image") as bar:
+        for index, own in groupby(keys, key=lambda key: key[0]):
+            posed = PosedView(scene, model, asset, caster, scene.cameras[index], factor)
+            numbers = [k for _, k in own]
+            for k, renderings in _rendered(scene, index, posed, sources, numbers, grids.reflection is not None):
+                truth = truths.at(index, k)
+                pictures = {name: shown(one.over(background)) for name, one in renderings.items()}
+                region = region_of(kind, truth, renderings)
+                for name, values in region_scores(pictures, truth.picture, region, perceptual).items():
+                    values["ssim_high"] = ssim_high(pictures[name], truth.picture, region)
+                    values["psnr_to_model"] = psnr(pictures[name], pictures["model"], region)
+                    found[name].append(values)
                 bar.update()
-    steps = [Step("model", float(np.mean(to_truth["model"])), None, 0, 0, 0)]
-    for source in sources:
-        truth_db, model_db = (float(np.mean(values[source.name])) for values in (to_truth, to_model))
-        sizes = (source.triangles, source.mesh_bytes, source.texture_bytes)
-        steps.append(Step(source.name, truth_db, model_db, *sizes))
+    return _steps(found, sources, scene)
+
+
+def _rendered(
+    scene: Scene, index: int, posed: PosedView, sources: Sequence[Source], frames: Sequence[int], lit: bool
+) -> Iterator[tuple[int, dict[str, Rendering]]]:
+    """Each of the frames by all steps; `lit`: the model with its reflection."""
+    looks = None
+    for k in frames:
+        posed.turn(k)
+        if looks is None or scene.poses is not None:
+            to_room = None if scene.poses is None else scene.poses.at(k).rotation
+            eye = Eye(scene.camera_in_head(index, k), to_room, posed)
+            looks = [source.look(eye) for source in sources]
+        with_view, without_view, alpha = posed.model.render(float(k))
+        renderings = {"model": Rendering(with_view if lit else without_view, alpha)}
+        for source, (hits, added) in zip(sources, looks, strict=True):
+            renderings[source.name] = Rendering(*composite(hits, source.textures(k), added=added))
+        yield k, renderings
+
+
+def _steps(found: Mapping[str, Sequence[Values]], sources: Sequence[Source], scene: Scene) -> list[Step]:
+    if not found["model"]:
+        raise UserError(
+            "no photo shows the subject: there is nothing to compare the steps with",
+            file=scene.folder / "frames.arrow",
+            remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
+        )
+    sizes = defaultdict(lambda: (0, 0, 0), {s.name: (s.triangles, s.mesh_bytes, s.texture_bytes) for s in sources})
+    steps = []
+    for name in STEPS:
+        means = {metric: _mean([one[metric] for one in found[name]]) for metric in found[name][0]}
+        to_model = None if name == "model" else means["psnr_to_model"]
+        psnr_, ssim_, high = (means[metric] or 0.0 for metric in ("psnr", "ssim", "ssim_high"))
+        steps.append(Step(name, psnr_, to_model, *sizes[name], ssim_, high, means["st_lpips"]))
     return steps
 
 
-def _add(values: list[float], image: Array, truth: Array, mask: Array | None) -> None:
-    value = psnr(image, truth, mask)
-    if value is not None:
-        values.append(value)
-
-
-def _sources(scene: Scene, model: RadianceManifolds, folders: SubjectFolders) -> Iterator[_Source]:
-    grids = read_grids(folders.samples / "grids.npz")
-    surfaces, window = folders.surfaces / "surfaces.npz", grids.window(0)
-    if holds_sheets(surfaces):
-        fine = full_meshes(read_sheets(surfaces))
-    else:
-        fine = [
-            TexturedMesh(s.vertices, s.faces, exact_st(s.vertices, window, grids.chart))
-            for s in read_surfaces(surfaces)
-        ]
-    coarse = read_meshes(folders.meshes / "meshes.npz")
-    stores = [
-        FrameStore(folder / "textures.arrow") for folder in (folders.samples, folders.resampled, folders.textures)
-    ]
-    exact = _Source("sampled", lambda camera: exact_hits(model, camera, window), _frame(stores[0]), 0, 0, 0)
-    yield exact
-    for name, meshes, store in (
-        ("meshed", fine, stores[0]),
-        ("decimated", coarse, stores[0]),
-        ("resampled", coarse, stores[1]),
-        ("baked", coarse, stores[2]),
-    ):
-        yield _of_meshes(name, meshes, store)
-    yield _of_asset(read_asset(folders.asset), scene)
-
-
-def _of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> _Source:
-    sizes = sum(mesh.vertices.nbytes + mesh.faces.nbytes + mesh.st.nbytes for mesh in meshes)
-    texels = len(store.keys()) * store.height * store.width * store.channels
-    triangles = sum(len(mesh.faces) for mesh in meshes)
-    return _Source(name, lambda camera: cast_layers(camera, meshes), _frame(store), triangles, sizes, texels)
-
-
-def _of_asset(asset: Asset, scene: Scene) -> _Source:
-    step = frame_rate_factor(scene, asset)
-    level = asset.manifest.full
-    files = sum(layer.bytes for layer in level.layers)
-    triangles = sum(layer.triangles for layer in level.layers)
-    return _Source(
-        "shipped",
-        lambda camera: cast_layers(camera, asset.layers),
-        lambda k: asset.frame(k * step),
-        triangles,
-        files,
-        level.texture.videos[0].bytes,
-    )
-
-
-def _frame(store: FrameStore) -> Frame:
-    layers = sorted({layer for layer, _ in store})
-    return lambda k: [store.image(layer, k) for layer in layers]
-
-
-def exact_hits(model: RadianceManifolds, camera: Camera, window: Window) -> Hits:
-    """Where a camera's rays meet the model's own surfaces, inside a window of the textures."""
-    origins, directions = (torch.tensor(np.reshape(part, (-1, 3))).to(model.centre) for part in camera.rays())
-    crossings = model.crossings(origins, directions)
-    st = uv_to_st(model.chart.uv(crossings.points)[0], window).cpu().numpy()
-    hit = crossings.hit.cpu().numpy() & (st >= 0).all(-1) & (st <= 1).all(-1)
-    shape = (camera.height, camera.width, model.num_layers)
-    return Hits(hit.reshape(shape), np.where(hit[..., None], st, 0).astype(np.float32).reshape(*shape, 2))
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

@@ -93,9 +93,10 @@ def test_scores(project: TinyProject) -> None:
 
 
 def test_waterfall(project: TinyProject) -> None:
-    facefolds("waterfall", "data/actor", "--frames", "1")
+    said = facefolds("waterfall", "data/actor", "--frames", "1")
     steps = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)["steps"]
     assert [step["name"] for step in steps] == list(STEPS)
+    assert all(0 < step["ssim_high"] < 1 and f"{step['ssim']:.4f}" in said for step in steps)
     shipped = json.loads((project.root / ASSET / "manifest.json").read_text())["levels"][-1]
     assert steps[-1]["mesh_bytes"] == sum(layer["bytes"] for layer in shipped["layers"])
 

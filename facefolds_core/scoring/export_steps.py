@@ -1,0 +1,146 @@
+"""What each step of the export has left in data/<subject>, as it is looked at: hits, textures, reflection, sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from facefolds_core.asset import Asset
+from facefolds_core.export.decimation import exact_st
+from facefolds_core.export.sheets import full_meshes
+from facefolds_core.export.stores import Grids, holds_sheets, read_meshes, read_sheets, read_surfaces
+from facefolds_core.frame_store import FrameStore
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.model import RadianceManifolds
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.rendering import Hits
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.rendering.reference import Image
+from facefolds_core.rendering.reflection import reflected_colours
+from facefolds_core.scoring.posed import PosedView
+
+Textures = Sequence[NDArray[np.uint8]]
+Look = tuple[Hits, Sequence[Image] | None]
+"""Hits of a camera, and what the reflection adds to each layer's: what `composite` takes."""
+
+
+@dataclass(frozen=True)
+class Eye:
+    """Where one looks from.
+
+    Attributes:
+        camera: in the head's own frame, by the scene's poses.
+        to_room: (3, 3) rotation from there to the room, which reflected light is fixed to; None where the head stands.
+        posed: the same camera's view of the model and of the asset.
+    """
+
+    camera: Camera
+    to_room: NDArray[np.float64] | None
+    posed: PosedView
+
+
+@dataclass(frozen=True)
+class Source:
+    """A step.
+
+    Attributes:
+        name: of `waterfall.STEPS`.
+        look: hits and reflection as seen from an eye.
+        textures: of a frame of the scene, N layers (h, w, 4).
+        triangles: of all layers; 0 where there are none.
+        mesh_bytes, texture_bytes: as in `waterfall.Step`.
+    """
+
+    name: str
+    look: Callable[[Eye], Look]
+    textures: Callable[[int], Textures]
+    triangles: int
+    mesh_bytes: int
+    texture_bytes: int
+
+
+def steps_on_disk(grids: Grids, model: RadianceManifolds, folders: SubjectFolders) -> Iterator[Source]:
+    """From `sampled` to `baked`. All have the reflection that `sample` took from the model, before it is coded.
+
+    Args:
+        grids: of `folders`.
+
+    Raises:
+        UserError: if a file is missing or damaged.
+    """
+    windows = [grids.window(i) for i in range(grids.num_layers)]
+    stores = [FrameStore(one / "textures.arrow") for one in (folders.samples, folders.resampled, folders.textures)]
+
+    def lit(cast: Callable[[Camera], Hits]) -> Callable[[Eye], Look]:
+        def look(eye: Eye) -> Look:
+            hits, maps = cast(eye.camera), grids.reflection
+            if maps is None:
+                return hits, None
+            return hits, reflected_colours(hits, eye.camera, windows, maps, eye.to_room)
+
+        return look
+
+    def of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> Source:
+        look, triangles = lit(lambda camera: cast_layers(camera, meshes)), sum(len(mesh.faces) for mesh in meshes)
+        sizes = sum(mesh.vertices.nbytes + mesh.faces.nbytes + mesh.st.nbytes for mesh in meshes)
+        texels = len(store.keys()) * store.height * store.width * store.channels
+        return Source(name, look, _textures(store), triangles, sizes, texels)
+
+    yield Source("sampled", lit(lambda camera: exact_hits(model, camera, windows[0])), _textures(stores[0]), 0, 0, 0)
+    fine, coarse = _reconstructed(grids, folders), read_meshes(folders.meshes / "meshes.npz")
+    for name, meshes, store in (
+        ("meshed", fine, stores[0]),
+        ("decimated", coarse, stores[0]),
+        ("resampled", coarse, stores[1]),
+        ("baked", coarse, stores[2]),
+    ):
+        yield of_meshes(name, meshes, store)
+
+
+def shipped_step(asset: Asset, step: int) -> Source:
+    """The files that ship, as `evaluate` looks at them: their own track and reflection.
+
+    Args:
+        step: frames of the asset a frame of the scene.
+    """
+    level = asset.manifest.full
+    pictures = level.texture.videos[0].bytes + (level.reflection.bytes if level.reflection else 0)
+    triangles, files = (sum(getattr(layer, what) for layer in level.layers) for what in ("triangles", "bytes"))
+    return Source(
+        "shipped",
+        lambda eye: (eye.posed.hits, eye.posed.glossy),
+        lambda k: asset.frame(k * step),
+        triangles,
+        files,
+        pictures,
+    )
+
+
+def _reconstructed(grids: Grids, folders: SubjectFolders) -> list[TexturedMesh]:
+    """The surfaces before decimation."""
+    path, window = folders.surfaces / "surfaces.npz", grids.window(0)
+    if holds_sheets(path):
+        return list(full_meshes(read_sheets(path)))
+    surfaces = read_surfaces(path)
+    return [TexturedMesh(s.vertices, s.faces, exact_st(s.vertices, window, grids.chart)) for s in surfaces]
+
+
+def _textures(store: FrameStore) -> Callable[[int], Textures]:
+    layers = sorted({layer for layer, _ in store})
+    return lambda k: [store.image(layer, k) for layer in layers]
+
+
+def exact_hits(model: RadianceManifolds, camera: Camera, window: Window) -> Hits:
+    """Where a camera's rays meet the model's own surfaces, inside a window of the textures."""
+    origins, directions = (torch.tensor(np.reshape(part, (-1, 3))).to(model.centre) for part in camera.rays())
+    crossings = model.crossings(origins, directions)
+    st = uv_to_st(model.chart.uv(crossings.points)[0], window).cpu().numpy()
+    hit = crossings.hit.cpu().numpy() & (st >= 0).all(-1) & (st <= 1).all(-1)
+    shape = (camera.height, camera.width, model.num_layers)
+    return Hits(hit.reshape(shape), np.where(hit[..., None], st, 0).astype(np.float32).reshape(*shape, 2))
