@@ -225,7 +225,7 @@ def stages(costs: Sequence[StageCost]) -> list[Row]:
 
 
 def waterfall(steps: Sequence[dict[str, Any]]) -> list[Row]:
-    """Steps of the export; bars start 1 dB below the least value."""
+    """Steps of the export; bars start 1 dB below the least value. Figures that an older file lacks are dashes."""
     values = [finite(step.get("psnr")) for step in steps]
     known = [value for value in values if value is not None]
     floor = min(known, default=0.0) - 1
@@ -240,6 +240,9 @@ def waterfall(steps: Sequence[dict[str, Any]]) -> list[Row]:
                 "psnr": number(value),
                 "change": NONE if change is None else f"{change:+.2f}".replace("-", "−"),
                 "worse": change is not None and change < -0.005,
+                "ssim": number(step.get("ssim"), 3),
+                "ssim_high": number(step.get("ssim_high"), 3),
+                "st_lpips": number(step.get("st_lpips"), 4),
                 "bar": share(None if value is None else value - floor, max(known, default=0.0) - floor),
                 "bytes": size(total) if total else NONE,
                 "triangles": count(step.get("triangles")) if step.get("triangles") else NONE,

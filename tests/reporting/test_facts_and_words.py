@@ -214,6 +214,13 @@ def test_the_place_of_a_camera() -> None:
     assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
 
 
+def test_figures_that_an_older_measurement_of_the_export_lacks_are_dashes() -> None:
+    old = {"name": "model", "psnr": 25.0, "triangles": 0, "mesh_bytes": 0, "texture_bytes": 0}
+    new = old | {"name": "sampled", "ssim": 0.91234, "ssim_high": 0.85, "st_lpips": 0.04567}
+    cells = [[row[key] for key in ("ssim", "ssim_high", "st_lpips")] for row in tables.waterfall([old, new])]
+    assert cells == [["–", "–", "–"], ["0.912", "0.850", "0.0457"]]
+
+
 def test_the_asset_is_held_against_the_photo_where_it_is_scored() -> None:
     truth, asset = np.full((2, 2, 3), 0.8), np.full((2, 2, 3), 0.2)
     mask = np.array([[1.0, 0.5], [0.0, 0.0]])

@@ -23,7 +23,7 @@ from facefolds_core.reporting.history import HISTORY_NAME
 from facefolds_core.reporting.index import make_index
 from facefolds_core.scoring.record import NAME
 from tests.assets import make_asset
-from tests.reporting.tiny import FRAMES, LAYERS, make_subject
+from tests.reporting.tiny import FRAMES, LAYERS, STEPS, make_subject
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +63,11 @@ def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
     page = page_of(copy)
     assert not re.search(r"\b(nan|None|inf)\b", re.sub(r"data:image[^\"]*|<script>.*</script>", "", page, flags=re.S))
     assert "reaches – dB" in page
+
+
+def test_each_step_of_the_export_has_its_figures(subject: SubjectFolders) -> None:
+    cells = r"<td>0\.900</td><td>0\.800</td><td>0\.0456</td>"
+    assert len(re.findall(cells, page_of(subject))) == len(STEPS)
 
 
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:

@@ -82,6 +82,7 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
         write_json(folders.config / f"{name}.json", section_of(name, {}).model_dump(mode="json"))
     steps = [
         {"name": name, "psnr": 25.0 - i, "triangles": 0, "mesh_bytes": 0, "texture_bytes": i}
+        | {"ssim": 0.9, "ssim_high": 0.8, "st_lpips": 0.0456}
         for i, name in enumerate(STEPS)
     ]
     write_json(folders.waterfall, {"subject": "spheres", "steps": steps})
