@@ -230,9 +230,8 @@ def sweeps(rows: Sequence[Row], path: Path) -> None:
             grid[i, -1].set_title(drawn, loc="right", fontsize=6.5, color="#555555")
         figure.suptitle("Held-out quality against cost", **TITLE)
         _legend(figure, [FRONTIER, *(name for name, _, _ in SWEEPS.values()), PAPER_NAME], fontsize=7.5)
-        commits = ", ".join(sorted({row.commit for row in measured}))
-        made = f"measured {_dates([row.date for row in measured])}, commit {commits}"
-        figure.supxlabel(f"{SWEEP_NOTE}\n{made}", **NOTE)
+        at = f"measured {_dates([r.date for r in measured])}, commit {', '.join(sorted({r.commit for r in measured}))}"
+        figure.supxlabel(f"{SWEEP_NOTE}\n{at}", **NOTE)
 
 
 def _sweep_panel(axes: Axes, cost: str, own: Mapping[str, Sequence[tuple[int, float, float]]]) -> None:
@@ -273,17 +272,19 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
 
 
 def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """A row of bars a subject: PSNR against the photos, what each step gained or lost, and the bytes."""
+    """Bars a subject: PSNR against the photos, what each step gained or lost, the bytes; below it ST-LPIPS, if any."""
     found = {name: [row for row in rows if row["subject"] == name] for name in sorted({r["subject"] for r in rows})}
-    with figure_of(path, 9, 4.2 * len(found), dpi=120) as figure:
-        for axes, (subject, steps) in zip(figure.subplots(len(found), squeeze=False)[:, 0], found.items(), strict=True):
-            values = [step["psnr"] for step in steps]
-            colours = ["#4c72b0", *["#9aa7bd"] * (len(steps) - 2), "#55a868"]
-            axes.bar([step["name"] for step in steps], values, color=colours)
+    tall = {"psnr": 4.2, "st_lpips": 2.6}
+    panels = [(s, key) for s, own in found.items() for key in tall if None not in [step.get(key) for step in own]]
+    with figure_of(path, 9, sum(tall[key] for _, key in panels), dpi=120) as figure:
+        grid = figure.subplots(len(panels), squeeze=False, height_ratios=[tall[key] for _, key in panels])[:, 0]
+        for axes, (name, key) in zip(grid, panels, strict=True):
+            steps, values, first = found[name], [step[key] for step in found[name]], key == "psnr"
+            low, high, digits = (min(values) - 1, max(values) + 0.8, 2) if first else (0, 1.45 * max(values), 4)
+            axes.bar([s["name"] for s in steps], values, color=["#4c72b0", *["#9aa7bd"] * (len(steps) - 2), "#55a868"])
             for i, (step, value) in enumerate(zip(steps, values, strict=True)):
-                change = f"\n{value - values[i - 1]:+.2f}" if i else ""
-                size = step["mesh_bytes"] + step["texture_bytes"]
-                axes.annotate(f"{value:.2f}{change}", (i, value), ha="center", va="bottom")
-                low = (i, min(values) - 0.9)
-                axes.annotate(f"{size / 1e6:.2f} MB" if size else "", low, ha="center", color="white")
-            axes.set(ylim=(min(values) - 1, max(values) + 0.8), ylabel="PSNR on held-out cameras, dB", title=subject)
+                change = f"\n{value - values[i - 1]:+.{digits}f}" if i else ""
+                size = step["mesh_bytes"] + step["texture_bytes"] if first else 0
+                axes.annotate(f"{value:.{digits}f}{change}", (i, value), ha="center", va="bottom")
+                axes.annotate(f"{size / 1e6:.2f} MB" if size else "", (i, low + 0.1), ha="center", color="white")
+            axes.set(ylim=(low, high), ylabel=METRICS[key], title=f"{name}, held out" if first else "lower is better")

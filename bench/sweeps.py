@@ -212,8 +212,7 @@ def draw(results: Results = RESULTS) -> None:
         files = sorted(Path("data").glob("*/waterfall/waterfall.json"))
         steps = [{"subject": found["subject"]} | step for found in map(read_json, files) for step in found["steps"]]
         there = results.with_name("waterfall.json")
-        measured = {step["subject"] for step in steps}
-        steps = [step for step in read_json(there) if step["subject"] not in measured] + steps
+        steps = [old for old in read_json(there) if old["subject"] not in {new["subject"] for new in steps}] + steps
         write_json(there, steps)
         charts.waterfall(steps, IMAGES / "export_waterfall.png")
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from bench import charts
 from bench.results import ROOT, Cell, Conditions, Measurement, Row, Scores, Store, commit_name
@@ -89,6 +90,16 @@ def rates() -> list[Row]:
 def test_all_that_is_kept_is_drawn(draw: Callable[..., None], kept: Callable[[], object], tmp_path: Path) -> None:
     draw(kept(), tmp_path / "chart.png")
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_st_lpips_of_the_exports_steps_is_drawn_where_all_have_it(tmp_path: Path) -> None:
+    rows, heights = read_json(KEPT / "waterfall.json"), []
+    for name in (None, "actor"):
+        measured = [row | {"st_lpips": 0.05 if row["subject"] == name else None} for row in rows]
+        charts.waterfall(measured, tmp_path / "chart.png")
+        with Image.open(tmp_path / "chart.png") as picture:
+            heights.append(picture.height)
+    assert heights[0] < heights[1]
 
 
 def test_figures_that_stand_in_the_docs_are_those_that_are_kept() -> None:
