@@ -81,9 +81,25 @@ def test_paint_that_looks_like_the_room_is_cleared_and_the_subject_stays() -> No
     state.layers[0, ..., 3] = 8.0
     shown = Shown(np.rint(255 * picture)[None, :, None].repeat(3, 2).astype(np.uint8))
     poor = painted_room(state, OneRay(), shown, 1, params.pruning).view(32, 32)
-    assert poor[:, :8].all() and not poor[:, 16:].any()
+    assert poor[:, :14].all() and not poor[:, 16:].any()  # a hem of a square is left
+    wide = params.pruning.model_copy(update={"gain_limit": 1e6})
+    assert not painted_room(state, OneRay(), shown, 1, wide).view(32, 32)[:, 12:14].any()  # the subject outshines it
     kept = params.pruning.model_copy(update={"room_gain": 0.0})
     assert not painted_room(state, OneRay(), shown, 1, kept).any()
+
+
+def test_one_speck_does_not_keep_what_looks_like_the_room() -> None:
+    """Opaque paint like a room of 0.2; of its rays one in 16 shows a speck of 0.9, or one in two does."""
+    params = ExplicitParams.model_validate({"pruning": {"room_texels": 2}})
+    row, column = np.divmod(np.arange(1024), 32)
+    state = TextureState((32, 32), 1, 1, torch.full((2, 2, 4), 0.5), torch.full((1, 1024, 3), 0.2), params)
+    state.layers[0, ..., 3] = 8.0
+    for specks_there, cleared in (((row % 4 == 0) & (column % 4 == 0), True), ((row + column) % 2 == 0, False)):
+        picture = np.where(specks_there, 0.9, 0.2)
+        state.colour[0] = torch.from_numpy(picture).float()[:, None]
+        shown = Shown(np.rint(255 * picture)[None, :, None].repeat(3, 2).astype(np.uint8))
+        poor = painted_room(state, OneRay(), shown, 1, params.pruning).view(32, 32)[4:28, 4:28]
+        assert poor.all() if cleared else not poor.any()
 
 
 def test_paint_like_the_room_goes_where_no_background_was_learnt_behind_it() -> None:

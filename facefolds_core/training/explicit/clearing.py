@@ -18,6 +18,7 @@ from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays, Views
 
 Light = Callable[[TextureState, Views, int], None]
+_LEARNT, _AROUND, _BESIDE = "learnt", "around", "beside"
 
 
 def _as_it_is(state: TextureState, views: Views, frame: int) -> None:
@@ -68,50 +69,59 @@ def painted_room(
     light: Light = _as_it_is,
     size: tuple[int, int] | None = None,
 ) -> torch.Tensor:
-    """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background.
+    """(M, 1) bool: texels in directions in which the subject shows hardly better than the bare background does.
 
     A layer that is as black as the room behind it costs nothing in any training picture, and hangs beside the head as a
     black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show, lit, over the
     background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. B is what
     was learnt, and it takes a gain of `room_gain`, or where rays lie beside the subject's `outlines` for the most part
     of `beside_gain`, to stay. Behind opaque layers nothing was learnt: where B may also be what pictures of `size` show
-    beside the layers, whichever is nearer to I, it takes `beside_layers_gain`.
+    beside the layers, whichever is nearer to I, it takes `beside_layers_gain`. One ray counts for `gain_limit` times
+    what it takes, however much it gains: else the subject's gain outshines the wing beside it.
     """
+    found = _poor(state, rays, images, passes, params, light, size)
+    if _BESIDE in found:
+        if outlines is None:
+            del found[_BESIDE]
+        else:
+            found[_BESIDE] &= _beside(state, rays, images, passes, outlines, light) < params.beside_share
     (h, w), side = state.shape, params.room_texels
-    poor = np.zeros((-(-h // side), -(-w // side)), bool)
-    around = size if params.beside_layers_gain > 0 else None
-    if params.room_gain > 0 or around is not None or (params.beside_gain > 0 and outlines is not None):
-        gain, least, mass = _gains(state, rays, images, passes, light, around)
-        if params.room_gain > 0:
-            poor = gain < params.room_gain * mass
-        if around is not None:
-            poor |= least < params.beside_layers_gain * mass
-        if outlines is not None and params.beside_gain > 0:
-            outside = _beside(state, rays, images, passes, outlines, light) < params.beside_share
-            poor |= outside & (gain < params.beside_gain * mass)
+    poor = np.any([np.zeros((-(-h // side), -(-w // side)), bool), *found.values()], 0)
     return torch.from_numpy(np.kron(poor, np.ones((side, side), bool))[:h, :w].reshape(-1, 1))
 
 
-def _gains(
-    state: TextureState, rays: Rays, images: Pictures, passes: int, light: Light, size: tuple[int, int] | None
-) -> tuple[NDArray[np.float64], ...]:
-    """Of each cell the gain over what was learnt, that over what is seen beside the layers too (the same where `size`
-    is None), and the opacity that both are weighted by."""
-    params = state.params.pruning
-    gain, least, mass = (_Cells(state.shape, params.room_texels) for _ in range(3))
+def _poor(
+    state: TextureState,
+    rays: Rays,
+    images: Pictures,
+    passes: int,
+    params: PruningParams,
+    light: Light,
+    size: tuple[int, int] | None,
+) -> dict[str, NDArray[np.bool_]]:
+    """Of each background that is asked for the cells whose rays gain less than they have to, on average by opacity."""
+    least = {_LEARNT: params.room_gain, _BESIDE: params.beside_gain}
+    least |= {_AROUND: params.beside_layers_gain} if size is not None else {}
+    least = {name: gain for name, gain in least.items() if gain > 0}
+    if not least:
+        return {}
+    mass, *cells = (_Cells(state.shape, params.room_texels) for _ in range(1 + len(least)))
+    sums = dict(zip(least, cells, strict=True))
     background = state.background.cpu().numpy()
     for frame in spread(range(len(state.steps)), params.room_frames):
         picture = images.frame(frame)
         seen, camera, pixel = _look(state, rays, picture, passes, frame, light)
         image, shown = picture[camera, pixel].astype(np.float32) / 255, (seen[:, :3] ** 2).mean(1)
         bare = ((image - background[camera, pixel]) ** 2).mean(1)
-        gain.add(seen, bare - shown)
-        mass.add(seen, np.ones(len(seen)))
-        if size is not None:
+        gains = {_LEARNT: bare - shown, _BESIDE: bare - shown}
+        if size is not None and _AROUND in least:
             beside = filled_in(picture, camera, pixel, seen[:, 3] > params.beside_layers_opacity, size)
-            bare = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1))
-        least.add(seen, bare - shown)
-    return gain.blurred(), least.blurred(), mass.blurred()
+            gains[_AROUND] = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1)) - shown
+        mass.add(seen, np.ones(len(seen)))
+        for name, one in sums.items():
+            one.add(seen, np.clip(gains[name] / least[name], -params.gain_limit, params.gain_limit))
+    whole = mass.blurred()
+    return {name: one.blurred() < whole for name, one in sums.items()}
 
 
 def _beside(
