@@ -15,10 +15,11 @@ from facefolds_core.training.explicit.loop import for_notes, for_poses
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
+from facefolds_core.training.volume.fog import clear_of_fog, closing, filled
 from facefolds_core.training.volume.outline import profile, thickness
 from facefolds_core.training.volume.room import Room
-from facefolds_core.training.volume.search import _clear_of_fog, cut_share, in_ball
-from facefolds_core.training.volume.subject import body_at_centre, positions, subject_of
+from facefolds_core.training.volume.search import cut_share, in_ball
+from facefolds_core.training.volume.subject import EMPTY, body_at_centre, positions, subject_of
 from facefolds_core.training.volume.walls import Wall
 from tests.scenes import make_scene
 
@@ -104,8 +105,8 @@ def test_fog_is_taken_to_be_denser_and_a_solid_head_is_left() -> None:
     head = _ball(0.2, 0.0, 0.0, 0.0)
     solid, fog = _volume((head, 8.0)), _volume((head, float(np.log(np.expm1(0.1)))))
     notes: list[Fact] = []
-    assert _clear_of_fog(solid, PARAMS.start, notes) is solid and not notes
-    dense = _clear_of_fog(fog, PARAMS.start, notes)
+    assert clear_of_fog(solid, PARAMS, notes) is solid and not notes
+    dense = clear_of_fog(fog, PARAMS, notes)
     assert [note.kind for note in notes] == ["fog"]
     ahead = np.zeros((1, 2))  # from the ball's centre
     middle, surface = (profile(v, Chart((0.0, 0.0, 0.0)), ahead, 0.3).radius[0] for v in (fog, dense))
@@ -115,13 +116,43 @@ def test_fog_is_taken_to_be_denser_and_a_solid_head_is_left() -> None:
 def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> None:
     notes: list[Fact] = []
     assert for_notes(PARAMS, notes) is PARAMS
-    _clear_of_fog(_volume((_ball(0.2, 0.0, 0.0, 0.0), float(np.log(np.expm1(0.1))))), PARAMS.start, notes)
+    clear_of_fog(_volume((_ball(0.2, 0.0, 0.0, 0.0), float(np.log(np.expm1(0.1))))), PARAMS, notes)
     found = for_notes(PARAMS, notes)
     assert found.background.rate == 0 < PARAMS.background.rate
     assert found.pruning.room_gain == 0 < PARAMS.pruning.room_gain
     assert found.pruning.beside_layers_gain == 0 < PARAMS.pruning.beside_layers_gain
     assert found.geometry.max_halfwidth_pixels == np.inf > PARAMS.geometry.max_halfwidth_pixels
-    assert found.losses == PARAMS.losses
+    assert found.losses.opacity == 0 < PARAMS.losses.opacity
+    assert found.losses.binarisation == PARAMS.losses.binarisation
+
+
+def test_a_hole_in_fog_is_filled_and_a_wide_dent_is_not() -> None:
+    """A head with a tunnel of 0.06 across, which the room was given, and a dent as wide as itself."""
+    points, thin = _points(), float(np.log(np.expm1(0.1)))
+    tunnel = np.hypot(points[..., 1], points[..., 2]) < 0.03
+    dent = _ball(0.2, 0.0, 0.0, 0.3)
+    head = _ball(0.2, 0.0, 0.0, 0.0) & ~dent
+    volume = _volume((head & ~tunnel, thin))
+    removed = volume.grid.copy()
+    removed[..., 0] = np.where(tunnel, thin, EMPTY)
+    found = filled(replace(volume, removed=removed), PARAMS)
+    assert found.removed is not None
+    inside = head & tunnel & _ball(0.17, 0.0, 0.0, 0.0)
+    np.testing.assert_allclose(found.grid[inside, 0], thin)
+    assert (found.removed[inside, 0] == np.float32(EMPTY)).all()
+    outside = ~_ball(0.22, 0.0, 0.0, 0.0)
+    np.testing.assert_array_equal(found.grid[outside], volume.grid[outside])
+    assert not _solid(found)[_ball(0.15, 0.0, 0.0, 0.3)].any()
+    least = filled(volume, PARAMS).grid[inside, 0]  # nothing was taken out there
+    np.testing.assert_allclose(np.logaddexp(0, least), PARAMS.subject.body_depth, rtol=1e-5)
+
+
+def test_closing_fills_what_a_ball_does_not_fit_into() -> None:
+    wall = np.ones((20, 20, 9), bool)
+    wall[8:11, 8:11] = False
+    assert closing(wall, 2.0)[..., 2:-2].all() and not closing(wall, 1.0)[9, 9].any()
+    assert not closing(np.zeros((4, 5, 6), bool), 3.0).any()
+    np.testing.assert_array_equal(closing(wall, 0.0), wall)
 
 
 def test_behind_a_turning_head_backgrounds_learn_more_slowly(tmp_path: Path) -> None:

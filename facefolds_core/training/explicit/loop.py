@@ -62,16 +62,18 @@ def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
     """The parameters of the layers' geometry and training after what the volume's said.
 
     Where the subject was fog, backgrounds stay what the room shows (`background.rate` 0): those that learn would take
-    up what is as pale as what stands behind it. Nothing is cleared for looking like the room there either, and layers
-    lie as far apart as `max_halfwidth` lets them: where the surface is nobody knows to a few pixels.
+    up what is as pale as what stands behind it. Opacity costs nothing (`losses.opacity` 0), and nothing is cleared for
+    looking like the room: it does. Layers lie as far apart as `max_halfwidth` lets them: where the surface is nobody
+    knows to a few pixels.
     """
     if not any(note.kind == "fog" for note in notes):
         return params
     background = params.background.model_copy(update={"rate": 0.0})
     off = {"room_gain": 0.0, "beside_gain": 0.0, "beside_layers_gain": 0.0}
-    pruning = params.pruning.model_copy(update=off)
+    pruning, losses = params.pruning.model_copy(update=off), params.losses.model_copy(update={"opacity": 0.0})
     geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": math.inf})
-    return params.model_copy(update={"background": background, "pruning": pruning, "geometry": geometry})
+    changed = {"background": background, "pruning": pruning, "losses": losses, "geometry": geometry}
+    return params.model_copy(update=changed)
 
 
 def for_poses(params: ExplicitParams, scene: Scene) -> ExplicitParams:

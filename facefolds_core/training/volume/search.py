@@ -11,11 +11,12 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import ExplicitParams, StartParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.volume.asked import room_gain
 from facefolds_core.training.volume.fit import Volume, VolumeFit
-from facefolds_core.training.volume.outline import thickness, visible_points
+from facefolds_core.training.volume.fog import clear_of_fog
+from facefolds_core.training.volume.outline import visible_points
 from facefolds_core.training.volume.subject import body_before, distances, positions, subject_of
 from facefolds_core.training.volume.walls import Wall, find_walls
 
@@ -39,21 +40,12 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
         about = {"psnr": plain.psnr, "under": asked.needed_below}
         if gain >= asked.least_gain:
             notes += [fact("room_fitted", **about), fact("room_gains", gain=gain)]
-            found = _clear_of_fog(_with_room(scene, params, bar, notes), params.start, notes)
+            found = clear_of_fog(_with_room(scene, params, bar, notes), params, notes)
             return found, tuple(notes)
         notes.append(fact("room_not_fitted", **about, gain=gain, least=asked.least_gain))
     for number in range(1, len(params.volume.levels)):
         plain.run(number, bar)
     return subject_of(plain.finish(), (), params), tuple(notes)
-
-
-def _clear_of_fog(volume: Volume, params: StartParams, notes: list[Fact]) -> Volume:
-    """The volume; a denser one where the subject is fog in it, which `notes` say."""
-    depth = thickness(volume, params.subject_opacity)
-    if depth <= params.fog_depth:
-        return volume
-    notes.append(fact("fog", depth=depth, over=params.fog_depth, gain=params.fog_gain))
-    return volume.denser(params.fog_gain)
 
 
 def in_ball(radius: float | None, params: ExplicitParams) -> ExplicitParams:
