@@ -89,7 +89,7 @@ WORDS = {
     "room_not_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}); a "
     "room with parallax would gain {gain:.1f} dB on cameras that its fit did not see, under {least:g}: there is none",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
-    "{gain:g} times as dense (train.start.fog_gain)",
+    "{gain:g} times as dense, its holes are filled (train.start.fog_gain, fog_holes), and opacity costs nothing",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from facefolds_core.params.base import Count, Factor, Natural, Section, Share, Weight
+from typing import Annotated
+
+from pydantic import Field
+
+from facefolds_core.params.base import Count, Natural, Section, Share, Weight
 
 
 class PruningParams(Section):
@@ -34,9 +38,9 @@ class PruningParams(Section):
     room_texels: Count = 2
     """in squares of so many texels a side."""
 
-    gain_limit: Factor = 6.0
+    gain_limit: Annotated[float, Field(gt=1, le=1e6)] = 6.0
     """One ray gains or loses at most so many times what is asked: skin beside a black wing, or a single speck in it,
-    does not keep it. Where one ray in so many gains enough, paint stays."""
+    does not keep it. Where one ray in so many gains as often what is asked, paint stays."""
 
     beside_gain: Weight = 0.003
     """The same, where the paint is seen on pixels that do not show the subject (`outlines`): there it may look less

@@ -50,11 +50,11 @@ class StartParams(Section):
 
     fog_gain: Annotated[float, Field(ge=1, le=1000)] = 10.0
     """Fog is taken to be so many times as dense: its middle lies deep within the subject, and where few cameras look it
-    is thin. 1 leaves it."""
+    is thin. 1 leaves it as thin."""
 
     fog_holes: Annotated[float, Field(ge=0, le=1)] = 0.12
     """Units. Holes and dents of such fog that a ball of this radius does not fit into are filled with what was left to
-    the room there (at least with `subject.body_depth`): where that is as pale nothing told them apart."""
+    the room there (at least with `subject.body_depth`): where that is as pale nothing told them apart. 0: none."""
 
     beside_opacity: Share = 0.3
     """Directions in which the volume is less opaque lie beside the subject: what was painted there is room, and is made

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 from unittest.mock import patch
 
 import numpy as np
@@ -16,6 +16,7 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.reflection_maps import Maps
+from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Views, trace_views
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.frames import FrameFitter
@@ -70,6 +71,24 @@ def test_frames_of_a_turning_head_are_lit_as_it_stands(made: tuple[Scene, Path, 
         fitter.fit(3, np.array([0.5, 0.5]), b"12345678")
     assert len(turned) == lit().segments.steps
     assert all(np.allclose(turn, turns.at(3).rotation) for turn in turned)  # type: ignore[arg-type]
+
+
+def test_frames_pay_for_opacity_what_their_base_paid(made: tuple[Scene, Path, Base]) -> None:
+    """The subject of this base is fog: it costs nothing, whatever the parameters say."""
+    scene, _, base = made
+    assert base.surroundings.losses == lit().losses.model_copy(update={"opacity": 0.0})
+    other = replace(base, surroundings=replace(base.surroundings, losses=lit().losses))
+    paid = list[float]()
+    step = TextureState.step
+
+    def counting(self: TextureState, *given: Any) -> float:
+        paid.append(given[4].opacity)
+        return step(self, *given)
+
+    with patch.object(TextureState, "step", counting):
+        for one in (base, other):
+            FrameFitter(scene, one, lit(), choose("cpu")).fit(3, np.array([0.5, 0.5]), b"12345678")
+    assert sorted(set(paid)) == [0.0, pytest.approx(lit().losses.opacity * lit().losses.late_opacity)]
 
 
 def test_processes_are_handed_what_is_reflected(made: tuple[Scene, Path, Base], tmp_path: Path) -> None:

@@ -143,6 +143,12 @@ def test_a_hole_in_fog_is_filled_and_a_wide_dent_is_not() -> None:
     outside = ~_ball(0.22, 0.0, 0.0, 0.0)
     np.testing.assert_array_equal(found.grid[outside], volume.grid[outside])
     assert not _solid(found)[_ball(0.15, 0.0, 0.0, 0.3)].any()
+    notes: list[Fact] = []
+    dense = clear_of_fog(replace(volume, removed=removed), PARAMS, notes)
+    assert [note.kind for note in notes] == ["fog"]
+    np.testing.assert_array_equal(dense.grid, found.denser(PARAMS.start.fog_gain).grid)
+    none = PARAMS.model_copy(update={"start": PARAMS.start.model_copy(update={"fog_holes": 0.0})})
+    assert filled(volume, none) is volume
     least = filled(volume, PARAMS).grid[inside, 0]  # nothing was taken out there
     np.testing.assert_allclose(np.logaddexp(0, least), PARAMS.subject.body_depth, rtol=1e-5)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -79,12 +79,12 @@ def painted_room(
     beside the layers, whichever is nearer to I, it takes `beside_layers_gain`. One ray counts for `gain_limit` times
     what it takes, however much it gains: else the subject's gain outshines the wing beside it.
     """
-    found = _poor(state, rays, images, passes, params, light, size)
-    if _BESIDE in found:
-        if outlines is None:
-            del found[_BESIDE]
-        else:
-            found[_BESIDE] &= _beside(state, rays, images, passes, outlines, light) < params.beside_share
+    least = {_LEARNT: params.room_gain, _BESIDE: params.beside_gain if outlines is not None else 0.0}
+    least |= {_AROUND: params.beside_layers_gain if size is not None else 0.0}
+    least = {name: gain for name, gain in least.items() if gain > 0}
+    found = _poor(state, rays, images, passes, params, light, size, least) if least else {}
+    if outlines is not None and _BESIDE in found:
+        found[_BESIDE] &= _beside(state, rays, images, passes, outlines, light) < params.beside_share
     (h, w), side = state.shape, params.room_texels
     poor = np.any([np.zeros((-(-h // side), -(-w // side)), bool), *found.values()], 0)
     return torch.from_numpy(np.kron(poor, np.ones((side, side), bool))[:h, :w].reshape(-1, 1))
@@ -98,13 +98,9 @@ def _poor(
     params: PruningParams,
     light: Light,
     size: tuple[int, int] | None,
+    least: Mapping[str, float],
 ) -> dict[str, NDArray[np.bool_]]:
-    """Of each background that is asked for the cells whose rays gain less than they have to, on average by opacity."""
-    least = {_LEARNT: params.room_gain, _BESIDE: params.beside_gain}
-    least |= {_AROUND: params.beside_layers_gain} if size is not None else {}
-    least = {name: gain for name, gain in least.items() if gain > 0}
-    if not least:
-        return {}
+    """Of each background of `least` the cells whose rays gain less than that on average, by their opacity."""
     mass, *cells = (_Cells(state.shape, params.room_texels) for _ in range(1 + len(least)))
     sums = dict(zip(least, cells, strict=True))
     background = state.background.cpu().numpy()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.facts import Fact
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import ExplicitParams, LossParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
@@ -94,12 +94,14 @@ class Surroundings:
         gains: (C, 3) of the training cameras that are left.
         background: (C, pixels, 3) float32, of the same.
         rate: the learning rate that it ended with.
+        losses: its own, after `for_notes`.
     """
 
     splits: tuple[Split, ...]
     gains: NDArray[np.float64]
     background: NDArray[np.float32]
     rate: float
+    losses: LossParams
 
 
 def fit_with_surroundings(
@@ -155,5 +157,5 @@ def fit_with_surroundings(
     draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
     assert trainer.state is not None
     background = trainer.state.background.cpu().numpy()
-    surroundings = Surroundings(cameras.scene.splits, cameras.gains, background, trainer.rate)
+    surroundings = Surroundings(cameras.scene.splits, cameras.gains, background, trainer.rate, own.losses)
     return Trained(model, spec, report, trainer.summary(spec), draw), surroundings

@@ -23,7 +23,7 @@ from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, read_spec
 from facefolds_core.model.tensor_files import read_tensors, write_tensors
-from facefolds_core.params import ExplicitParams, ReflectionParams
+from facefolds_core.params import ExplicitParams, LossParams, ReflectionParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.explicit.reflection_maps import Maps
@@ -166,7 +166,7 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
         }
         # One entry: safetensors writes several in any order, and equal bases are to be equal files.
-        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
+        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate, "losses": found.losses.model_dump()})}
         write_tensors(temporary / "surroundings.safetensors", tensors, about)
         shutil.copytree(log, temporary / LOG)
 
@@ -190,7 +190,11 @@ def read_base(folder: Path, fingerprint: str) -> Base:
     tensors, metadata = read_tensors(folder / "surroundings.safetensors", _REMEDY)
     about = json.loads(metadata["about"])
     surroundings = Surroundings(
-        tuple(about["splits"]), tensors["gains"].numpy(), tensors["background"].numpy(), about["rate"]
+        tuple(about["splits"]),
+        tensors["gains"].numpy(),
+        tensors["background"].numpy(),
+        about["rate"],
+        LossParams.model_validate(about["losses"]),
     )
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 

@@ -90,7 +90,7 @@ class FrameFitter:
         views = self._rays(frame, random)
         texels = state.shape[0] * state.shape[1]
         parts = max(1, int(views.count / (params.textures.rays_per_texel * texels)))
-        losses, steps = params.losses, params.segments.steps
+        losses, steps = self.base.surroundings.losses, params.segments.steps
         weights = LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, params.textures.min_alpha)
         phases: list[int] = []
         rays, errors, images = 0, [], Shown(self.images.frame(frame))

@@ -30,25 +30,30 @@ def clear_of_fog(volume: Volume, params: ExplicitParams, notes: list[Fact]) -> V
 
 def filled(volume: Volume, params: ExplicitParams) -> Volume:
     """With at least `body_depth` in holes of the subject and dents narrower than twice `fog_holes`: where what stands
-    behind is as pale, nothing speaks for the subject, and it is taken for the room."""
+    behind is as pale, nothing speaks for the subject, and it is taken for the room. `volume` itself if it has none."""
     least = params.subject.body_depth
     body = np.logaddexp(0, volume.grid[..., 0]) > least
     hole = closing(body, params.start.fog_holes / volume.voxel) & ~body
+    if not hole.any():
+        return volume
     grid = volume.grid.copy()
     removed = None if volume.removed is None else volume.removed.copy()
     if removed is not None:
         there = hole & (removed[..., 0] > grid[..., 0])
         grid[there] = removed[there]
         removed[hole, 0] = EMPTY
-    grid[hole, 0] = np.maximum(grid[hole, 0], math.log(math.expm1(least)))
+    grid[hole, 0] = np.maximum(grid[hole, 0], math.log(math.expm1(max(least, 1e-12))))
     return replace(volume, grid=grid, removed=removed)
 
 
 def closing(body: Bool, radius: float) -> Bool:
     """Morphological closing of (X, Y, Z) by a ball, radius in voxels; what lies outside the grid is empty."""
-    margin = math.ceil(radius) + 1
-    apart = ndimage.distance_transform_edt(~np.pad(body, margin))
-    closed = ndimage.distance_transform_edt(apart <= radius) > radius
-    inner = slice(margin, -margin)
-    found: Bool = (closed[inner, inner, inner] | body) & bool(body.any())
+    found = body.copy()
+    if radius > 0 and body.any():
+        (box,) = ndimage.find_objects(body.astype(np.int8))  # what is closed lies within the hull of what there is
+        margin = math.ceil(radius) + 1
+        apart = ndimage.distance_transform_edt(~np.pad(body[box], margin))
+        closed = ndimage.distance_transform_edt(apart <= radius) > radius
+        inner = slice(margin, -margin)
+        found[box] |= closed[inner, inner, inner]
     return found
