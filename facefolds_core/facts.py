@@ -94,6 +94,8 @@ WORDS = {
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
+    "smooth_reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not "
+    "see, if its maps are {times:g} times as smooth as elsewhere ({fine:.2f} dB with finer ones)",
     "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "in_segments": "{frames} frames, trained as {segments} segments over a base of {keys} key frames (fit.json: "
     "key_frames)",

@@ -58,6 +58,16 @@ def test_cameras_are_filled_apart() -> None:
     assert np.allclose(filled[0], 0.2) and np.allclose(filled[1], 0.8)
 
 
+def test_what_no_ray_reaches_is_not_taken_for_the_room() -> None:
+    """A room of 0.2; below row 8, where rays end, the subject of 0.8 goes on."""
+    row, column = np.divmod(np.arange(200), 10)
+    picture = np.where((row >= 12) | ((row >= 4) & (column > 2) & (column < 7)), 204, 51).astype(np.uint8)
+    pixel = np.flatnonzero(row < 12)
+    opaque = picture[pixel] == 204
+    filled = filled_in(picture[None, :, None].repeat(3, 2), pixel * 0, pixel, opaque, (20, 10))
+    assert np.allclose(filled, 0.2)
+
+
 def test_before_a_picture_that_is_covered_nothing_is_known() -> None:
     pixel = np.arange(100)
     filled = filled_in(np.zeros((1, 100, 3), np.uint8), pixel * 0, pixel, np.ones(100, bool), (10, 10))

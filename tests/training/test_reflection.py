@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
+from typing import Any, cast
+from unittest.mock import patch
 
 import numba
 import numpy as np
@@ -15,7 +18,8 @@ from facefolds_core.geometry.sphere_uv import texel_uv, uv_to_directions
 from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit import reference
-from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded
+from facefolds_core.training.explicit.gloss import GlossFit
+from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded, smoothed
 from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
 from facefolds_core.training.explicit.reflection_maps import (
     Maps,
@@ -156,6 +160,38 @@ def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool
     truth = _random_maps(3)
     start = _start(truth)
     assert (gain_on_cameras(_seen(truth, strength), start, PARAMS) >= PARAMS.min_gain) == helps
+
+
+@pytest.mark.parametrize(
+    ("fine", "smooth", "kind", "times"),
+    [(0.3, 0.9, "reflection", 1.0), (0.0, 0.2, "smooth_reflection", 10.0), (-0.3, 0.0, "no_reflection", 1.0)],
+)
+def test_a_smoother_one_is_asked_for_where_it_does_not_help(
+    fine: float, smooth: float, kind: str, times: float
+) -> None:
+    truth = _random_maps(3)
+    seen, start = _seen(truth, 0.2), _start(truth)
+    gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, PARAMS, None)
+    gloss.maps, gloss._normals = start, start.surface
+    state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
+
+    def gain(_: Seen, __: Maps, asked: ReflectionParams) -> float:
+        return fine if asked == PARAMS else smooth
+
+    with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
+        found = gloss._decide(cast(Any, state), seen)
+    assert (found.kind, gloss.smoother, gloss.on) == (kind, times, kind != "no_reflection")
+    assert found.values["gain"] == (fine if kind == "reflection" else smooth)
+    if kind == "reflection":
+        assert gloss.maps is start and len(state.shine) == 3
+    elif kind == "no_reflection":
+        assert gloss.maps is None and len(state.shine) == 0
+    else:
+        params = smoothed(PARAMS, 10.0)
+        expected = centred(grounded(fit_maps(seen, start, PARAMS.first_rounds, params)), seen, params)
+        assert gloss.maps is not None and len(state.shine) == len(seen.st)
+        for field in fields(Maps):
+            np.testing.assert_allclose(getattr(gloss.maps, field.name), getattr(expected, field.name), atol=1e-6)
 
 
 def test_light_that_stays_with_the_room_is_not_taken_for_the_heads() -> None:

@@ -17,7 +17,8 @@ def filled_in(
     opaque: NDArray[np.bool_],
     size: tuple[int, int],
 ) -> Image:
-    """(C, H W, 3) in [0, 1]: pictures, and `fill`ed in what layers cover in them; infinite where they cover all.
+    """(C, H W, 3) in [0, 1]: pictures where rays find the layers transparent, `fill`ed in elsewhere; infinite where
+    they are nowhere. What no ray reaches is not known to be room: below the layers' window the subject goes on.
 
     Args:
         pictures: (C, H W, 3), of one frame.
@@ -28,7 +29,9 @@ def filled_in(
     filled = np.empty(pictures.shape, np.float32)
     for position, flat in enumerate(pictures):
         mine = camera == position
-        clear = ~covered(pixel[mine], opaque[mine], size)
+        clear = np.zeros(size, bool)
+        clear.reshape(-1)[pixel[mine]] = True
+        clear &= ~covered(pixel[mine], opaque[mine], size)
         if clear.any():
             filled[position] = fill(flat.reshape(*size, 3).astype(np.float32) / 255, clear).reshape(-1, 3)
         else:

@@ -102,7 +102,7 @@ class Checkpoints:
             "psnr": trainer.psnr,
             "logged": trainer.logged,
             "events": [event.to_json() for event in trainer.events],
-            "reflection": trainer.gloss.on,
+            "reflection": [trainer.gloss.on, trainer.gloss.smoother],
             "random": trainer.random.bit_generator.state,
         }
         with atomic_folder(self.folder) as temporary:
@@ -123,12 +123,12 @@ class Checkpoints:
         middle, background = (torch.from_numpy(np.array(arrays[name])) for name in ("middle", "background"))
         lit = [f"reflection_{field.name}" for field in fields(Maps)]
         maps = Maps(*(np.array(arrays[name]) for name in lit)) if lit[0] in arrays else None
-        shine, on = np.array(arrays["shine"]), bool(about["reflection"])
+        shine, (on, smoother) = np.array(arrays["shine"]), about["reflection"]
         trainer.iteration, trainer.rays = about["counts"]
         trainer.rate, trainer.psnr = about["rate"], about["psnr"]
         trainer.logged, trainer.events, trainer.random, trainer.middle = logged, events, random, middle
         state = trainer.take_up(levels[level], background)
-        trainer.gloss.on, trainer.gloss.maps, state.shine = on, maps, shine
+        trainer.gloss.on, trainer.gloss.smoother, trainer.gloss.maps, state.shine = on, smoother, maps, shine
         for name, values in grids.items():
             torch.as_tensor(getattr(state, name)).numpy()[:] = values
         self.before = float(about["seconds"])

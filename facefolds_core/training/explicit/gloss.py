@@ -16,7 +16,7 @@ from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
-from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded
+from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded, smoothed
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Pictures, Rays, StillRays, Views
@@ -28,6 +28,7 @@ class GlossFit:
     Attributes:
         maps: as fitted last; None before the first fit, and where there is no reflection.
         on: whether there is one.
+        smoother: how many times as smooth as `params` say its maps are: 1, or what `params` have where that helps.
 
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
@@ -35,7 +36,7 @@ class GlossFit:
 
     def __init__(self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None) -> None:
         self.chart, self.window, self.params, self.poses = chart, window, params, poses
-        self.on = params.enabled
+        self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
@@ -90,20 +91,29 @@ class GlossFit:
         start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
         rounds = self.params.first_rounds if first else self.params.rounds
-        maps = grounded(fit_maps(used, start, rounds, self.params))
+        params = smoothed(self.params, self.smoother)
+        maps = grounded(fit_maps(used, start, rounds, params))
         # Textures that are still trained would follow an offset that takes up what they leave over.
-        self.maps = maps if done else centred(maps, used, self.params)
+        self.maps = maps if done else centred(maps, used, params)
         self._shine(state, seen)
 
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
-        """Whether the reflection helps on cameras that its fit did not see; if not there is none from here on."""
+        """Whether the reflection helps on cameras that its fit did not see, or a smoother one does, which is fitted
+        anew then; if not there is none from here on."""
         assert self._normals is not None
-        start = Maps.blank(self._normals, self.params)
-        gain = gain_on_cameras(self._used(seen), start, self.params)
-        self.on = gain >= self.params.min_gain
+        start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.params.min_gain
+        gain = gain_on_cameras(used, start, self.params)
+        if gain >= least:
+            return fact("reflection", gain=gain, least=least)
+        begun, self.maps, state.shine = self.maps is not None, None, np.zeros((0, 3), np.float32)
+        smoother = gain_on_cameras(used, start, smoothed(self.params, self.params.smoother))
+        self.on = smoother >= least
         if not self.on:
-            self.maps, state.shine = None, np.zeros((0, 3), np.float32)
-        return fact("reflection" if self.on else "no_reflection", gain=gain, least=self.params.min_gain)
+            return fact("no_reflection", gain=max(gain, smoother), least=least)
+        self.smoother = self.params.smoother
+        if begun:
+            self._fit(state, seen, done=False)
+        return fact("smooth_reflection", gain=smoother, fine=gain, least=least, times=self.smoother)
 
     def model(self) -> Reflection | None:
         """What the model gets."""

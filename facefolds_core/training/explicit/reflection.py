@@ -86,10 +86,7 @@ def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
 
 def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
-    smoother = {
-        name: params.asked_smoothness * getattr(params, name) for name in ("gloss_smoothness", "environment_smoothness")
-    }
-    params = params.model_copy(update=smoother)
+    params = smoothed(params, params.asked_smoothness)
     before = after = 0.0
     for fold in range(params.folds):
         out = seen.camera % params.folds == fold
@@ -102,6 +99,12 @@ def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
         before += float((clipped**2).sum())
         after += float(((clipped - added) ** 2).sum())
     return 10 * float(np.log10(before / after)) if after > 0 and before > 0 else 0.0
+
+
+def smoothed(params: ReflectionParams, factor: float) -> ReflectionParams:
+    """With the smoothnesses of gloss, offset and environment times `factor`."""
+    names = "gloss_smoothness", "environment_smoothness"
+    return params.model_copy(update={name: factor * getattr(params, name) for name in names})
 
 
 def _solve(st: Array, weight: Array, wish: Array, shape: tuple[int, ...], smoothness: float) -> Array:
