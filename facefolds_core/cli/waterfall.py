@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from facefolds_core.captures.chosen_mattes import scored_scene
+from facefolds_core.captures.scene import Split
 from facefolds_core.cli.report import evaluated_subjects
 from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import report_user_errors
@@ -17,9 +18,12 @@ from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.perceptual import find_perceptual
-from facefolds_core.scoring.waterfall import Step, waterfall
-from facefolds_core.spacing import spread
+from facefolds_core.scoring.perceptual import load_st_lpips
+from facefolds_core.scoring.truths import MatteKind
+from facefolds_core.scoring.waterfall import Step, Waterfall, waterfall
+
+CAMERAS: dict[Split, str] = {"validate": "for validation", "holdout": "held out"}
+REGIONS: dict[MatteKind, str] = {"true": "the masks", "scene": "the mattes", "found": "the model's own opacity"}
 
 
 def command(
@@ -27,21 +31,25 @@ def command(
         list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
     ] = None,
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
-    frames: Annotated[int, typer.Option(help="Frames that are rendered, evenly spread.", min=1)] = 3,
+    frames: Annotated[int, typer.Option(help="Of each camera, evenly spread over those with the subject.", min=1)] = 3,
 ) -> None:
     """Score every step of the export, from the model to the files that ship: waterfall/waterfall.json."""
     with report_user_errors("waterfall"):
+        st_lpips = load_st_lpips()
         for folders in map(SubjectFolders, subjects or evaluated_subjects(data)):
             scene, device = scored_scene(folders), device_of(read_train(folders.config))
-            model, perceptual = load_model(folders.model, device), find_perceptual(device)
-            numbers, params = spread(range(scene.num_frames), frames), read_stage(EvaluateParams, folders.config)
-            steps = waterfall(scene, model, folders, numbers, perceptual, params)
+            model, params = load_model(folders.model, device), read_stage(EvaluateParams, folders.config)
+            distance = None if st_lpips is None else st_lpips.to(device)
+            found = waterfall(scene, model, folders, frames, distance, params)
             with atomic_folder(folders.waterfall.parent) as temporary:
-                write_json(
-                    temporary / folders.waterfall.name,
-                    {"subject": folders.root.name, "steps": [asdict(step) for step in steps]},
-                )
-            typer.echo("\n".join(lines(folders.root.name, steps)))
+                write_json(temporary / folders.waterfall.name, {"subject": folders.root.name} | asdict(found))
+            typer.echo("\n".join([*lines(folders.root.name, found.steps), measured_on(found)]))
+
+
+def measured_on(found: Waterfall) -> str:
+    """Which pictures, and which pixels of them."""
+    cameras, where = CAMERAS[found.split], REGIONS[found.region]
+    return f"pictures: {found.images}, of cameras {cameras}; region: {found.region}, the pixels of {where}"
 
 
 def lines(subject: str, steps: list[Step]) -> list[str]:

@@ -177,8 +177,7 @@ class _Scorer:
         self._step = frame_rate_factor(scene, asset)
         self._truths = Truths(scene)
         self._caster = AssetCaster(asset)
-        cameras = [index for split in SCORED for index in scene.indices(split)]
-        self.keys = [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in self._truths]
+        self.keys = scored_keys(scene, self._truths)
         self.kind = self._truths.matte_kind(self.keys)
         self.kept = KeptScores(kept, digest_of_metrics(perceptual, self.kind, params.background, params.band))
 
@@ -205,6 +204,12 @@ class _Scorer:
     def _scores(self, renderings: Mapping[str, Rendering], truth: Truth) -> dict[str, Values]:
         params = self._params
         return score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
+
+
+def scored_keys(scene: Scene, truths: Truths) -> list[tuple[int, int]]:
+    """(camera, frame) of all photos that are scored, held-out cameras first."""
+    cameras = [index for split in SCORED for index in scene.indices(split)]
+    return [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in truths]
 
 
 def rendered(

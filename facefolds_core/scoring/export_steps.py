@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,7 @@ class Source:
 
     Attributes:
         name: of `waterfall.STEPS`.
-        look: hits and reflection as seen from an eye.
+        look: hits and reflection as seen from an eye; one function for all steps that look the same.
         textures: of a frame of the scene, N layers (h, w, 4).
         triangles: of all layers; 0 where there are none.
         mesh_bytes, texture_bytes: as in `waterfall.Step`.
@@ -86,21 +86,17 @@ def steps_on_disk(grids: Grids, model: RadianceManifolds, folders: SubjectFolder
 
         return look
 
-    def of_meshes(name: str, meshes: Sequence[TexturedMesh], store: FrameStore) -> Source:
+    def of_meshes(meshes: Sequence[TexturedMesh], shown: Mapping[str, FrameStore]) -> Iterator[Source]:
         look, triangles = lit(lambda camera: cast_layers(camera, meshes)), sum(len(mesh.faces) for mesh in meshes)
         sizes = sum(mesh.vertices.nbytes + mesh.faces.nbytes + mesh.st.nbytes for mesh in meshes)
-        texels = len(store.keys()) * store.height * store.width * store.channels
-        return Source(name, look, _textures(store), triangles, sizes, texels)
+        for name, store in shown.items():
+            texels = len(store.keys()) * store.height * store.width * store.channels
+            yield Source(name, look, _textures(store), triangles, sizes, texels)
 
     yield Source("sampled", lit(lambda camera: exact_hits(model, camera, windows[0])), _textures(stores[0]), 0, 0, 0)
-    fine, coarse = _reconstructed(grids, folders), read_meshes(folders.meshes / "meshes.npz")
-    for name, meshes, store in (
-        ("meshed", fine, stores[0]),
-        ("decimated", coarse, stores[0]),
-        ("resampled", coarse, stores[1]),
-        ("baked", coarse, stores[2]),
-    ):
-        yield of_meshes(name, meshes, store)
+    yield from of_meshes(_reconstructed(grids, folders), {"meshed": stores[0]})
+    coarse = read_meshes(folders.meshes / "meshes.npz")
+    yield from of_meshes(coarse, dict(zip(("decimated", "resampled", "baked"), stores, strict=True)))
 
 
 def shipped_step(asset: Asset, step: int) -> Source:

@@ -45,11 +45,13 @@ class Truths:
     def at(self, camera: int, frame: int) -> Truth:
         """Args: indices in the scene."""
         key = (camera, frame)
-        mask, matte = (_picture(store, key) for store in (self._masks, self._mattes))
+        mask, matte = (_opacity(store, key) for store in (self._masks, self._mattes))
         plate = _picture(self._plates, (camera, 0))
-        picture = self._photos.image(*key) / 255.0
-        flat = [None if one is None else one[..., 0] for one in (mask, matte)]
-        return Truth(picture, flat[0], flat[1], plate)
+        return Truth(self._photos.image(*key) / 255.0, mask, matte, plate)
+
+    def region(self, kind: MatteKind, camera: int, frame: int) -> Array | None:
+        """(H, W) opacity by which scores of this kind go; None where there is none: `found` is the model's."""
+        return _opacity({"true": self._masks, "scene": self._mattes}.get(kind), (camera, frame))
 
     def matte_kind(self, keys: Sequence[tuple[int, int]]) -> MatteKind:
         """Which opacity the scores of these (camera, frame) go by: one for all, so that no mean mixes two."""
@@ -62,3 +64,8 @@ class Truths:
 
 def _picture(store: FrameStore | None, key: tuple[int, int]) -> Array | None:
     return store.image(*key) / 255.0 if store is not None and key in store else None
+
+
+def _opacity(store: FrameStore | None, key: tuple[int, int]) -> Array | None:
+    found = _picture(store, key)
+    return None if found is None else found[..., 0]

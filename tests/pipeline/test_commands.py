@@ -94,7 +94,9 @@ def test_scores(project: TinyProject) -> None:
 
 def test_waterfall(project: TinyProject) -> None:
     said = facefolds("waterfall", "data/actor", "--frames", "1")
-    steps = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)["steps"]
+    written = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)
+    steps = written["steps"]
+    assert f"pictures: {written['images']}, " in said and f"region: {written['region']}, " in said
     assert [step["name"] for step in steps] == list(STEPS)
     assert all(0 < step["ssim_high"] < 1 and f"{step['ssim']:.4f}" in said for step in steps)
     shipped = json.loads((project.root / ASSET / "manifest.json").read_text())["levels"][-1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from facefolds_core.asset import read_asset
-from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, read_scene, write_scene
-from facefolds_core.cli.waterfall import lines
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, Split, read_scene, write_scene
+from facefolds_core.cli.waterfall import lines, measured_on
 from facefolds_core.errors import UserError
 from facefolds_core.export import steps
 from facefolds_core.export.stores import read_grids, write_grids, write_meshes, write_sheets
 from facefolds_core.export.textures import resample_store
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.grids import GridTextures
@@ -36,9 +38,13 @@ from facefolds_core.params import (
     SampleParams,
 )
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.rendering import Hits
+from facefolds_core.rendering.raster import cast_layers
+from facefolds_core.scoring import export_steps
 from facefolds_core.scoring.evaluation import evaluate
 from facefolds_core.scoring.model_view import ModelView
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
+from facefolds_core.scoring.truths import MatteKind
 from facefolds_core.scoring.waterfall import STEPS, Step, waterfall
 from tests.scenes import make_scene
 
@@ -130,9 +136,9 @@ def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return subject(tmp_path_factory.mktemp("steps") / "ball", turning() if request.param == "turning" else None)
 
 
-def measured(made: Subject, perceptual: Perceptual = NO_WEIGHTS, frames: Sequence[int] = range(FRAMES)) -> list[Step]:
+def measured(made: Subject, st_lpips: PerceptualDistance | None = None, frames: int = FRAMES) -> list[Step]:
     folders, scene, model = made
-    return waterfall(scene, model, folders, frames, perceptual)
+    return waterfall(scene, model, folders, frames, st_lpips).steps
 
 
 def test_all_steps_have_the_reflection(made: Subject) -> None:
@@ -170,13 +176,13 @@ class Difference:
 
 def test_st_lpips_is_measured_where_there_is_one(made: Subject) -> None:
     distance = cast(PerceptualDistance, Difference())
-    found = measured(made, Perceptual(distance, distance, ()), [0])
+    found = measured(made, distance, 1)
     values = [step.st_lpips for step in found]
     assert values[0] is not None and values[-1] is not None and values[0] < values[-1]
     said = lines("ball", found)
     assert len(said) == 1 + len(STEPS) and f"{values[-1]:.4f}" in said[-1]
     assert len({len(line) for line in said}) == 1
-    without = measured(made, NO_WEIGHTS, [0])
+    without = measured(made, None, 1)
     assert {step.st_lpips for step in without} == {None}
     assert [step.psnr for step in without] == [step.psnr for step in found]
     assert len({len(line) for line in lines("ball", without)}) == 1
@@ -185,13 +191,99 @@ def test_st_lpips_is_measured_where_there_is_one(made: Subject) -> None:
 def test_without_a_reflection_the_model_is_shown_without_its_view_branch(tmp_path: Path) -> None:
     folders, scene, model = subject(tmp_path / "ball")
     write_grids(folders.samples / "grids.npz", replace(read_grids(folders.samples / "grids.npz"), reflection=None))
-    found = {step.name: step for step in waterfall(scene, model, folders, [0], NO_WEIGHTS)}
+    found = {step.name: step for step in waterfall(scene, model, folders, 1, None).steps}
     assert found["model"].psnr < 25  # of photos with one
     sampled = found["sampled"].psnr_to_model
     assert sampled is not None and sampled > 40
 
 
-def test_without_photos_there_is_one_message(made: Subject) -> None:
+def test_meshes_that_are_the_same_are_cast_once_a_camera(made: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = []
+
+    def counted(camera: Camera, layers: Sequence[TexturedMesh]) -> Hits:
+        times.append(1)
+        return cast_layers(camera, layers)
+
+    monkeypatch.setattr(export_steps, "cast_layers", counted)
     folders, scene, model = made
-    with pytest.raises(UserError, match="no photo shows the subject"):
-        waterfall(scene, model, folders, [], NO_WEIGHTS)
+    found = waterfall(scene, model, folders, FRAMES, None)
+    assert len(times) == 2 * (1 if scene.poses is None else found.images)
+
+
+Masks = Mapping[tuple[Split, int], bool]
+"""By the camera's split and the frame: whether a mask shows the subject, or is empty."""
+
+
+def masked(made: Subject, folder: Path, masks: Masks, photos: bool = True) -> Subject:
+    """The same subject with one camera for validation and one held out, and no other masks."""
+    folders, scene, model = made
+    cameras: dict[Split, int] = {"validate": 1, "holdout": 2}
+    true, frames = scene.open_masks(), scene.open_frames()
+    assert true is not None
+    folder.mkdir()
+    kept = [(cameras[split], k, true.image(cameras[split], k) * np.uint8(full)) for (split, k), full in masks.items()]
+    write_frames(folder / "masks.arrow", (SIZE, SIZE, 1), kept)
+    write_frames(folder / "frames.arrow", (SIZE, SIZE, 3), [(*key, frames.image(*key)) for key in frames if photos])
+    splits: tuple[Split, ...] = ("train", "validate", "holdout", "train", "train")
+    return folders, replace(scene, splits=splits, folder=folder), model
+
+
+@pytest.mark.parametrize(
+    ("masks", "region", "split", "metric"),
+    [
+        ({("holdout", 0): True}, "true", "holdout", "psnr_subject"),
+        ({("holdout", 1): True}, "true", "holdout", "psnr_subject"),
+        ({("validate", 0): False, ("holdout", 0): True}, "true", "holdout", "psnr_subject"),
+        ({("validate", 1): True, ("holdout", 0): True}, "true", "validate", "psnr_subject"),
+        ({("validate", 0): False, ("validate", 1): True}, "true", "validate", "psnr_subject"),
+        ({}, "found", "validate", "psnr_found"),
+    ],
+    ids=["first", "last", "elsewhere", "both", "one_empty", "none"],
+)
+def test_pictures_and_pixels_are_those_of_evaluate(
+    made: Subject, tmp_path: Path, masks: Masks, region: MatteKind, split: Split, metric: str
+) -> None:
+    folders, scene, model = masked(made, tmp_path / "scene", masks)
+    found = waterfall(scene, model, folders, FRAMES, None)
+    told = evaluate(scene, model, read_asset(folders.asset), EvaluateParams(), NO_WEIGHTS)
+    for variant, step in (("model", found.steps[0]), ("asset", found.steps[-1])):
+        own = [s.values[metric] for s in told.scores if (s.variant, s.split) == (variant, split)]
+        values = [value for value in own if value is not None]
+        assert len(values) == found.images and step.psnr == pytest.approx(np.mean(values))
+    assert (found.region, found.split) == (region, split) and told.matte == region
+    one = waterfall(scene, model, folders, 1, None)
+    assert (one.region, one.split, one.images) == (region, split, 1)
+    assert "pictures: 1, " in measured_on(one) and f"region: {region}, " in measured_on(one)
+
+
+def test_without_pictures_of_the_subject_there_is_one_message(made: Subject, tmp_path: Path) -> None:
+    empty: Masks = {("validate", 1): False, ("holdout", 0): False}
+    folders, scene, model = masked(made, tmp_path / "empty", empty)
+    with pytest.raises(UserError, match=r"no mask of a scored photo shows the subject[\s\S]*masks\.arrow"):
+        waterfall(scene, model, folders, FRAMES, None)
+    folders, scene, model = masked(made, tmp_path / "dark", empty, photos=False)
+    with pytest.raises(UserError, match=r"has a photo[\s\S]*frames\.arrow"):
+        waterfall(scene, model, folders, FRAMES, None)
+
+
+def test_mattes_that_are_empty_are_passed_over(made: Subject, tmp_path: Path) -> None:
+    splits: tuple[Split, ...] = ("validate", "holdout")
+    for seen in (True, False):
+        mattes = {(split, k): seen and (split, k) == ("validate", 1) for split in splits for k in range(FRAMES)}
+        folders, scene, model = masked(made, tmp_path / f"{seen}", mattes)
+        (scene.folder / "masks.arrow").rename(scene.folder / "mattes.arrow")
+        if seen:
+            found = waterfall(scene, model, folders, 1, None)
+            assert (found.region, found.split, found.images) == ("scene", "validate", 1)
+        else:
+            with pytest.raises(UserError, match=r"no matte of a scored photo[\s\S]*mattes\.arrow"):
+                waterfall(scene, model, folders, 1, None)
+
+
+def test_what_a_transparent_model_shows_is_compared_with_nothing(made: Subject, tmp_path: Path) -> None:
+    folders, scene, _ = masked(made, tmp_path / "scene", {})
+    model = glossy_model()
+    assert isinstance(model.textures, GridTextures)
+    model.textures.layers.data[..., 3] = -20
+    with pytest.raises(UserError, match="the model is transparent"):
+        waterfall(scene, model, folders, 1, None)
