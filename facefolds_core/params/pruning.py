@@ -25,9 +25,9 @@ class PruningParams(Section):
     (mean squared error, of values in [0, 1]) are made transparent: paint that looks like the room. 0: none."""
 
     beside_layers_gain: Weight = 0.0003
-    """The same, with the background that was learnt or what is seen beside the layers and drawn on below them,
-    whichever is nearer: where layers are opaque nothing is learnt. 0: what was learnt alone counts. Nothing is cleared
-    for looking like the room where this, `room_gain` and `beside_gain` are 0."""
+    """The same, with what is seen beside the layers and drawn on below them for the background: where layers are opaque
+    nothing is learnt. 0: what was learnt alone counts. Nothing is cleared for looking like the room where this,
+    `room_gain` and `beside_gain` are 0."""
 
     beside_layers_opacity: Share = 0.05
     """Pixels show what is beside the layers where these are less opaque than this."""
@@ -39,8 +39,8 @@ class PruningParams(Section):
     """in squares of so many texels a side."""
 
     gain_limit: Annotated[float, Field(gt=1, le=1e6)] = 6.0
-    """One ray gains or loses at most so many times what is asked: skin beside a black wing, or a single speck in it,
-    does not keep it. Where one ray in so many gains as often what is asked, paint stays."""
+    """Before what is seen beside the layers one ray gains or loses at most so many times what is asked: skin beside a
+    black wing, or a single speck in it, does not keep it. Where one ray in so many gains that much, paint stays."""
 
     beside_gain: Weight = 0.003
     """The same, where the paint is seen on pixels that do not show the subject (`outlines`): there it may look less

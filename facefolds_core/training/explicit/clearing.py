@@ -75,9 +75,10 @@ def painted_room(
     black wing before any other background. Of each ray |B - I|^2 - |C - I|^2, C what the layers show, lit, over the
     background B, counts where the ray's opacity lies, mean over `room_frames` and squares of `room_texels`. B is what
     was learnt, and it takes a gain of `room_gain`, or where rays lie beside the subject's `outlines` for the most part
-    of `beside_gain`, to stay. Behind opaque layers nothing was learnt: where B may also be what pictures of `size` show
-    beside the layers, whichever is nearer to I, it takes `beside_layers_gain`. One ray counts for `gain_limit` times
-    what it takes, however much it gains: else the subject's gain outshines the wing beside it.
+    of `beside_gain`, to stay. Behind opaque layers nothing was learnt: before what pictures of `size` show beside the
+    layers it takes `beside_layers_gain`. There one ray counts for `gain_limit` times what it takes, however much it
+    gains: else the subject's gain outshines the wing beside it. Not before what was learnt: at the window's edge that
+    is the subject itself, which goes on below, and what is near it stays.
     """
     least = {_LEARNT: params.room_gain, _BESIDE: params.beside_gain if outlines is not None else 0.0}
     least |= {_AROUND: params.beside_layers_gain if size is not None else 0.0}
@@ -112,12 +113,14 @@ def _poor(
         gains = {_LEARNT: bare - shown, _BESIDE: bare - shown}
         if size is not None and _AROUND in least:
             beside = filled_in(picture, camera, pixel, seen[:, 3] > params.beside_layers_opacity, size)
-            gains[_AROUND] = np.minimum(bare, ((image - beside[camera, pixel]) ** 2).mean(1)) - shown
+            around = ((image - beside[camera, pixel]) ** 2).mean(1) - shown
+            limit = params.gain_limit * least[_AROUND]
+            gains[_AROUND] = np.clip(around, -limit, limit)
         mass.add(seen, np.ones(len(seen)))
         for name, one in sums.items():
-            one.add(seen, np.clip(gains[name] / least[name], -params.gain_limit, params.gain_limit))
+            one.add(seen, gains[name])
     whole = mass.blurred()
-    return {name: one.blurred() < whole for name, one in sums.items()}
+    return {name: one.blurred() < least[name] * whole for name, one in sums.items()}
 
 
 def _beside(
