@@ -78,8 +78,11 @@ class ReflectionParams(Section):
     with 1, 0.5 with 10; in the end it gains 2)."""
 
     smoother: Annotated[float, Field(ge=1, le=1e6)] = 10.0
-    """Where it does not help it is asked again with gloss and environment so many times as smooth, and fitted so if
-    that does: eight of the actor's cameras do not determine finer maps, and gain 0.8 dB inside by these."""
+    """Where it gains little (`sure_gain`) it is asked again with gloss and environment so many times as smooth, and
+    fitted so if that gains more: eight of the actor's cameras do not determine finer maps, and win 0.8 dB inside."""
+
+    sure_gain: Annotated[float, Field(ge=0, le=100)] = 0.5
+    """dB on rays of cameras left out, from which on no smoother one is asked for."""
 
     min_gain: Annotated[float, Field(ge=0, le=100)] = 0.05
     """dB on rays of cameras left out of a fit, after the rounds of geometry; with less there is no reflection."""

@@ -164,9 +164,15 @@ def test_whether_it_helps_is_asked_of_other_cameras(strength: float, helps: bool
 
 @pytest.mark.parametrize(
     ("fine", "smooth", "kind", "times"),
-    [(0.3, 0.9, "reflection", 1.0), (0.0, 0.2, "smooth_reflection", 10.0), (-0.3, 0.0, "no_reflection", 1.0)],
+    [
+        (0.6, 0.9, "reflection", 1.0),  # sure
+        (0.3, 0.2, "reflection", 1.0),
+        (0.3, 0.4, "smooth_reflection", 10.0),
+        (0.0, 0.2, "smooth_reflection", 10.0),
+        (-0.3, 0.0, "no_reflection", 1.0),
+    ],
 )
-def test_a_smoother_one_is_asked_for_where_it_does_not_help(
+def test_a_smoother_one_is_asked_for_where_little_is_gained(
     fine: float, smooth: float, kind: str, times: float
 ) -> None:
     truth = _random_maps(3)

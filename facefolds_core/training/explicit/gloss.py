@@ -98,22 +98,23 @@ class GlossFit:
         self._shine(state, seen)
 
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
-        """Whether the reflection helps on cameras that its fit did not see, or a smoother one does, which is fitted
-        anew then; if not there is none from here on."""
+        """Whether the reflection helps on cameras that its fit did not see, or a smoother one does more: it is fitted
+        anew then. If neither does there is none from here on."""
         assert self._normals is not None
         start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.params.min_gain
-        gain = gain_on_cameras(used, start, self.params)
-        if gain >= least:
+        gain = smooth = gain_on_cameras(used, start, self.params)
+        if gain < self.params.sure_gain:
+            smooth = gain_on_cameras(used, start, smoothed(self.params, self.params.smoother))
+        if gain >= max(least, smooth):
             return fact("reflection", gain=gain, least=least)
         begun, self.maps, state.shine = self.maps is not None, None, np.zeros((0, 3), np.float32)
-        smoother = gain_on_cameras(used, start, smoothed(self.params, self.params.smoother))
-        self.on = smoother >= least
+        self.on = smooth >= least
         if not self.on:
-            return fact("no_reflection", gain=max(gain, smoother), least=least)
+            return fact("no_reflection", gain=max(gain, smooth), least=least)
         self.smoother = self.params.smoother
         if begun:
             self._fit(state, seen, done=False)
-        return fact("smooth_reflection", gain=smoother, fine=gain, least=least, times=self.smoother)
+        return fact("smooth_reflection", gain=smooth, fine=gain, least=least, times=self.smoother)
 
     def model(self) -> Reflection | None:
         """What the model gets."""
