@@ -75,7 +75,8 @@ export class LevelChoice {
         return await this.#show(name);
       } catch (error) {
         if (this.player.closed || error.name === "AbortError") return;
-        this.player.fail(error);
+        // That nothing is left to try is no news: what broke down has been said.
+        if (error.kind !== "codec" || !this.refused.size) this.player.fail(error);
         if (HOPELESS.includes(error.kind) || !(error instanceof PlayerError)) return;
         this.broken.add(name);
       }
