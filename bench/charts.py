@@ -101,7 +101,7 @@ def speed(measurements: Sequence[Measurement], path: Path) -> None:
             grid[0, column].set_title(title, loc="left", fontsize=9, fontweight="bold")
             label = "training time" if at.clock == "wall" else f"training time: processor time / {at.threads}"
             grid[-1, column].set(xlim=(min(8.0, 0.9 * min(seconds)), 2.6 * max(seconds)), xlabel=label)
-        figure.suptitle("Held-out accuracy against training time, view-independent model", **TITLE)
+        figure.suptitle("Held-out accuracy against training time: models as they ship", **TITLE)
         _legend(figure, [FRONTIER, *dict.fromkeys([*PRESET_COLOURS, *(m.preset for m in data)])])
         figure.supxlabel(f"{conditions_text(data)}\n{SPEED_NOTE}", **NOTE)
 
