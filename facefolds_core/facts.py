@@ -113,6 +113,10 @@ WORDS = {
     "matte_is_found": "warning: no masks, and not of all scored pictures mattes: scores are taken where the model "
     "itself is opaque, so that one training's cannot be compared with another's. Give masks of the scored cameras, or "
     "find mattes: `matte: {{method: auto}}` in params.yaml, and name those that it leaves out (docs/guide/subjects.md)",
+    "training_view_bad": "warning: training camera {camera} sees the asset with {psnr:.1f} dB only in frame {frame}, "
+    "the median training camera with {median:.1f}: look at evaluation/pictures/training_{camera}.png (photo beside "
+    "asset); is its calibration wrong, does something stand before the subject, or are there too few cameras on its "
+    "side?",
     "front_is_guessed": "warning: `front` was guessed from the cameras' mean direction; name a camera that faces the "
     "subject",
 }
@@ -123,7 +127,7 @@ WARNINGS = frozenset(
     {
         *("pictures_disagree", "front_guessed", "camera_contradicts", "mesh_is_off", "cut_by_the_ball"),
         *("volume_explains_little", "surface_without_a_place", "front_is_guessed"),
-        *("codec_misses", "stands_still", "matte_is_found"),
+        *("codec_misses", "stands_still", "matte_is_found", "training_view_bad"),
     }
 )
 """Kinds that ask for something to be done; the others are told for the record."""

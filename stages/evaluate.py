@@ -23,6 +23,7 @@ from facefolds_core.scoring.record import write_record
 from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
+from facefolds_core.scoring.training_views import bad_views, warnings_of
 from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
 from stages.common import run_stage
 
@@ -39,6 +40,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
             *training_events(folders.model / "fit.json"),
             *([codec] if codec else []),
             *matte_is_found(result.matte),
+            *warnings_of(result.training),
             *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
         ]
     )
@@ -56,11 +58,22 @@ def evaluate_subject(folders: SubjectFolders) -> str:
         if params.fresh_views and read_subject(folders.config).source == "actor":
             capture = read_stage(CaptureParams, folders.config)
             fresh = fresh_json(score_fresh_views(scene, model, asset, params, capture))
-        about = Circumstances(result.matte, params.band, result.changes, fresh, noticed(folders, scene, asset, result))
+        warnings = noticed(folders, scene, asset, result)
+        about = Circumstances(result.matte, params.band, result.changes, result.patch, result.training, fresh, warnings)
         metrics = metrics_json(scene.subject, result.scores, cost, about)
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
-        write_record(temporary, result.panels, result.worst, result.seen, shape_of(asset), asset, result.films)
+        write_record(
+            temporary,
+            result.panels,
+            result.worst,
+            result.seen,
+            shape_of(asset),
+            asset,
+            films=result.films,
+            patch=result.patch,
+            training=bad_views(result.training),
+        )
     write_json(folders.metrics, metrics)
     notes = list(perceptual.missing)
     factor = frame_rate_factor(scene, asset)

@@ -22,18 +22,20 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering import AssetCaster
 from facefolds_core.scoring.analysis import Sums as SeenSums
 from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
-from facefolds_core.scoring.images import Rendering, Values, region_of, score_renderings
+from facefolds_core.scoring.images import Rendering, Values, cutout_of, region_of, score_renderings
 from facefolds_core.scoring.kept_scores import KeptScores, digest_of_metrics
 from facefolds_core.scoring.metrics import Array, shown
 from facefolds_core.scoring.panels import ImageScore, Panel
+from facefolds_core.scoring.patches import WorstPatch, find_patch
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
+from facefolds_core.scoring.training_views import TrainingView, training_views
 from facefolds_core.scoring.truths import MatteKind, Truth, Truths
 from facefolds_core.spacing import spread
 
@@ -48,6 +50,8 @@ class Evaluation:
         scores: all of them, held-out cameras first.
         panels: of the contact sheet, held-out cameras alone.
         worst: the held-out picture on which the asset's PSNR is lowest (of the subject, where that is known).
+        patch: the worst window of all held-out pictures of the asset; None where the subject's opacity is not known.
+        training: what the training cameras see of the asset.
         seen: what the asset's layers do in the pictures of the contact sheet.
         matte: which opacity says where the subject is.
         changes: split -> variant -> what it shows of what changes from frame to frame.
@@ -58,6 +62,8 @@ class Evaluation:
     panels: list[Panel]
     worst: Panel
     seen: Seen
+    patch: WorstPatch | None = None
+    training: Sequence[TrainingView] = ()
     matte: MatteKind = "true"
     changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
     films: Sequence[FilmFile] = ()
@@ -65,9 +71,10 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class _Shot:
-    """A scored picture: textures of the asset, pictures by variant."""
+    """A scored picture: textures of the asset, pictures by variant, and where the asset is worst in it."""
 
     panel: Panel
+    patch: WorstPatch | None
     scores: list[ImageScore]
     textures: Sequence[NDArray[np.uint8]]
     pictures: dict[str, Array]
@@ -124,25 +131,40 @@ def evaluate(
             file=scene.folder / "frames.arrow",
             remedy="hold out cameras with photos, under subjects.<name>.holdout in params.yaml",
         )
-    return Evaluation(found, show.panels, show.worst, show.seen.result(), scorer.kind, changes, rolls.files)
+    return Evaluation(
+        scores=found,
+        panels=show.panels,
+        worst=show.worst,
+        seen=show.seen.result(),
+        patch=show.patch,
+        training=training_views(scene, asset, params),
+        matte=scorer.kind,
+        changes=changes,
+        films=rolls.files,
+    )
 
 
 class _Show:
-    """What is kept of the held-out cameras' pictures: those of the contact sheet, and the worst."""
+    """What is kept of the held-out cameras' pictures: those of the contact sheet, the worst, and the worst patch."""
 
     def __init__(self, asset: Asset, on_sheet: set[int]) -> None:
         self._on_sheet = on_sheet
+        self._caster = AssetCaster(asset)
         self.panels: list[Panel] = []
         self.worst: Panel | None = None
+        self.patch: WorstPatch | None = None
         self.seen = SeenSums(asset.layers)
 
     def add(self, frame: int, shot: _Shot, view: PosedView, kind: MatteKind) -> None:
         panel = shot.panel
         self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
+        if shot.patch is not None and (self.patch is None or shot.patch.place.psnr < self.patch.place.psnr):
+            self.patch = shot.patch
         if frame in self._on_sheet:
             self.panels.append(panel)
             known = None if kind == "found" else panel.mask
-            self.seen.add_picture(view.seen_by, view.hits, shot.textures, panel.asset - panel.truth, known)
+            hits = self._caster.cast(view.seen_by)
+            self.seen.add_picture(view.seen_by, hits, shot.textures, panel.asset - panel.truth, known)
 
 
 def _changes(films: Sequence[dict[str, Sums]], jod: Mapping[str, float]) -> dict[str, Change]:
@@ -176,14 +198,13 @@ class _Scorer:
         self._params, self._perceptual = params, perceptual
         self._step = frame_rate_factor(scene, asset)
         self._truths = Truths(scene)
-        self._caster = AssetCaster(asset)
         self.keys = scored_keys(scene, self._truths)
         self.kind = self._truths.matte_kind(self.keys)
         self.kept = KeptScores(kept, digest_of_metrics(perceptual, self.kind, params.background, params.band))
 
     def view(self, camera: Camera) -> PosedView:
         """Of a camera of the world."""
-        return PosedView(self._scene, self._model, self._asset, self._caster, camera, self._step)
+        return PosedView(self._scene, self._model, self._asset, camera, self._step)
 
     def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
         """All frames of a camera that have a photo."""
@@ -199,7 +220,8 @@ class _Scorer:
             both = pictures["model"], pictures["asset"], group["model"], group["asset"]
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
-            yield k, _Shot(panel, list(group.values()), textures, pictures)
+            patch = find_patch(camera.name, frame, renderings["asset"], cutout_of(self.kind, truth))
+            yield k, _Shot(panel, patch, list(group.values()), textures, pictures)
 
     def _scores(self, renderings: Mapping[str, Rendering], truth: Truth) -> dict[str, Values]:
         params = self._params
@@ -222,7 +244,8 @@ def rendered(
         images = {
             "model": Rendering(with_view, alpha),
             "diffuse": Rendering(without_view, alpha),
-            "asset": Rendering(*composite(view.hits, textures, added=view.glossy)),
+            "asset": Rendering(*view.asset.composite(textures)),
+            "asset_diffuse": Rendering(*view.asset.composite(textures, lit=False)),
         }
         yield k, textures, images
 

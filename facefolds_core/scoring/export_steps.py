@@ -20,14 +20,13 @@ from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import Hits
+from facefolds_core.rendering.areas import AreaView
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Image
 from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.scoring.posed import PosedView
 
 Textures = Sequence[NDArray[np.uint8]]
-Look = tuple[Hits, Sequence[Image] | None]
-"""Hits of a camera, and what the reflection adds to each layer's: what `composite` takes."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,14 @@ class Source:
 
     Attributes:
         name: of `waterfall.STEPS`.
-        look: hits and reflection as seen from an eye; one function for all steps that look the same.
+        look: what an eye sees; one function for all steps that look the same.
         textures: of a frame of the scene, N layers (h, w, 4).
         triangles: of all layers; 0 where there are none.
         mesh_bytes, texture_bytes: as in `waterfall.Step`.
     """
 
     name: str
-    look: Callable[[Eye], Look]
+    look: Callable[[Eye], AreaView]
     textures: Callable[[int], Textures]
     triangles: int
     mesh_bytes: int
@@ -77,12 +76,15 @@ def steps_on_disk(grids: Grids, model: RadianceManifolds, folders: SubjectFolder
     windows = [grids.window(i) for i in range(grids.num_layers)]
     stores = [FrameStore(one / "textures.arrow") for one in (folders.samples, folders.resampled, folders.textures)]
 
-    def lit(cast: Callable[[Camera], Hits]) -> Callable[[Eye], Look]:
-        def look(eye: Eye) -> Look:
-            hits, maps = cast(eye.camera), grids.reflection
-            if maps is None:
-                return hits, None
-            return hits, reflected_colours(hits, eye.camera, windows, maps, eye.to_room)
+    def lit(cast: Callable[[Camera], Hits]) -> Callable[[Eye], AreaView]:
+        def look(eye: Eye) -> AreaView:
+            def hits(part: Camera) -> tuple[Hits, Sequence[Image] | None]:
+                found, maps = cast(part), grids.reflection
+                if maps is None:
+                    return found, None
+                return found, reflected_colours(found, part, windows, maps, eye.to_room)
+
+            return AreaView.of_hits(eye.camera, hits)
 
         return look
 
@@ -110,7 +112,7 @@ def shipped_step(asset: Asset, step: int) -> Source:
     triangles, files = (sum(getattr(layer, what) for layer in level.layers) for what in ("triangles", "bytes"))
     return Source(
         "shipped",
-        lambda eye: (eye.posed.hits, eye.posed.glossy),
+        lambda eye: eye.posed.asset,
         lambda k: asset.frame(k * step),
         triangles,
         files,

@@ -15,7 +15,6 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import CaptureParams, EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster
 from facefolds_core.scoring.evaluation import frame_rate_factor, rendered
 from facefolds_core.scoring.images import score_renderings
 from facefolds_core.scoring.panels import VARIANTS, ImageScore
@@ -43,11 +42,11 @@ def score_fresh_views(
     scene: Scene, model: RadianceManifolds, asset: Asset, params: EvaluateParams, capture: CaptureParams
 ) -> list[FreshScore]:
     """Film and score `params.fresh_views` views; shows a progress bar."""
-    step, caster = frame_rate_factor(scene, asset), AssetCaster(asset)
+    step = frame_rate_factor(scene, asset)
     found = []
     with progress(total=params.fresh_views, desc="fresh views", unit="image") as bar:
         for view in film_fresh_views(scene, capture, params.fresh_views):
-            posed = PosedView(scene, model, asset, caster, view.camera, step)
+            posed = PosedView(scene, model, asset, view.camera, step)
             truth = Truth(view.rgb / 255.0, mask=view.opacity)
             for _, _, images in rendered(posed, asset, [view.frame], step):
                 values = score_renderings(images, truth, "true", params.background, params.band, NO_WEIGHTS)

@@ -9,8 +9,10 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors
-from facefolds_core.scoring.metrics import Array, psnr, shown, ssim
+from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
+from facefolds_core.scoring.detail import ssim_high
+from facefolds_core.scoring.matte import Region, interior_and_band, matte_errors, opacity_errors
+from facefolds_core.scoring.metrics import Array, decibels, psnr, shown, ssim
 from facefolds_core.scoring.panels import ALL_METRICS, FOUND_METRICS, METRICS, SUBJECT_METRICS
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
 from facefolds_core.scoring.truths import MatteKind, Truth
@@ -64,8 +66,12 @@ def score_renderings(
         {} if kind == "true" else region_scores(pictures, truth.picture, region_of(kind, truth, renderings), perceptual)
     )
     parts = None if truth.mask is None else interior_and_band(truth.mask, band)
+    cutout, region = cutout_of(kind, truth), region_of(kind, truth, renderings)
     for variant, one in renderings.items():
         values = result[variant]
+        values["ssim_high"] = None if region is None else ssim_high(pictures[variant], truth.picture, region)
+        if cutout is not None:
+            values |= over_any(one, cutout, band)
         if variant in within:
             values |= dict(zip(FOUND_METRICS, within[variant].values(), strict=True))
         over = None if truth.plate is None else shown(one.over(truth.plate))
@@ -85,6 +91,21 @@ def region_of(kind: MatteKind, truth: Truth, renderings: Mapping[str, Rendering]
     if kind == "scene":
         return truth.matte
     return np.clip(renderings["model"].alpha.astype(np.float64), 0, 1)
+
+
+def cutout_of(kind: MatteKind, truth: Truth) -> Cutout | None:
+    """The subject alone, as far as its opacity is known."""
+    opacity = {"true": truth.mask, "scene": truth.matte}.get(kind)
+    return None if opacity is None else Cutout.of(truth.picture, opacity, truth.plate)
+
+
+def over_any(one: Rendering, cutout: Cutout, band: float) -> Values:
+    """Over black, white, grey and the plate; and how far opacity is off."""
+    alpha = np.clip(one.alpha.astype(np.float64), 0, 1)
+    error = squared_error(one.rgb, alpha, cutout)
+    patch = worst_patch(error, cutout.opacity)
+    any_background = {"psnr_any": decibels(float(error.mean())), "worst_patch": None if patch is None else patch.psnr}
+    return any_background | opacity_errors(alpha, cutout.opacity, band)
 
 
 def _outline(image: Array, over: Array | None, truth: Array, mask: Array, interior: Region, edge: Region) -> Values:

@@ -57,3 +57,16 @@ def interior_and_band(mask: Array, pixels: float) -> tuple[Region, Region]:
     interior = distance_transform_edt(subject) > pixels
     dilated = distance_transform_edt(~subject) <= pixels
     return interior, dilated & ~interior
+
+
+def opacity_errors(alpha: Array, mask: Array, pixels: float) -> dict[str, float | None]:
+    """Mean |alpha - m| inside the outline, along it and outside (`interior_and_band`); None where there is no pixel.
+
+    Args:
+        alpha, mask: (H, W) opacity in [0, 1], found and true.
+        pixels: to both sides of the outline.
+    """
+    interior, band = interior_and_band(mask, pixels)
+    parts = {"inside": interior, "edge": band, "outside": ~(interior | band)}
+    error = np.abs(alpha - mask)
+    return {f"opacity_{name}": float(error[part].mean()) if part.any() else None for name, part in parts.items()}

@@ -26,6 +26,11 @@ def shown(image: NDArray[np.floating]) -> Array:
     return np.asarray(np.round(np.clip(image, 0, 1) * np.float64(255)) / 255)
 
 
+def decibels(error: float) -> float:
+    """10 log10(1 / MSE) dB of a mean squared error, at most MAX_PSNR."""
+    return min(MAX_PSNR, -10 * float(np.log10(max(error, 1e-12))))
+
+
 def psnr(image: Array, truth: Array, mask: Array | None = None) -> float | None:
     """10 log10(1 / MSE) dB, at most MAX_PSNR; MSE = sum m |I - T|^2 / (3 sum m).
 
@@ -38,12 +43,8 @@ def psnr(image: Array, truth: Array, mask: Array | None = None) -> float | None:
     """
     square = ((image - truth) ** 2).mean(-1)
     if mask is None:
-        error = float(square.mean())
-    elif mask.sum() > 0:
-        error = float((mask * square).sum() / mask.sum())
-    else:
-        return None
-    return min(MAX_PSNR, -10 * float(np.log10(max(error, 1e-12))))
+        return decibels(float(square.mean()))
+    return decibels(float((mask * square).sum() / mask.sum())) if mask.sum() > 0 else None
 
 
 def ssim_map(image: Array, truth: Array) -> Array:

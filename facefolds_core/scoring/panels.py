@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from facefolds_core.captures.scene import Split
 from facefolds_core.scoring.metrics import Array
 
-VARIANTS = ("model", "diffuse", "asset")
+VARIANTS = ("model", "diffuse", "asset", "asset_diffuse")
+"""The trained model, and without what depends on the view; the shipped files, and without their reflection."""
 METRICS = ("psnr", "ssim", "lpips", "st_lpips")
 SUBJECT_METRICS = tuple(f"{name}_subject" for name in METRICS)
 FOUND_METRICS = tuple(f"{name}_found" for name in METRICS)
@@ -15,11 +16,18 @@ FOUND_METRICS = tuple(f"{name}_found" for name in METRICS)
 PLATE_METRICS = ("psnr_over_plate", "ssim_over_plate")
 REGION_METRICS = ("psnr_interior", "psnr_band", "psnr_band_over_plate")
 MATTE_METRICS = ("matte_sad", "matte_mse", "matte_gradient", "matte_iou")
-ALL_METRICS = (*METRICS, *SUBJECT_METRICS, *FOUND_METRICS, *PLATE_METRICS, *REGION_METRICS, *MATTE_METRICS)
+ANY_METRICS = ("psnr_any", "worst_patch", "opacity_inside", "opacity_edge", "opacity_outside")
+"""Over any background: colour and opacity together, and opacity alone."""
+ALL_METRICS = (
+    *(*METRICS, *SUBJECT_METRICS, *FOUND_METRICS, *PLATE_METRICS, *REGION_METRICS, *MATTE_METRICS),
+    *(*ANY_METRICS, "ssim_high"),
+)
 """Of each picture; docs/reference/metrics.md defines them."""
-FILM_METRICS = ("temporal", "flicker", "cvvdp")
+LEAST = ("worst_patch",)
+"""Of these the least of all pictures is given in place of their mean."""
+FILM_METRICS = ("temporal", "psnr_moving", "flicker", "cvvdp")
 """Of each variant, over all frames of its cameras."""
-HEADLINES = ("psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
+HEADLINES = ("psnr_any", "psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
 """The first that is there says most of the asset."""
 
 

@@ -10,9 +10,7 @@ from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
-from facefolds_core.rendering import AssetCaster
-from facefolds_core.rendering.reference import room_from
-from facefolds_core.rendering.reflection import reflected_colours
+from facefolds_core.rendering.areas import view_of
 from facefolds_core.scoring.model_view import ModelView
 
 
@@ -27,17 +25,13 @@ class PosedView:
 
     Attributes:
         seen_by: the camera in the frame of the asset's meshes.
-        hits: there.
+        asset: the asset's view, its reflection with it.
         model: the model's view.
-        glossy: what the reflection adds, or None.
     """
 
-    def __init__(
-        self, scene: Scene, model: RadianceManifolds, asset: Asset, caster: AssetCaster, camera: Camera, step: int
-    ) -> None:
-        self._poses, self._model, self._asset, self._caster = scene.poses, model, asset, caster
+    def __init__(self, scene: Scene, model: RadianceManifolds, asset: Asset, camera: Camera, step: int) -> None:
+        self._poses, self._model, self._files = scene.poses, model, asset
         self._camera, self._step = camera, step
-        self._reflection = asset.reflection()
         self._turn_model(0)
         self._turn_asset(0)
 
@@ -45,7 +39,7 @@ class PosedView:
         """To a frame of the scene."""
         if self._poses is not None:
             self._turn_model(frame)
-        if self._asset.track is not None:
+        if self._files.track is not None:
             self._turn_asset(frame)
 
     def _turn_model(self, frame: int) -> None:
@@ -57,10 +51,5 @@ class PosedView:
 
     def _turn_asset(self, frame: int) -> None:
         time = frame * self._step
-        self.seen_by = self._asset.camera_in_head(self._camera, time)
-        self.hits = self._caster.cast(self.seen_by)
-        maps = self._reflection
-        self.glossy = None
-        if maps is not None:
-            to_room = None if self._asset.track is None else room_from(self._asset, time)
-            self.glossy = reflected_colours(self.hits, self.seen_by, self._asset.full.windows, maps, to_room)
+        self.seen_by = self._files.camera_in_head(self._camera, time)
+        self.asset = view_of(self._files.full, self._camera, time)

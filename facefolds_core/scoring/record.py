@@ -21,6 +21,8 @@ from facefolds_core.pictures import DamagedPictureError, open_picture
 from facefolds_core.scoring.films import FilmFile
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import HEADLINES, Panel
+from facefolds_core.scoring.patches import WorstPatch
+from facefolds_core.scoring.training_views import TrainingView
 
 VERSION = 1
 NAME = "analysis.json"
@@ -105,8 +107,26 @@ class View:
     psnr_subject: float | None
     psnr_found: float | None = None
     psnr_over_plate: float | None = None
+    psnr_any: float | None = None
     over: Array | None = None
     """The asset over the camera's clean plate."""
+
+
+@dataclass(frozen=True)
+class Crop:
+    """The worst window of all held-out pictures and what lies around it: truth, asset (h, w, 3) in [0, 1] over grey.
+
+    Attributes:
+        psnr: dB, of the window.
+        box: (row, column, side) of the window in the crops.
+    """
+
+    camera: str
+    frame: str
+    psnr: float
+    box: tuple[int, int, int]
+    truth: Array
+    asset: Array
 
 
 @dataclass(frozen=True)
@@ -120,6 +140,7 @@ class Record:
         seen, shape: of the asset.
         films: of the held-out cameras, in `folder`.
         folder: of the evaluation.
+        patch: where the asset is worst; None where that is not known.
     """
 
     views: tuple[View, ...]
@@ -129,6 +150,7 @@ class Record:
     shape: Shape
     films: tuple[FilmFile, ...] = ()
     folder: Path = Path()
+    patch: Crop | None = None
 
 
 def write_record(
@@ -139,8 +161,14 @@ def write_record(
     shape: Shape,
     asset: Asset,
     films: Sequence[FilmFile] = (),
+    patch: WorstPatch | None = None,
+    training: Sequence[TrainingView] = (),
 ) -> None:
-    """Write into `folder`, which `evaluate` makes."""
+    """Write into `folder`, which `evaluate` makes.
+
+    Args:
+        training: views whose pictures are kept, photo beside asset.
+    """
     listed = panels if any(panel is worst for panel in panels) else [*panels, worst]
     (folder / PICTURES).mkdir()
     layers = [
@@ -161,7 +189,10 @@ def write_record(
         "layers": layers,
         "sections": {name: points.tolist() for name, points in shape.sections.items()},
         "films": [asdict(film) for film in films],
+        "patch": None if patch is None else _write_patch(folder, patch),
     }
+    for view in training:
+        _save(folder / PICTURES / f"training_{view.camera}.png", np.concatenate([view.truth, view.asset], 1))
     write_json(folder / NAME, _rounded(value))
 
 
@@ -171,9 +202,22 @@ def _write_view(folder: Path, index: int, panel: Panel) -> dict[str, Any]:
     entry |= {name: panel.asset_score.values.get(name) for name in reversed(HEADLINES)}
     for name, image in images.items():
         entry[name] = None if image is None else f"{PICTURES}/{index:03d}_{name}.png"
-        if image is not None:  # multiples of 1/255: nothing is lost
-            Image.fromarray(np.rint(255 * image).astype(np.uint8)).save(folder / entry[name])
+        if image is not None:
+            _save(folder / entry[name], image)
     return entry
+
+
+def _write_patch(folder: Path, patch: WorstPatch) -> dict[str, Any]:
+    files = {name: f"{PICTURES}/patch_{name}.png" for name in ("truth", "asset")}
+    for name, file in files.items():
+        _save(folder / file, getattr(patch, name))
+    box = [patch.place.row - patch.corner[0], patch.place.column - patch.corner[1], patch.place.side]
+    return {"camera": patch.camera, "frame": patch.frame, "psnr": patch.place.psnr, "box": box, **files}
+
+
+def _save(path: Path, image: Array) -> None:
+    """A picture whose values are multiples of 1/255: nothing is lost."""
+    Image.fromarray(np.rint(255 * image).astype(np.uint8)).save(path)
 
 
 def _rounded(value: Any) -> Any:
@@ -226,6 +270,7 @@ def read_record(folder: Path, asset: Asset) -> Record | None:
             ),
             films=tuple(_read_film(one) for one in value.get("films", ())),
             folder=folder,
+            patch=_read_patch(folder, value.get("patch")),
         )
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise UserError("garbled record of an evaluation", file=path, found=repr(error), remedy=REMEDY) from None
@@ -238,14 +283,26 @@ def _read_film(entry: dict[str, Any]) -> FilmFile:
     return FilmFile(str(entry["camera"]), file, float(entry["fps"]), tuple(map(str, entry["frames"])))
 
 
+def _read_patch(folder: Path, entry: dict[str, Any] | None) -> Crop | None:
+    if entry is None:
+        return None
+    row, column, side = (int(number) for number in entry["box"])
+    pictures = {name: _read_picture(folder / entry[name]) for name in ("truth", "asset")}
+    return Crop(str(entry["camera"]), str(entry["frame"]), float(entry["psnr"]), (row, column, side), **pictures)
+
+
+def _read_picture(path: Path) -> Array:
+    try:
+        return np.asarray(open_picture(path)) / 255.0
+    except (OSError, DamagedPictureError) as error:
+        message = "a picture of the evaluation is damaged"
+        raise UserError(message, file=path, found=str(error), remedy=REMEDY) from None
+
+
 def _read_view(folder: Path, entry: dict[str, Any]) -> View:
     images: dict[str, Any] = {}
     for name in ("truth", "asset", "mask", "over"):
         file: Any = entry.get(name)
-        try:
-            images[name] = None if file is None else np.asarray(open_picture(folder / file)) / 255.0
-        except (OSError, DamagedPictureError) as error:
-            raise UserError("a picture of the evaluation is damaged", file=folder / file, found=str(error),
-                            remedy=REMEDY) from None  # fmt: skip
+        images[name] = None if file is None else _read_picture(folder / file)
     values: dict[str, Any] = {name: entry.get(name) for name in HEADLINES}
     return View(entry["camera"], entry["frame"], **images, **values)

@@ -17,11 +17,13 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_file, read_json
 from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, VARIANTS, ImageScore
+from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, ImageScore
+from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.temporal import Change
+from facefolds_core.scoring.training_views import TrainingView, bad_views, compared_by
 from facefolds_core.scoring.truths import MatteKind
 
-METRICS_VERSION = 1
+METRICS_VERSION = 2
 EXPORT_STAGES = ("sample", "reconstruct", "decimate", "texture", "bake", "compress")
 
 VERTEX_BYTES = 20
@@ -61,6 +63,8 @@ class Circumstances:
         matte: which opacity says where the subject is.
         band: pixels to both sides of the outline.
         changes: split -> variant -> what it shows of what changes from frame to frame.
+        patch: the worst window of all held-out pictures of the asset.
+        training: what the training cameras see of it.
         fresh_views: means on views that were filmed for the purpose.
         warnings: what is not well.
     """
@@ -68,6 +72,8 @@ class Circumstances:
     matte: MatteKind = "true"
     band: float = 0.0
     changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
+    patch: WorstPatch | None = None
+    training: Sequence[TrainingView] = ()
     fresh_views: Mapping[str, Any] | None = None
     warnings: Sequence[Fact] = ()
 
@@ -85,6 +91,8 @@ def metrics_json(
         "matte": about.matte,
         "band_pixels": about.band,
         **held,
+        "worst_patch": _patch(about.patch),
+        "training_views": _training(about.training),
     }
     if checked["images"]:
         content["validate"] = {"headline": headline(checked), **checked}
@@ -93,8 +101,33 @@ def metrics_json(
     return {**content, "warnings": [one.to_json() for one in about.warnings], "cost": cost}
 
 
+def _patch(patch: WorstPatch | None) -> dict[str, Any] | None:
+    """Where the asset is worst: its PSNR, camera and frame, and the window's first pixel and side."""
+    if patch is None:
+        return None
+    place = patch.place
+    found = {"psnr": rounded(place.psnr), "camera": patch.camera, "frame": patch.frame}
+    return found | {"row": place.row, "column": place.column, "side": place.side}
+
+
+def _training(views: Sequence[TrainingView]) -> dict[str, Any] | None:
+    """Of the training cameras: what they are compared by, means, the worst of them, and the bad ones."""
+    name = compared_by(views)
+    if name is None or not views:
+        return None
+    worst = min(views, key=lambda view: view.values[name] or 0.0)
+    known = {key: [view.values[key] for view in views if view.values.get(key) is not None] for key in views[0].values}
+    return {
+        "metric": name,
+        "images": len(views),
+        **{key: rounded(sum(of) / len(of)) if of else None for key, of in known.items()},  # type: ignore[arg-type]
+        "worst": {"camera": worst.camera, "frame": worst.frame, "psnr": rounded(worst.values[name])},
+        "bad": [view.camera for view in bad_views(views)],
+    }
+
+
 def headline(metrics: Mapping[str, Any]) -> str:
-    """The metric of the asset that says most: over the plate, of the subject, within the found matte, whole frame."""
+    """The metric of the asset that says most: the first of HEADLINES that it has."""
     values = metrics.get("asset") or {}
     return next((name for name in HEADLINES if isinstance(values.get(name), int | float)), HEADLINES[-1])
 
@@ -113,11 +146,12 @@ def _means(scores: Sequence[ImageScore], split: Split, about: Circumstances) -> 
 
 
 def averages(scores: Sequence[ImageScore], variant: str, change: Change | None = None) -> dict[str, float | None]:
-    """Mean of each metric over the images that have it; None where no image has. Then those of whole films."""
+    """Mean of each metric over the images that have it, of LEAST the least; None where none has. Then of films."""
     result: dict[str, float | None] = {}
     for name in ALL_METRICS:
         values = [v for s in scores if s.variant == variant and (v := s.values.get(name)) is not None]
-        result[name] = rounded(sum(values) / len(values)) if values else None
+        one = (min(values) if name in LEAST else sum(values) / len(values)) if values else None
+        result[name] = rounded(one)
     return result | {name: rounded(getattr(change, name, None)) for name in FILM_METRICS}
 
 

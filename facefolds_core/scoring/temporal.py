@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.metrics import Array, decibels
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Sums:
         left: sum |(x_t - mean x) - (y_t - mean y)|^2, x the rendering and y the photos.
         truth: sum |y_t - mean y|^2.
         values: how many values these sums are over, weighted.
+        moving: sum |y_t - mean y|^2 |x_t - y_t|^2 / 3: errors, weighted with how far the photo is from its mean.
         steps: sum |e_t - e_(t-1)|^2, e = x - y.
         pairs: how many values that sum is over, weighted.
     """
@@ -28,6 +29,7 @@ class Sums:
     left: float = 0.0
     truth: float = 0.0
     values: float = 0.0
+    moving: float = 0.0
     steps: float = 0.0
     pairs: float = 0.0
 
@@ -41,12 +43,15 @@ class Change:
     """Attributes:
     temporal: share of the photos' variance over time that the rendering explains, 1 - left / truth: 1 for the photos
         themselves, 0 for a film that stands still, below for one that moves otherwise; None where nothing changes.
+    psnr_moving: dB of the error where and when the photos change, weighted with |y_t - mean y|^2; None where nothing
+        changes.
     flicker: RMS of the error's change from frame to frame, colours in [0, 1]; None with less than two frames.
     truth_change: RMS of what the photos differ from their mean over time; None with less than two frames.
     cvvdp: of the film, JOD, mean over the cameras; None where it cannot be had.
     """
 
     temporal: float | None
+    psnr_moving: float | None
     flicker: float | None
     truth_change: float | None
     cvvdp: float | None = None
@@ -57,6 +62,7 @@ def change_of(sums: Iterable[Sums], cvvdp: float | None = None) -> Change:
     total = sum(sums, Sums())
     return Change(
         temporal=1 - total.left / total.truth if total.truth > 0 else None,
+        psnr_moving=decibels(total.moving / total.truth) if total.truth > 0 else None,
         flicker=float(np.sqrt(total.steps / total.pairs)) if total.pairs > 0 else None,
         truth_change=float(np.sqrt(total.truth / total.values)) if total.pairs > 0 else None,
         cvvdp=cvvdp,
@@ -77,6 +83,7 @@ class Film:
         self._weight: Array | None = None
         self._truth = _Moments()
         self._errors: dict[str, _Moments] = {}
+        self._moving: dict[str, _Weighted] = {}
 
     def add(self, frame: int, pictures: Mapping[str, Array], truth: Array, weight: Array) -> None:
         """Args:
@@ -90,6 +97,7 @@ class Film:
         self._truth.add(truth, follows)
         for name, picture in pictures.items():
             self._errors.setdefault(name, _Moments()).add(picture - truth, follows)
+            self._moving.setdefault(name, _Weighted()).add(((picture - truth) ** 2).mean(-1), truth)
         self._frames, self._pairs, self._last = self._frames + 1, self._pairs + follows, frame
 
     def sums(self) -> dict[str, Sums]:
@@ -104,6 +112,7 @@ class Film:
                 left=float((weight * errors.spread()).sum()),
                 truth=truth,
                 values=self._frames * covered,
+                moving=float((weight * self._moving[name].by_change()).sum()),
                 steps=float((weight * errors.steps).sum()),
                 pairs=self._pairs * covered,
             )
@@ -138,3 +147,28 @@ class _Moments:
         """(H, W) sum over frames and channels of |value - mean|^2."""
         mean = np.asarray(self._sum) / self._count
         return np.asarray(np.maximum(self._squares - self._count * (mean**2).sum(-1), 0.0))
+
+
+class _Weighted:
+    """Sums over frames of an error (H, W), weighted with powers of the photos (H, W, 3)."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._first: Array | None = None
+        self._photos: Array | float = 0.0
+        self._sums: tuple[Array | float, Array | float, Array | float] = (0.0, 0.0, 0.0)
+
+    def add(self, error: Array, photo: Array) -> None:
+        if self._first is None:  # sums of small numbers lose no digits
+            self._first = photo
+        moved = photo - self._first
+        self._photos = self._photos + moved
+        none, one, two = self._sums
+        self._sums = (none + error, one + error[..., None] * moved, two + error * (moved**2).sum(-1))
+        self._count += 1
+
+    def by_change(self) -> Array:
+        """(H, W) sum over frames of error |photo - mean|^2."""
+        mean = np.asarray(self._photos) / self._count
+        none, one, two = (np.asarray(part) for part in self._sums)
+        return np.asarray(np.maximum(two - 2 * (mean * one).sum(-1) + (mean**2).sum(-1) * none, 0.0))

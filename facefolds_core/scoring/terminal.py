@@ -11,6 +11,7 @@ NAME, CELL = 42, 12
 """Columns of the terminal: of a row's name, and of each figure."""
 
 HEADLINE_WORDS = {
+    "psnr_any": "over any background",
     "psnr_over_plate": "over the room's plate",
     "psnr_subject": "of the subject",
     "psnr_found": "within the matte that was found",
@@ -18,7 +19,18 @@ HEADLINE_WORDS = {
 }
 """Metric -> what it is taken over, on held-out cameras."""
 
+NAMES = {"diffuse": "no gloss", "asset_diffuse": "no gloss"}
+"""What the terminal calls variants, in few letters: each stands beside the one that it is a part of."""
+
 ROWS = (
+    ("psnr_any", "PSNR over any background, dB", "{:.2f}"),
+    ("worst_patch", "  of the worst patch of any picture", "{:.2f}"),
+    ("psnr_moving", "PSNR of what moves, dB", "{:.2f}"),
+    ("temporal", "change over time explained", "{:.0%}"),
+    ("opacity_inside", "error of opacity inside the outline", "{:.3f}"),
+    ("opacity_edge", "  along it", "{:.3f}"),
+    ("opacity_outside", "  outside", "{:.3f}"),
+    ("ssim_high", "SSIM of high frequencies", "{:.3f}"),
     ("psnr_over_plate", "PSNR over the room's plate, dB", "{:.2f}"),
     ("ssim_over_plate", "SSIM over the room's plate", "{:.3f}"),
     ("psnr_subject", "PSNR of the subject, dB", "{:.2f}"),
@@ -33,7 +45,6 @@ ROWS = (
     ("lpips_found", "LPIPS within the found matte", "{:.3f}"),
     ("st_lpips_found", "ST-LPIPS within the found matte", "{:.3f}"),
     ("matte_iou", "matte: intersection over union", "{:.3f}"),
-    ("temporal", "change over time explained", "{:.0%}"),
     ("flicker", "flicker of the error", "{:.4f}"),
     ("cvvdp", "CVVDP of the film, JOD (10 is best)", "{:.2f}"),
     ("psnr", "PSNR of the whole frame, without the room", "{:.2f}"),
@@ -52,7 +63,9 @@ def score_lines(metrics: Mapping[str, Any]) -> list[str]:
 def _lines(metrics: Mapping[str, Any], what: str) -> list[str]:
     # Without a view branch the first two are the same figures twice.
     variants = ["model", *(["diffuse"] if metrics["diffuse"] != metrics["model"] else []), "asset"]
-    lines = [_line(f"{metrics['images']} pictures {what}", variants)]
+    if metrics.get("asset_diffuse") not in (None, metrics["asset"]):
+        variants.append("asset_diffuse")
+    lines = [_line(f"{metrics['images']} pictures {what}", [NAMES.get(name, name) for name in variants])]
     for key, words, form in ROWS:
         values = [metrics[variant].get(key) for variant in variants]
         if any(value is not None for value in values):

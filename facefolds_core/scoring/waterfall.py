@@ -30,10 +30,10 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.areas import AreaView
 from facefolds_core.scoring.detail import ssim_high
 from facefolds_core.scoring.evaluation import frame_rate_factor, scored_keys
-from facefolds_core.scoring.export_steps import Eye, Look, Source, shipped_step, steps_on_disk
+from facefolds_core.scoring.export_steps import Eye, Source, shipped_step, steps_on_disk
 from facefolds_core.scoring.images import MASK_EDGE, Rendering, Values, region_of, region_scores, subject_box
 from facefolds_core.scoring.metrics import psnr, shown
 from facefolds_core.scoring.perceptual import Perceptual, PerceptualDistance
@@ -112,12 +112,12 @@ def waterfall(
     grids, asset, truths = read_grids(folders.samples / "grids.npz"), read_asset(folders.asset), Truths(scene)
     factor = frame_rate_factor(scene, asset)
     sources = [*steps_on_disk(grids, model, folders), shipped_step(asset, factor)]
-    caster, perceptual = AssetCaster(asset), Perceptual(None, st_lpips, ())
+    perceptual = Perceptual(None, st_lpips, ())
     kind, split, keys = _chosen(scene, truths, frames)
     found: dict[str, list[Values]] = {name: [] for name in STEPS}
     with progress(total=len(keys), desc="waterfall", unit="image") as bar:
         for index, own in groupby(keys, key=lambda key: key[0]):
-            posed = PosedView(scene, model, asset, caster, scene.cameras[index], factor)
+            posed = PosedView(scene, model, asset, scene.cameras[index], factor)
             numbers = [k for _, k in own]
             for k, renderings in _rendered(scene, index, posed, sources, numbers, grids.reflection is not None):
                 truth = truths.at(index, k)
@@ -175,7 +175,7 @@ def _rendered(
     scene: Scene, index: int, posed: PosedView, sources: Sequence[Source], frames: Sequence[int], lit: bool
 ) -> Iterator[tuple[int, dict[str, Rendering]]]:
     """Each of the frames by all steps; `lit`: the model with its reflection."""
-    looks: dict[Callable[[Eye], Look], Look] = {}
+    looks: dict[Callable[[Eye], AreaView], AreaView] = {}
     for k in frames:
         posed.turn(k)
         if not looks or scene.poses is not None:
@@ -185,8 +185,7 @@ def _rendered(
         with_view, without_view, alpha = posed.model.render(float(k))
         renderings = {"model": Rendering(with_view if lit else without_view, alpha)}
         for source in sources:
-            hits, added = looks[source.look]
-            renderings[source.name] = Rendering(*composite(hits, source.textures(k), added=added))
+            renderings[source.name] = Rendering(*looks[source.look].composite(source.textures(k)))
         yield k, renderings
 
 

@@ -1,0 +1,128 @@
+"""Error over any background: what a picture is worth wherever it is put (docs/reference/metrics.md, `psnr_any`).
+
+A head over black says nothing of how dark its haze is, and one over its own room nothing of what is left of that room
+in its hair. Over black, white and grey at once opacity counts everywhere, as colour does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from facefolds_core.scoring.metrics import Array, decibels, shown
+
+BACKGROUNDS = (0.0, 1.0, 0.5)
+"""Black, white, mid grey."""
+
+PATCH_SHARE = 1 / 8
+"""A patch's side, in those of a square that is as large as the subject."""
+LEAST_PATCH = 8
+"""Pixels: a smaller patch is a handful of pixels."""
+COVERED = 0.5
+"""Mean opacity of a patch from which on it is taken to show the subject."""
+
+WIDE, NARROW = 91, 7
+"""Pixels, windows of the two passes of blur fusion (Forte 2021)."""
+
+
+@dataclass(frozen=True)
+class Cutout:
+    """The true subject without what stands behind it.
+
+    Attributes:
+        colour: (H, W, 3) times opacity.
+        opacity: (H, W) in [0, 1].
+        plate: (H, W, 3) what stands behind it in the photo, or None.
+    """
+
+    colour: Array
+    opacity: Array
+    plate: Array | None = None
+
+    @classmethod
+    def of(cls, photo: Array, opacity: Array, plate: Array | None) -> Cutout:
+        """From a photo (H, W, 3) = F + (1 - opacity) plate; where nobody knows the plate, the subject's own colours are
+        estimated from its neighbourhood."""
+        if plate is None:
+            return cls(opacity[..., None] * foreground(photo, opacity), opacity)
+        through = (1 - opacity)[..., None] * plate
+        return cls(np.clip(photo - through, 0, opacity[..., None]), opacity, plate)
+
+    def over(self, background: float | Array) -> Array:
+        """(H, W, 3) over a grey, or over a picture (H, W, 3)."""
+        return np.asarray(self.colour + (1 - self.opacity)[..., None] * background)
+
+
+def foreground(photo: Array, opacity: Array) -> Array:
+    """The subject's colours (H, W, 3) in pixels that it half covers: blur fusion (Forte 2021, "Approximate Fast
+    Foreground Colour Estimation", eq. 4 and 6), twice."""
+    first, behind = _fused(photo, photo, photo, opacity, WIDE)
+    return _fused(photo, first, behind, opacity, NARROW)[0]
+
+
+def _fused(photo: Array, front: Array, behind: Array, opacity: Array, window: int) -> tuple[Array, Array]:
+    a = opacity[..., None]
+
+    def mean(image: Array, weight: Array) -> Array:
+        total = cv2.blur(weight, (window, window))[..., None]
+        return np.asarray(cv2.blur(image * weight[..., None], (window, window)) / np.maximum(total, 1e-5))
+
+    near, far = mean(front, opacity), mean(behind, 1 - opacity)
+    return np.clip(near + a * (photo - a * near - (1 - a) * far), 0, 1), far
+
+
+def squared_error(rgb: NDArray[np.floating], alpha: Array, truth: Cutout) -> Array:
+    """(H, W) mean over the channels and over black, white, mid grey and, where it is known, the plate.
+
+    Args:
+        rgb: (H, W, 3) of the rendering, over black.
+        alpha: (H, W) its opacity.
+    """
+    backgrounds: list[float | Array] = [*BACKGROUNDS, *([] if truth.plate is None else [truth.plate])]
+    through: Array = (1 - alpha)[..., None]
+    errors = [((shown(rgb + through * one) - truth.over(one)) ** 2).mean(-1) for one in backgrounds]
+    return np.asarray(np.mean(errors, 0))
+
+
+@dataclass(frozen=True)
+class Patch:
+    """The window of a picture in which it is worst.
+
+    Attributes:
+        psnr: dB, of the window alone.
+        row, column: of its first pixel.
+        side: pixels.
+    """
+
+    psnr: float
+    row: int
+    column: int
+    side: int
+
+
+def patch_side(opacity: Array) -> int:
+    """Pixels: about an eighth of the subject's size."""
+    return max(LEAST_PATCH, round(PATCH_SHARE * float(np.sqrt(opacity.sum()))))
+
+
+def worst_patch(error: Array, opacity: Array) -> Patch | None:
+    """The window with the greatest mean error, weighted with the subject's opacity, of those that it covers by half.
+
+    Args:
+        error: (H, W) squared.
+        opacity: (H, W) of the true subject.
+
+    Returns:
+        None where no window is covered.
+    """
+    side = min(patch_side(opacity), *error.shape)
+    inside = tuple(slice(side // 2, size - (side - 1) // 2) for size in error.shape)
+    cover, sums = (uniform_filter(one, side, mode="constant")[inside] for one in (opacity, opacity * error))
+    means = np.where(cover >= COVERED, sums / np.maximum(cover, 1e-9), -1.0)
+    row, column = np.unravel_index(int(means.argmax()), means.shape)
+    worst = float(means[row, column])
+    return None if worst < 0 else Patch(decibels(worst), int(row), int(column), side)
