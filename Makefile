@@ -9,6 +9,7 @@
 # make hero    set up, then film the embedded actor at full size, run the pipeline and pack the asset: dist/hero (hours; it can be interrupted)
 # make docs    set up, then make the documents a site: site/index.html (with the player on the first page after `make hero`)
 # make package dist/facefolds-player-*.tgz: the web player as an npm package, with types (nothing is published)
+# make gate    set up, then run every capture that is there and hold its scores against those that are kept (hours; ONLY="actor; mugsy" for some)
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)
 # make blender an environment with Blender as a Python module, for docs/guide/engines.md (about 400 MB; needs Python 3.11)
 # make charts  set up, run the pipeline, then measure what each step of the export loses, and bytes against accuracy
@@ -25,7 +26,7 @@ PLAYER := viewer/dist/index.html
 WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
 PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: repro check test nightly view report hero docs lint lint-player wheel package bench charts blender clean
+.PHONY: repro check test nightly view report hero docs lint lint-player wheel package gate bench charts blender clean
 
 repro: $(READY)
 	$(BIN)/facefolds doctor
@@ -79,6 +80,9 @@ wheel: $(READY) $(PLAYER)
 package: $(PLAYER)
 	mkdir -p dist
 	cd viewer && npm pack --silent --pack-destination ../dist
+
+gate: $(READY)
+	$(BIN)/python -m bench.gate $(or $(GATE),.gate) $(if $(ONLY),--only "$(ONLY)")
 
 bench: $(READY)
 	$(BIN)/python -m bench.speed_accuracy

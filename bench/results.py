@@ -114,16 +114,6 @@ class Cell(Entry):
         return not self.failure and not self.restarts and self.psnr is not None and self.psnr > self.flat
 
 
-class Found(Entry):
-    """A room (bench/rooms.py): scores of its asset, bytes of meshes and video."""
-
-    KEY = ("room",)
-    room: str
-    figures: Means = {}
-    bytes: int = 0
-    commit: str = ""
-
-
 class Row(Entry):
     """An asset with a few values of its subject's configuration changed (bench/sweeps.py).
 

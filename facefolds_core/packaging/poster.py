@@ -12,10 +12,8 @@ from facefolds_core.asset.manifest import Bounds, Manifest
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.track_file import read_track
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of
-from facefolds_core.rendering.reference import room_from
-from facefolds_core.rendering.reflection import reflected_colours
 
 FIELD_OF_VIEW, FILLED = 30.0, 0.92
 """Of the player's first view (viewer/src/view.js): degrees, and how much of a square the longer side takes."""
@@ -54,9 +52,6 @@ def write_poster(path: Path, manifest: Manifest, side: int, quality: int) -> Cam
     assert manifest.bounds is not None
     level = read_level(path.parent, manifest.full, read_track(path.parent, manifest))
     camera = home_camera(manifest.bounds, side)
-    seen_by = level.camera_in_head(camera, 0)
-    hits, maps = AssetCaster(level).cast(seen_by), level.reflection()
-    added = None if maps is None else reflected_colours(hits, seen_by, level.windows, maps, room_from(level, 0))
-    rgb, _ = composite(hits, level.frame(0), BACKGROUND, added)
+    rgb, _ = view_of(level, camera).composite(level.frame(0), BACKGROUND)
     Image.fromarray(np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8)).save(path, quality=quality)
     return camera

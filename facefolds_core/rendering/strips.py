@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.reader import Asset
+from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit
-from facefolds_core.rendering.reference import render_asset
 
 Colour = tuple[float, float, float]
 
@@ -28,6 +28,7 @@ def strip(
     box, eyes = asset.manifest.bounds, [Eye(azimuth) for azimuth in azimuths]
     away = 1.0 if box is None else max(1.0, distance_to_fit(box.min, box.max, eyes, *size, field_of_view))
     cameras = [camera_of(Eye(eye.azimuth, distance=away), *size, field_of_view) for eye in eyes]
-    seen = [render_asset(asset, camera, 0) for camera in cameras]
+    textures = asset.frame(0)
+    seen = [view_of(asset.full, camera).composite(textures) for camera in cameras]
     rows = [np.hstack([rgb + (1 - alpha[..., None]) * np.array(colour) for rgb, alpha in seen]) for colour in colours]
     return np.asarray(np.rint(255 * np.vstack(rows).clip(0, 1)), np.uint8)

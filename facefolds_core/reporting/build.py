@@ -146,6 +146,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
         "angles": tables.angles(seen) if seen else [],
         "worst": next((one for one in compared if one["worst"]), None),
+        "patch": patch(subject),
         "views": record.on_sheet if record else 0,
         "masked": seen is not None and seen.masked,
         **layers(subject),
@@ -169,16 +170,13 @@ def warnings(metrics: dict[str, Any]) -> list[str]:
 def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
     """The figures at the head of the page."""
     metrics, manifest = subject.facts.metrics, subject.asset.manifest
-    asset, cost, suffix = metrics.get("asset", {}), metrics.get("cost", {}), key.removeprefix("psnr")
+    asset, cost = metrics.get("asset", {}), metrics.get("cost", {})
     where = HEADLINE_WORDS[key]
-    # There is no ST-LPIPS over a plate: that of the subject stands for it.
-    near = suffix if suffix != "_over_plate" else "_subject"
-    beside = HEADLINE_WORDS[f"psnr{near}"]
     files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
     return [
         {"name": "PSNR", "value": number_unit(asset.get(key), "dB"), "note": f"{where}, held-out cameras"},
-        {"name": "SSIM", "value": words.number(asset.get(f"ssim{suffix}"), 3), "note": f"{where}, 1 is best"},
-        {"name": "ST-LPIPS", "value": words.number(asset.get(f"st_lpips{near}"), 3), "note": f"{beside}, 0 is best"},
+        *optional_tile("Worst patch", asset.get("worst_patch"), "of any held-out picture"),
+        *optional_tile("What moves", asset.get("psnr_moving"), "where and when the photos change"),
         {"name": "Size", "value": words.size(files), "note": "meshes and video"},
         {
             "name": "Triangles",
@@ -187,6 +185,11 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
         },
         {"name": "Training", "value": words.duration(cost.get("train_seconds")), "note": str(cost.get("device", ""))},
     ]
+
+
+def optional_tile(name: str, value: float | None, note: str) -> list[dict[str, str]]:
+    """A tile in dB, or none where there is no figure."""
+    return [] if value is None else [{"name": name, "value": number_unit(value, "dB"), "note": note}]
 
 
 def number_unit(value: Any, unit: str) -> str:
@@ -228,6 +231,26 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
             }
         )
     return result
+
+
+def patch(subject: Subject) -> dict[str, Any] | None:
+    """The window in which the asset is worst, truth beside asset; None where it is not known."""
+    crop = subject.record.patch if subject.record else None
+    if crop is None:
+        return None
+    row, column, side = crop.box
+    height, width = crop.truth.shape[:2]
+    box = {"top": row / height, "left": column / width, "height": side / height, "width": side / width}
+    return {
+        "truth": pictures.exact(crop.truth),
+        "asset": pictures.exact(crop.asset),
+        "width": width,
+        "height": height,
+        "box": "; ".join(f"{name}: {100 * share:.1f}%" for name, share in box.items()),
+        "camera": crop.camera,
+        "label": words.frame_label(subject.scene.frame_ids if subject.scene else (), crop.frame),
+        "psnr": words.number(crop.psnr),
+    }
 
 
 def place_words(place: tables.Place | None) -> list[str]:

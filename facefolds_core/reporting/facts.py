@@ -67,7 +67,7 @@ class ImageScores:
     """One row of per_image.parquet, of the asset.
 
     Attributes:
-        psnr, psnr_subject, psnr_found, psnr_over_plate: dB; None where the value cannot be had.
+        psnr, psnr_subject, psnr_found, psnr_over_plate, psnr_any: dB; None where the value cannot be had.
     """
 
     camera: str
@@ -76,6 +76,7 @@ class ImageScores:
     psnr_subject: float | None
     psnr_found: float | None = None
     psnr_over_plate: float | None = None
+    psnr_any: float | None = None
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ def read_images(path: Path) -> tuple[ImageScores, ...]:
         return ()
     check_regular(path, REMEDY)
     columns = ["camera", "frame", "variant", "psnr", "psnr_subject"]
-    more = ["psnr_found", "psnr_over_plate", "split"]
+    more = ["psnr_found", "psnr_over_plate", "psnr_any", "split"]
     try:
         known = pq.read_schema(path).names
         rows = pq.read_table(path, columns=[*columns, *(name for name in more if name in known)]).to_pylist()

@@ -26,6 +26,11 @@ def photo(image: Array) -> str:
     return _encode(Image.fromarray(_bytes(image)), "webp", quality=PHOTO_QUALITY, method=4)
 
 
+def exact(image: Array) -> str:
+    """(H, W, 3) in [0, 1] -> PNG: small crops, shown large."""
+    return _encode(Image.fromarray(_bytes(image)), "png", optimize=True)
+
+
 def texture(rgba: NDArray[np.uint8], longest: int) -> str:
     """(H, W, 4) straight alpha -> WebP with alpha, at most `longest` pixels a side."""
     image = Image.fromarray(rgba)

@@ -24,6 +24,7 @@ VARIANT_NAMES = {
     "model": "model",
     "diffuse": "model without view branch",
     "asset": "asset",
+    "asset_diffuse": "asset without its reflection",
 }
 METRIC_NAMES = {"psnr": "PSNR, dB", "ssim": "SSIM", "lpips": "LPIPS", "st_lpips": "ST-LPIPS"}
 HEAT_RANGE = 3.0
@@ -51,6 +52,19 @@ def share(value: float | None, most: float) -> float:
 
 
 GROUPS: dict[str, dict[str, tuple[str, int]]] = {
+    "any background": {"psnr_any": ("PSNR, dB", 2), "worst_patch": ("worst patch, dB", 2)},
+    "over time": {
+        "psnr_moving": ("PSNR of what moves, dB", 2),
+        "temporal": ("share explained", 2),
+        "flicker": ("flicker", 4),
+        "cvvdp": ("CVVDP, JOD", 2),
+    },
+    "error of opacity": {
+        "opacity_inside": ("inside", 3),
+        "opacity_edge": ("at the outline", 3),
+        "opacity_outside": ("outside", 3),
+    },
+    "detail": {"ssim_high": ("SSIM of high frequencies", 3)},
     "over the plate": {"psnr_over_plate": ("PSNR, dB", 2), "ssim_over_plate": ("SSIM", 3)},
     "subject": {f"{key}_subject": (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
     "found matte": {f"{key}_found": (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
@@ -60,7 +74,6 @@ GROUPS: dict[str, dict[str, tuple[str, int]]] = {
         "psnr_band_over_plate": ("along it, over the plate", 2),
     },
     "matte": {"matte_iou": ("IoU", 3), "matte_sad": ("SAD", 2)},
-    "over time": {"temporal": ("share explained", 2), "flicker": ("flicker", 4), "cvvdp": ("CVVDP, JOD", 2)},
     "whole frame": {key: (name, 2 if key == "psnr" else 3) for key, name in METRIC_NAMES.items()},
 }
 """Group -> metric -> its name and its digits; the whole frame comes last."""

@@ -10,6 +10,10 @@ from facefolds_core.reporting.words import number, size
 Row = dict[str, Any]
 
 VERDICTS: dict[str, tuple[str, int, float, int]] = {
+    "psnr_any": ("PSNR over any background, dB", 1, 0.05, 2),
+    "worst_patch": ("PSNR of the worst patch, dB", 1, 0.2, 2),
+    "psnr_moving": ("PSNR of what moves, dB", 1, 0.1, 2),
+    "opacity_edge": ("error of opacity at the outline", -1, 0.002, 3),
     "psnr_over_plate": ("PSNR over the plate, dB", 1, 0.05, 2),
     "psnr_subject": ("PSNR of the subject, dB", 1, 0.05, 2),
     "psnr_interior": ("PSNR inside the outline, dB", 1, 0.05, 2),

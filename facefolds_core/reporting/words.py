@@ -72,7 +72,7 @@ def listed(names: list[str]) -> str:
 
 
 def quality_key(metrics: dict[str, Any]) -> str:
-    """The PSNR that says most: over the plate, of the subject, within the found matte, or of the whole frame."""
+    """The PSNR that says most: the first of HEADLINES that is there."""
     return headline(metrics)
 
 
@@ -114,12 +114,11 @@ def quality_words(metrics: dict[str, Any]) -> str:
     """The asset's means, what the export cost, and what the whole frame says."""
     key = quality_key(metrics)
     asset, diffuse = metrics.get("asset", {}), metrics.get("diffuse", {})
-    ssim = asset.get(key.replace("psnr", "ssim"))
+    ssim, high = asset.get(key.replace("psnr", "ssim")), asset.get("ssim_high")
     images = metrics.get("images_with_mask" if key == "psnr_subject" else "images")
-    text = (
-        f"On {count(images)} held-out pictures the asset reaches {number(asset.get(key))} dB PSNR and "
-        f"{number(ssim, 3)} SSIM {HEADLINE_WORDS[key]}."
-    )
+    text = f"On {count(images)} held-out pictures the asset reaches {number(asset.get(key))} dB PSNR"
+    text += f" {HEADLINE_WORDS[key]}" if ssim is None else f" and {number(ssim, 3)} SSIM {HEADLINE_WORDS[key]}"
+    text += "." if high is None else f", and {number(high, 3)} SSIM of high frequencies."
     here, before = finite(asset.get(key)), finite(diffuse.get(key))
     if here is not None and before is not None:
         loss = before - here

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MOST = 2610
+MOST = 2700
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
-`rooms`, 118 lines, and `large`, 88 (2400 before them)."""
+`gate`, 208 lines, which took over from `rooms`, and `large`, 88 (2400 before them)."""
 
 
 def test_the_benchmarks_stay_small(project_root: Path) -> None:

@@ -23,6 +23,8 @@ from tests.scenes import look_at_origin, make_scene
 
 SIZE = 32
 FRAMES = 3
+TEXELS = 8
+"""Equal texels a side of each pixel: all rays through its area meet one colour."""
 
 SPEC = ModelSpec(
     centre=(-0.25, 0.0, 0.0),
@@ -67,8 +69,8 @@ def half_mask() -> NDArray[np.uint8]:
 
 @dataclass(frozen=True)
 class FlatAsset:
-    """A square that fills the image of the camera at azimuth 0, textured with `frames_` (K, R, R, 3), opaque; with a
-    `track` it moves."""
+    """A square that fills the image of the camera at azimuth 0, textured with `frames_` (K, R, R, 3), opaque, each
+    pixel of them TEXELS x TEXELS texels; with a `track` it moves."""
 
     frames_: NDArray[np.uint8]
     track: Track | None = None
@@ -98,8 +100,11 @@ class FlatAsset:
         return ()
 
     def frames(self) -> Iterator[NDArray[np.uint8]]:
-        for frame in self.frames_:
-            yield np.concatenate([frame, np.full((*frame.shape[:2], 1), 255, np.uint8)], -1)[None]
+        return (self.frame(k) for k in range(self.num_frames))
+
+    def frame(self, k: int) -> NDArray[np.uint8]:
+        frame = self.frames_[k].repeat(TEXELS, 0).repeat(TEXELS, 1)
+        return np.concatenate([frame, np.full((*frame.shape[:2], 1), 255, np.uint8)], -1)[None]
 
 
 def flat_asset(frames: NDArray[np.uint8] | None = None) -> Asset:

@@ -58,4 +58,5 @@ def test_it_is_in_the_evaluation_where_there_is_one(tmp_path: Path) -> None:
         "model": FRAMES,
         "diffuse": None,
         "asset": FRAMES,
+        "asset_diffuse": None,
     }

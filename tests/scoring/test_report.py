@@ -70,6 +70,11 @@ def test_images_without_a_value_are_not_counted() -> None:
     assert averages(SCORES, "asset")["psnr_subject"] == 12
 
 
+def test_of_the_worst_patch_the_least_is_given() -> None:
+    patched = [replace(s, values={**s.values, "worst_patch": s.values["psnr"]}) for s in SCORES]
+    assert averages(patched, "asset")["worst_patch"] == 20
+
+
 def test_a_metric_that_no_image_has_is_null() -> None:
     assert averages(SCORES, "asset")["lpips"] is None
 
@@ -79,7 +84,8 @@ def test_metrics_json_has_all_its_keys_and_no_nan(folders: SubjectFolders) -> No
     write_json(folders.metrics, metrics_json("somebody", SCORES, cost))
     metrics = json.loads(folders.metrics.read_text(), parse_constant=pytest.fail)
     about = ["headline", "matte", "band_pixels", "images", "images_with_mask", "truth_change"]
-    assert list(metrics) == ["version", "subject", *about, *VARIANTS, "warnings", "cost"]
+    places = ["worst_patch", "training_views"]
+    assert list(metrics) == ["version", "subject", *about, *VARIANTS, *places, "warnings", "cost"]
     assert (metrics["version"], metrics["images"], metrics["images_with_mask"]) == (METRICS_VERSION, 3, 2)
     assert all(list(metrics[v]) == [*ALL_METRICS, *FILM_METRICS] for v in VARIANTS)
     assert list(metrics["cost"]) == COST_KEYS
@@ -138,6 +144,7 @@ def test_cameras_for_validation_are_averaged_apart() -> None:
         ({"psnr": 1.0, "psnr_found": 2.0}, "psnr_found"),
         ({"psnr": 1.0, "psnr_subject": 2.0}, "psnr_subject"),
         ({"psnr": 1.0, "psnr_subject": 2.0, "psnr_over_plate": 3.0}, "psnr_over_plate"),
+        ({"psnr_over_plate": 3.0, "psnr_any": 2.0}, "psnr_any"),
         ({}, "psnr"),
     ],
 )
@@ -146,7 +153,7 @@ def test_the_headline_is_what_says_most(values: dict[str, float], best: str) -> 
 
 
 def test_changes_and_warnings_are_in_it() -> None:
-    changes = {"holdout": {"asset": Change(0.5, 0.01, 0.1)}}
+    changes = {"holdout": {"asset": Change(0.5, 20.0, 0.01, 0.1)}}
     about = Circumstances("found", 4.0, changes, warnings=[fact("matte_is_found")])  # type: ignore[arg-type]
     metrics = metrics_json("somebody", SCORES, {}, about)
     assert (metrics["asset"]["temporal"], metrics["asset"]["flicker"], metrics["truth_change"]) == (0.5, 0.01, 0.1)

@@ -45,6 +45,19 @@ def test_so_much_of_the_motion_explains_so_much_of_the_variance(share: float, ex
     assert change(mean + share * (truth() - mean), truth()).temporal == pytest.approx(explained)
 
 
+def test_errors_count_where_and_when_the_photos_change() -> None:
+    """A frozen film of one that changes in one half of the picture, in one frame, is as far off as that."""
+    photos = np.full((FRAMES, 8, 8, 3), 0.5)
+    photos[7, :, 4:] = 0.9
+    frozen = np.full_like(photos, 0.5)
+    mean, odd, usual = 0.54, 0.36**2, 0.04**2  # of the right half, and squared distances to it
+    expected = odd * 0.4**2 / (odd + (FRAMES - 1) * usual)
+    assert mean == pytest.approx(photos[:, 0, 7, 0].mean())
+    assert change(frozen, photos).psnr_moving == pytest.approx(-10 * np.log10(expected))
+    late = photos[[0, 0, 0, 7, 0, 0, 0, 0, 0, 0]]  # the error is the same, at the wrong time twice
+    assert change(late, photos).psnr_moving < change(photos + 0.01, photos).psnr_moving  # type: ignore[operator]
+
+
 def test_an_error_that_comes_and_goes_flickers() -> None:
     blinking = truth() + 0.1 * (np.arange(FRAMES) % 2)[:, None, None, None]
     assert change(blinking, truth()).flicker == pytest.approx(0.1)
@@ -72,7 +85,7 @@ def test_what_is_uncovered_once_does_not_count() -> None:
 
 
 def test_one_frame_does_not_change() -> None:
-    assert change(truth()[:1], truth()[:1], at=[0]) == Change(None, None, None)
+    assert change(truth()[:1], truth()[:1], at=[0]) == Change(None, None, None, None)
 
 
 def test_a_still_life_has_no_variance_to_explain() -> None:

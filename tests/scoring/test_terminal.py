@@ -14,7 +14,7 @@ COST = {"mesh_bytes": 200_000, "texture_bytes": 300_000, "reflection_bytes": 0}
 
 
 def metrics(diffuse: float = 30.0, **values: float) -> dict[str, object]:
-    given = {"model": 30.0, "diffuse": diffuse, "asset": 29.0}
+    given = {"model": 30.0, "diffuse": diffuse, "asset": 29.0, "asset_diffuse": 29.0}
     scores = [
         ImageScore("a", "0", v, dict.fromkeys(ALL_METRICS) | {"psnr": 10.0, "psnr_subject": given[v], **values})
         for v in VARIANTS
@@ -33,7 +33,7 @@ def test_what_nothing_has_is_left_out_and_the_whole_frame_comes_last() -> None:
 
 def test_a_model_without_a_view_branch_is_one_column() -> None:
     assert score_lines(metrics())[0].split()[-2:] == ["model", "asset"]
-    assert score_lines(metrics(diffuse=29.5))[0].split()[-3:] == ["model", "diffuse", "asset"]
+    assert score_lines(metrics(diffuse=29.5))[0].split()[-4:] == ["model", "no", "gloss", "asset"]
 
 
 def test_the_end_says_where_what_how_good_and_how_to_look(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from facefolds_core.scoring.warnings import stands_still, training_events, warni
     ],
 )
 def test_a_film_that_stands_still_is_named(explained: float | None, frames: int, moves: float, said: bool) -> None:
-    change = Change(explained, 0.01, moves)
+    change = Change(explained, 20.0, 0.01, moves)
     found = stands_still({"model": change, "asset": change}, frames, ScoreWarningParams())
     assert [one.kind for one in found] == (["stands_still"] if said else [])
     assert all("train.iterations" in str(one) for one in found)
