@@ -3,8 +3,8 @@
 python -m bench.gate FOLDER [--only "actor; sparse"] [--accept]        (`make gate`)
 
 It prints a table and fails, aloud, where a score, bytes, processor time or memory is worse than it was in
-bench/results/gate.json by more than its tolerance. FOLDER keeps what was measured, and of each asset a strip from -90 to 90 degrees over white,
-black and green: look at it before you accept anything.
+bench/results/gate.json by more than its tolerance. FOLDER keeps what was measured, and a strip of each asset from -90
+to 90 degrees over white, black and green: look at it before you accept anything.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import typer
 from PIL import Image
+from pydantic import Field
 
 from bench.results import ROOT, Entry, Means, Store, commit_name, now
 from bench.run import Project, own_params
@@ -90,7 +91,7 @@ class Found(Entry):
 
     KEY: ClassVar[tuple[str, ...]] = ("case",)
     case: str
-    scores: Means = {}
+    scores: Means = Field(default_factory=dict)
     bytes: int = 0
     cpu_seconds: float = 0.0
     peak_bytes: int = 0
@@ -200,9 +201,9 @@ def main(
     for case in CASES.keys() - {*there(captures)}:
         typer.echo(f"skipped: {case}: no {CASES[case][0]} in {captures}")
     store = Store(folder / "gate.json", "gate", Found)
-    for one in stale(store, names):
-        store.add(apart(one, folder, captures))
-        typer.echo(f"{one}: measured")
+    for case in stale(store, names):
+        store.add(apart(case, folder, captures))
+        typer.echo(f"{case}: measured")
     measured = {one.case: one for one in store.read() if one.case in names}
     typer.echo(f"\n{table(measured)}\n")
     keeping = Store(KEPT, "gate", Found)
