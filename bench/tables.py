@@ -56,7 +56,7 @@ def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
     own = {row.value: row for row in rows if (row.sweep, row.subject) == (sweep, subject)}
     paper = {point["value"]: point for point in PAPER[sweep]}
     disk = {"layers": "disk", "mesh": "disk (mesh)", "texture": "disk (texture)"}[sweep]
-    head = [AXES[sweep], "PSNR of the subject", "SSIM", "ST-LPIPS", "whole frame: PSNR", "SSIM", "ST-LPIPS"]
+    head = [AXES[sweep], "PSNR of the subject", "SSIM", "ST-LPIPS"]
     head += ["triangles", "mesh", "texture", "GPU", "pictures a second", "seconds"]
     head += ["paper: PSNR", "SSIM", "LPIPS", "triangles", disk]
     lines = []
@@ -72,12 +72,9 @@ def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
 
 def _own_cells(row: Row | None) -> list[str]:
     if row is None or row.failure:
-        return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 11]
-    scores = [
-        number(row.figures.get(f"{name}{region}"), 2 if name == "psnr" else 3)
-        for region in ("_subject", "")
-        for name in ("psnr", "ssim", "st_lpips")
-    ]
+        return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 8]
+    names = ("psnr", "ssim", "st_lpips")
+    scores = [number(row.figures.get(f"{name}_subject"), 2 if name == "psnr" else 3) for name in names]
     taken = [row.figures.get(f"{what}_seconds", 0.0) for what in ("train", "export")]
     seconds = " + ".join(f"{seconds:.0f}" for seconds in taken if seconds)
     sizes = [size(row.figures[name]) for name in ("mesh_bytes", "texture_bytes", "gpu_bytes")]

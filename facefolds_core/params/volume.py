@@ -118,7 +118,7 @@ class RoomParams(Section):
     needed_below: Annotated[float, Field(ge=0, le=100)] = 28.0
     """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. Before plain
     walls it has 30 to 33 and an outer zone explains nothing better, but takes up hair and highlights of the subject;
-    before near, bright or patterned ones it has 20 to 26 (docs/research/2026-11-22-rooms.md). Then it is asked:"""
+    before near, bright or patterned ones it has 20 to 26 (docs/research/backgrounds-and-rooms.md). Then it is asked:"""
 
     asked_cameras: Count = 6
     """one of so many training cameras, at least one, is left out of two fits of the coarse level,"""
