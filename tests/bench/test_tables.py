@@ -55,9 +55,7 @@ def test_a_sweep_stands_beside_the_paper() -> None:
     figures = {**cost, "psnr": 11.0, "psnr_subject": 24.0, "export_seconds": 7.0}
     rows = [Row(**given, value=64, figures=figures), Row(**given, value=32, failure="oh")]
     lines = {line.split("|")[1].strip(): line for line in sweep_table(rows, "mesh", "actor").splitlines()}
-    assert lines["64"].startswith(
-        "| 64 | 24.00 |  |  | 1 234 | 2.50 MB | 3 KB | 9.00 MB |  | 7 | 29.49 |"
-    )
+    assert lines["64"].startswith("| 64 | 24.00 |  |  | 1 234 | 2.50 MB | 3 KB | 9.00 MB |  | 7 | 29.49 |")
     assert lines["32"].startswith("| 32 | failed: oh |") and lines["32"].endswith(
         "| 29.12 | 0.831 | 0.291 | 9 962 | 170 KB |"
     )
