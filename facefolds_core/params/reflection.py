@@ -16,8 +16,8 @@ class ReflectionParams(Section):
     """Try a reflection; it is left out all the same where it does not help."""
 
     begin: Literal["rounds", "full", "end"] = "rounds"
-    """When the reflection is first fitted: in the first round of geometry, at full resolution, or to finished textures. "end" is
-    best for programs that cannot draw it (GLB, OpenUSD)."""
+    """When the reflection is first fitted: in the first round of geometry, at full resolution, or to finished textures.
+    "end" is best for programs that cannot draw it (GLB, OpenUSD)."""
 
     texels: Annotated[int, Field(ge=2, le=256)] = 96
     """Texels of the maps of gloss, offset and normals, along the window's longer side."""
