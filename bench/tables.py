@@ -26,6 +26,12 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join([f"| {' | '.join(head)} |".replace("|  |", "| |"), "|---" * len(head) + "|", *lines])
 
 
+def wide(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """The same without spaces: of many columns, which nobody reads as text."""
+    lines = [f"|{'|'.join(row)}|" for row in (head, *rows)]
+    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
+
+
 def replace_between(path: Path, start: str, end: str, text: str) -> None:
     """Write `text` between two markers of a document.
 
@@ -67,7 +73,7 @@ def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
             theirs = [f"{point['psnr']:.2f}", f"{point['ssim']:.3f}", f"{point['lpips']:.3f}"]
             theirs += [spaced(point["triangles"]), point["disk"]]
         lines.append([str(value), *_own_cells(own.get(value)), *theirs])
-    return markdown(head, lines)
+    return wide(head, lines)
 
 
 def _own_cells(row: Row | None) -> list[str]:
@@ -106,7 +112,7 @@ def _hazard_table(cells: Sequence[Cell], subject: str, preset: str) -> str:
     if subject == FILM:
         lines = [line for hazard in ROWS if (line := _hazard_line(own, hazard))]
         head = ["", "weak", "middle", "strong", "seeds", "worst view, at the strongest measured"]
-        return f"{text} dB lost:\n\n{markdown(head, lines)}"
+        return f"{text} dB lost:\n\n{wide(head, lines)}"
     found = dict.fromkeys((c.hazard, c.strength) for c in own if c.hazard != "clean")
     known = {hazard.key: hazard for hazard in ROWS}
     named = [(known.get(key, Hazard(key, key, (0, 0, 0), "{} units")), strength) for key, strength in found]

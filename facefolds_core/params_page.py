@@ -58,6 +58,9 @@ All keys of params.yaml, made from facefolds_core/params by `python -m facefolds
 stage can be overridden for one subject, key by key ([subjects](../guide/subjects.md)). Unknown keys, wrong types and
 numbers out of bounds are refused. Lengths are in units of the scene: cameras are about 1 away from the subject.
 
+Kinds of values: a *share* is a number from 0 to 1, a *part* the same but not 0; a *count* is an integer from 1, a
+*natural* one from 0; a *weight* is a number from 0; *factor*, *rate* and *length* are numbers above 0.
+
 Each key can be set for one run, and for sweeps, by its path; `++` adds it where params.yaml does not write it:
 
 ```
@@ -67,6 +70,18 @@ dvc exp run --queue -S '++train.volume.reach=0.4,0.45,0.5'       # a sweep: one 
 ```
 """
 
+
+KINDS = {
+    "number ≥0, ≤1": "share",
+    "number >0, ≤1": "part",
+    "integer ≥1, ≤1e+08": "count",
+    "integer ≥0, ≤1e+08": "natural",
+    "number ≥0, ≤1e+06": "weight",
+    "number >0, ≤1e+06": "factor",
+    "number >0, ≤10": "length",
+    "number >0, ≤1000": "rate",
+}
+"""Values with bounds that many keys have -> their name in the tables."""
 
 EXPERT = """\
 ## Expert keys
@@ -160,7 +175,8 @@ def _is_list(annotation: Any) -> bool:
 
 def _kind(field: FieldInfo) -> str:
     bounds = [text for part in field.metadata if (text := _bound(part))]
-    return _type(field.annotation) + (" " + ", ".join(bounds) if bounds else "")
+    kind = _type(field.annotation) + (" " + ", ".join(bounds) if bounds else "")
+    return KINDS.get(kind, kind)
 
 
 def _type(annotation: Any) -> str:
