@@ -14,8 +14,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
-"""Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
-meshes) and R^t (disk: video), 120 images of subject 002914589. `other_bytes` is what `disk` leaves out."""
+"""Its ablations as printed (docs/research/ablations.md). `other_bytes` is what `disk` leaves out."""
 AXES = {"layers": "layers N", "mesh": "R^m", "texture": "R^t"}
 RATES = {"paper": "paper"} | {codec: f"ours, {codec}" for codec in ("h264", "vp9", "av1")} | {"h264x32": "ours32, h264"}
 """Series of bytes against accuracy -> in tables and charts."""
@@ -27,9 +26,8 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def wide(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The same without spaces: of many columns, which nobody reads as text."""
-    lines = [f"|{'|'.join(row)}|" for row in (head, *rows)]
-    return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]])
+    """The same of many columns, without spaces: nobody reads it as text."""
+    return markdown(head, rows).replace(" | ", "|").replace("| ", "|").replace(" |", "|")
 
 
 def replace_between(path: Path, start: str, end: str, text: str) -> None:

@@ -94,6 +94,7 @@ def page() -> str:
     """The whole page, Markdown."""
     parts = [HEAD, "## `subjects.NAME`\n", _table(Subject, "", set(Overrides.model_fields))]
     parts += ["## The keys that people turn\n", _rows(_first_keys()), EXPERT]
+    seen: dict[type[Section], str] = {}
     for stage, kinds in SECTIONS.items():
         for kind in kinds:
             model = kind.model_fields["model"].default if len(kinds) > 1 else None
@@ -101,12 +102,12 @@ def page() -> str:
             parts.append(_words(kind.__doc__) + "\n")
             if model:
                 parts.append(_presets(model))
-            parts += _tables(kind, stage)
+            parts += _tables(kind, stage, seen)
     return "\n".join(parts)
 
 
-def _tables(kind: type[Section], path: str) -> Iterator[str]:
-    """A table of a section's own keys, then one of each section in it."""
+def _tables(kind: type[Section], path: str, seen: dict[type[Section], str]) -> Iterator[str]:
+    """A table of a section's own keys, then one of each section in it; `seen` has the places of earlier tables."""
     stage, _, folder = path.partition(".")
     first = {key for key in FIRST.get(stage, ()) if _holder(stage, key) is kind and key.rpartition(".")[0] == folder}
     yield _table(kind, path, {key.rpartition(".")[2] for key in first})
@@ -114,8 +115,12 @@ def _tables(kind: type[Section], path: str) -> Iterator[str]:
         inner = section_in(field.annotation)
         if inner is not None:
             yield f"### `{path}.{name}`{' (a list of these)' if _is_list(field.annotation) else ''}\n"
+            if inner in seen:
+                yield f"The keys of `{seen[inner]}`.\n"
+                continue
+            seen[inner] = f"{path}.{name}"
             yield _words(inner.__doc__) + "\n"
-            yield from _tables(inner, f"{path}.{name}")
+            yield from _tables(inner, f"{path}.{name}", seen)
 
 
 def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
