@@ -14,8 +14,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_text
 
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
-"""Its ablations as printed: number of manifolds (disk: meshes and video; 240 images of two subjects); R^m (disk:
-meshes) and R^t (disk: video), 120 images of subject 002914589. `other_bytes` is what `disk` leaves out."""
+"""Its ablations as printed (docs/research/ablations.md). `other_bytes` is what `disk` leaves out."""
 AXES = {"layers": "layers N", "mesh": "R^m", "texture": "R^t"}
 RATES = {"paper": "paper"} | {codec: f"ours, {codec}" for codec in ("h264", "vp9", "av1")} | {"h264x32": "ours32, h264"}
 """Series of bytes against accuracy -> in tables and charts."""
@@ -24,6 +23,11 @@ RATES = {"paper": "paper"} | {codec: f"ours, {codec}" for codec in ("h264", "vp9
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [f"| {' | '.join(row)} |" for row in rows]
     return "\n".join([f"| {' | '.join(head)} |".replace("|  |", "| |"), "|---" * len(head) + "|", *lines])
+
+
+def wide(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """The same of many columns, without spaces: nobody reads it as text."""
+    return markdown(head, rows).replace(" | ", "|").replace("| ", "|").replace(" |", "|")
 
 
 def replace_between(path: Path, start: str, end: str, text: str) -> None:
@@ -56,7 +60,7 @@ def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
     own = {row.value: row for row in rows if (row.sweep, row.subject) == (sweep, subject)}
     paper = {point["value"]: point for point in PAPER[sweep]}
     disk = {"layers": "disk", "mesh": "disk (mesh)", "texture": "disk (texture)"}[sweep]
-    head = [AXES[sweep], "PSNR of the subject", "SSIM", "ST-LPIPS", "whole frame: PSNR", "SSIM", "ST-LPIPS"]
+    head = [AXES[sweep], "PSNR of the subject", "SSIM", "ST-LPIPS"]
     head += ["triangles", "mesh", "texture", "GPU", "pictures a second", "seconds"]
     head += ["paper: PSNR", "SSIM", "LPIPS", "triangles", disk]
     lines = []
@@ -67,17 +71,14 @@ def sweep_table(rows: Sequence[Row], sweep: str, subject: str) -> str:
             theirs = [f"{point['psnr']:.2f}", f"{point['ssim']:.3f}", f"{point['lpips']:.3f}"]
             theirs += [spaced(point["triangles"]), point["disk"]]
         lines.append([str(value), *_own_cells(own.get(value)), *theirs])
-    return markdown(head, lines)
+    return wide(head, lines)
 
 
 def _own_cells(row: Row | None) -> list[str]:
     if row is None or row.failure:
-        return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 11]
-    scores = [
-        number(row.figures.get(f"{name}{region}"), 2 if name == "psnr" else 3)
-        for region in ("_subject", "")
-        for name in ("psnr", "ssim", "st_lpips")
-    ]
+        return ["not measured" if row is None else f"failed: {row.failure}", *[""] * 8]
+    names = ("psnr", "ssim", "st_lpips")
+    scores = [number(row.figures.get(f"{name}_subject"), 2 if name == "psnr" else 3) for name in names]
     taken = [row.figures.get(f"{what}_seconds", 0.0) for what in ("train", "export")]
     seconds = " + ".join(f"{seconds:.0f}" for seconds in taken if seconds)
     sizes = [size(row.figures[name]) for name in ("mesh_bytes", "texture_bytes", "gpu_bytes")]
@@ -109,7 +110,7 @@ def _hazard_table(cells: Sequence[Cell], subject: str, preset: str) -> str:
     if subject == FILM:
         lines = [line for hazard in ROWS if (line := _hazard_line(own, hazard))]
         head = ["", "weak", "middle", "strong", "seeds", "worst view, at the strongest measured"]
-        return f"{text} dB lost:\n\n{markdown(head, lines)}"
+        return f"{text} dB lost:\n\n{wide(head, lines)}"
     found = dict.fromkeys((c.hazard, c.strength) for c in own if c.hazard != "clean")
     known = {hazard.key: hazard for hazard in ROWS}
     named = [(known.get(key, Hazard(key, key, (0, 0, 0), "{} units")), strength) for key, strength in found]

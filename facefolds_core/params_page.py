@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -21,16 +21,47 @@ from facefolds_core.params.train import PRESETS
 
 PAGE = Path("docs/reference/params.md")
 
+FIRST = {
+    "normalize": ("long_side", "short_side", "max_azimuth", "max_elevation", "stabilize"),
+    "matte": ("method", "train"),
+    "train": (
+        "preset",
+        "device",
+        "seed",
+        "layers",
+        "iterations",
+        "volume.reach",
+        "reflection.begin",
+        "segments.joint_frames",
+        "segments.memory_megabytes",
+    ),
+    "sample": ("resolution",),
+    "decimate": ("resolution",),
+    "texture": ("resolution",),
+    "bake": ("hold",),
+    "compress": (
+        "mesh.max_error_pixels",
+        "video.codec",
+        "video.target_psnr",
+        "video.preset",
+        "photos",
+        "frame_rate_factor",
+        "stream.beyond",
+    ),
+}
+"""Stage -> the keys that people turn: they stand first, and not again among the expert keys."""
+
 HEAD = """\
 # Parameters
 
 All keys of params.yaml, made from facefolds_core/params by `python -m facefolds_core.params_page`. Every section of a
-stage can be overridden for one subject, key by key ([subjects](../guide/subjects.md)). Unknown keys are refused, and so
-are strings or true and false where a number belongs, and numbers out of bounds. Lengths are in units of the scene:
-cameras are about 1 away from the subject.
+stage can be overridden for one subject, key by key ([subjects](../guide/subjects.md)). Unknown keys, wrong types and
+numbers out of bounds are refused. Lengths are in units of the scene: cameras are about 1 away from the subject.
 
-For one run without a change of the file, and for sweeps, each key is set by its path; `++` adds it where params.yaml
-does not write it:
+Kinds of values: a *share* is a number from 0 to 1, a *part* the same but not 0; a *count* is an integer from 1, a
+*natural* one from 0; a *weight* is a number from 0; *factor*, *rate* and *length* are numbers above 0.
+
+Each key can be set for one run, and for sweeps, by its path; `++` adds it where params.yaml does not write it:
 
 ```
 dvc exp run -S '++train.volume.reach=0.4'                        # of a section
@@ -40,9 +71,30 @@ dvc exp run --queue -S '++train.volume.reach=0.4,0.45,0.5'       # a sweep: one 
 """
 
 
+KINDS = {
+    "number ≥0, ≤1": "share",
+    "number >0, ≤1": "part",
+    "integer ≥1, ≤1e+08": "count",
+    "integer ≥0, ≤1e+08": "natural",
+    "number ≥0, ≤1e+06": "weight",
+    "number >0, ≤1e+06": "factor",
+    "number >0, ≤10": "length",
+    "number >0, ≤1000": "rate",
+}
+"""Values with bounds that many keys have -> their name in the tables."""
+
+EXPERT = """\
+## Expert keys
+
+Few users need what follows: every other key, by section.
+"""
+
+
 def page() -> str:
     """The whole page, Markdown."""
     parts = [HEAD, "## `subjects.NAME`\n", _table(Subject, "", set(Overrides.model_fields))]
+    parts += ["## The keys that people turn\n", _rows(_first_keys()), EXPERT]
+    seen: dict[type[Section], str] = {}
     for stage, kinds in SECTIONS.items():
         for kind in kinds:
             model = kind.model_fields["model"].default if len(kinds) > 1 else None
@@ -50,28 +102,52 @@ def page() -> str:
             parts.append(_words(kind.__doc__) + "\n")
             if model:
                 parts.append(_presets(model))
-            parts += _tables(kind, stage)
+            parts += _tables(kind, stage, seen)
     return "\n".join(parts)
 
 
-def _tables(kind: type[Section], path: str) -> Iterator[str]:
-    """A table of a section's own keys, then one of each section in it."""
-    yield _table(kind, path, set())
+def _tables(kind: type[Section], path: str, seen: dict[type[Section], str]) -> Iterator[str]:
+    """A table of a section's own keys, then one of each section in it; `seen` has the places of earlier tables."""
+    stage, _, folder = path.partition(".")
+    first = {key for key in FIRST.get(stage, ()) if _holder(stage, key) is kind and key.rpartition(".")[0] == folder}
+    yield _table(kind, path, {key.rpartition(".")[2] for key in first})
     for name, field in kind.model_fields.items():
         inner = section_in(field.annotation)
         if inner is not None:
             yield f"### `{path}.{name}`{' (a list of these)' if _is_list(field.annotation) else ''}\n"
+            if inner in seen:
+                yield f"The keys of `{seen[inner]}`.\n"
+                continue
+            seen[inner] = f"{path}.{name}"
             yield _words(inner.__doc__) + "\n"
-            yield from _tables(inner, f"{path}.{name}")
+            yield from _tables(inner, f"{path}.{name}", seen)
 
 
 def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
-    rows = [
-        f"| `{field.alias or name}` | {_kind(field)} | {_default(field)} | {_words(field.description)} |"
+    return _rows(
+        (field.alias or name, field)
         for name, field in kind.model_fields.items()
         if name not in hidden and (not _is_section(field.annotation) or not path)
-    ]
-    return "\n".join(["| key | values | default | meaning |", "|---|---|---|---|", *rows, ""]) if rows else ""
+    )
+
+
+def _rows(keys: Iterable[tuple[str, FieldInfo]]) -> str:
+    rows = [f"|`{name}`|{_kind(field)}|{_default(field)}|{_words(field.description)}|" for name, field in keys]
+    return "\n".join(["|key|values|default|meaning|", "|---|---|---|---|", *rows, ""]) if rows else ""
+
+
+def _holder(stage: str, key: str) -> type[Section]:
+    """The section that holds a key of FIRST; of `train`, the explicit model's."""
+    kind = SECTIONS[stage][0]
+    for name in key.split(".")[:-1]:
+        kind = section_in(kind.model_fields[name].annotation) or kind
+    return kind
+
+
+def _first_keys() -> Iterator[tuple[str, FieldInfo]]:
+    for stage, keys in FIRST.items():
+        for key in keys:
+            yield f"{stage}.{key}", _holder(stage, key).model_fields[key.rpartition(".")[2]]
 
 
 def _presets(model: str) -> str:
@@ -104,7 +180,8 @@ def _is_list(annotation: Any) -> bool:
 
 def _kind(field: FieldInfo) -> str:
     bounds = [text for part in field.metadata if (text := _bound(part))]
-    return _type(field.annotation) + (" " + ", ".join(bounds) if bounds else "")
+    kind = _type(field.annotation) + (" " + ", ".join(bounds) if bounds else "")
+    return KINDS.get(kind, kind)
 
 
 def _type(annotation: Any) -> str:
@@ -124,8 +201,8 @@ def _type(annotation: Any) -> str:
 
 
 def _bound(part: Any) -> str:
-    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-    return ", ".join(f"{sign} {getattr(part, name):g}" for name, sign in signs.items() if hasattr(part, name))
+    signs = {"ge": "≥", "gt": ">", "le": "≤", "lt": "<"}
+    return ", ".join(f"{sign}{getattr(part, name):g}" for name, sign in signs.items() if hasattr(part, name))
 
 
 def _default(field: FieldInfo) -> str:

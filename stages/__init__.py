@@ -5,7 +5,7 @@ import sys
 from types import TracebackType
 
 # Threads of torch (libgomp) that wait for each other sleep instead of spinning: measured as fast on idle cores, and
-# five times as fast where other work shares them (docs/research/2026-11-21-performance.md). To be set before torch is
+# five times as fast where other work shares them (docs/research/performance.md). To be set before torch is
 # imported.
 os.environ.setdefault("GOMP_SPINCOUNT", "0")
 

@@ -87,12 +87,11 @@ def api_page() -> str:
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Every research note, the newest first, under the heading that mkdocs.yml has for them."""
-    named = sorted((ROOT / "docs" / "research").glob("20*.md"), reverse=True)
-    others = sorted((ROOT / "docs" / "research").glob("[a-z]*.md"))
+    """Every research note under the heading that mkdocs.yml has for them."""
+    notes = sorted((ROOT / "docs" / "research").glob("[a-z]*.md"))
     for entry in config.nav or []:
         if NOTES in entry:
-            entry[NOTES] += [f"research/{path.name}" for path in [*others, *named]]
+            entry[NOTES] += [f"research/{path.name}" for path in notes]
     return config
 
 

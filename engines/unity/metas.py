@@ -16,6 +16,7 @@ IMPORTERS = {
     ".hlsl": "ShaderIncludeImporter:",
     ".json": "PackageManifestImporter:",
     ".md": "TextScriptImporter:",
+    "": "DefaultImporter:",
 }
 
 

@@ -36,7 +36,7 @@ def rgb_to_yuv420(rgb: NDArray[np.uint8]) -> tuple[Plane, Plane, Plane]:
 
     Chroma is what comes nearest when it is interpolated: least squares. Means of 2 x 2 pixels would be blurred twice,
     by the mean and by the interpolation: with them half of the detail that `actor`'s video lost was lost here
-    (docs/research/2026-11-22-detail.md).
+    (docs/research/codec.md).
     """
     r, g, b = (rgb[..., channel].astype(np.float32) / np.float32(255) for channel in range(3))
     luma = KR * r + KG * g + KB * b

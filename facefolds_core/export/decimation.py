@@ -1,7 +1,7 @@
 """Decimation of Poisson surfaces, each by itself, to at most R^m x R^m vertices, and their texture coordinates.
 
 Quadric edge collapse (Garland and Heckbert 1997) by fast_simplification with aggressiveness 3. Measured
-(docs/research/2026-11-21-export.md) against its default, which errs two to three times more, and pymeshlab's, which
+(docs/research/export.md) against its default, which errs two to three times more, and pymeshlab's, which
 with its border kept misses the bound on the vertices and errs more at the same number of triangles.
 """
 

@@ -19,33 +19,31 @@ class CaptureParams(Section):
     """Number of frames, evenly spread over `seconds`."""
 
     seconds: Annotated[float, Field(gt=0, le=3600)] = 1.5
-    """Of its take that are filmed, from the beginning. The take is 4 s long and loops; so do its first 1.5 s, a
-    greeting, a blink and a smile. Twelve frames of them are eight a second: each sound is seen, and the film is small.
-    """
+    """Seconds of her take of 4 s that are filmed, from the beginning. Both the take and its first 1.5 s loop."""
 
     height: ImageSide = 192
-    """Of the images, pixels."""
+    """Height of the images, pixels."""
 
     width: ImageSide = 128
-    """Of the images, pixels."""
+    """Width of the images, pixels."""
 
     fps: FrameRate | None = None
     """Frames a second at which it is played. null: as fast as it was filmed, frames / seconds."""
 
     head_motion: Annotated[float, Field(ge=0, le=45)] = 0.0
-    """Degrees by which the head turns to each side as it performs, with a nod and a lean of half as much."""
+    """Degrees by which the head turns to each side, with a nod and a lean of half as much."""
 
     clutter: Share = 0.0
-    """Of her room's walls, 0 as painted, 1 tiles of random colours at full contrast: what is hard behind a head."""
+    """Contrast of tiles of random colours on her room's walls; 0 leaves them as painted."""
 
     seed: Seed = 0
-    """Of the procedural skin, freckles and hair."""
+    """Seed of the procedural skin, freckles and hair."""
 
     plates: bool = False
-    """Film the empty room, too: a clean plate a camera. Off, so that results stay what they were."""
+    """Film the empty room, too: a clean plate a camera."""
 
     mattes: bool = False
-    """Offer the true opacity of all cameras to the training. Off: it serves scoring only, as in a real capture."""
+    """Offer the true opacity of all cameras to the training. Else it serves scoring only."""
 
     @property
     def frame_rate(self) -> float:
@@ -54,83 +52,81 @@ class CaptureParams(Section):
 
 
 class MotionParams(Section):
-    """When `stabilize: auto` stabilises: if either is exceeded in any frame, against the mean pose."""
+    """`stabilize: auto` stabilises if one of these is exceeded in any frame, against the mean pose."""
 
     degrees: Annotated[float, Field(ge=0, le=180)] = 2.0
-    """Turn of the head."""
+    """Turn of the head, degrees."""
 
     shift: Annotated[float, Field(ge=0, le=10)] = 0.02
-    """Shift of the head, shares of the tracked mesh's largest extent (of a head about 5 mm)."""
+    """Shift of the head, as a share of the tracked mesh's largest extent."""
 
 
 class RegistrationParams(Section):
     """How poses are found from the pictures (training/registration.py)."""
 
     stride: Count = 3
-    """Every so-manieth pixel of each camera's picture of the reference frame is a point, if it shows the subject."""
+    """Every n-th pixel of the reference frame's pictures that shows the subject is a point."""
 
     scales: Annotated[Many[Share], Field(min_length=1)] = (0.032, 0.016, 0.008, 0.004)
-    """Blurs, from coarse to fine, standard deviations in shares of the picture's shorter side: the first bridges what
-    moves in a frame, the last is a pixel of 250."""
+    """Blurs from coarse to fine, standard deviations as shares of the picture's shorter side."""
 
     rounds: Natural = 3
-    """How often the depth of the points is corrected, and all frames are laid over the reference anew."""
+    """How often the depth of the points is corrected and all frames are aligned anew."""
 
     max_deeper: Length = 0.01
-    """Units that a correction moves them at most, a voxel of the volume."""
+    """Largest correction of depth, units."""
 
     steps: Count = 12
     """Gauss-Newton steps a scale, at most."""
 
     enough: Annotated[float, Field(gt=0, le=1)] = 2e-5
-    """A scale ends with a step of less, radians and units."""
+    """A scale ends with a smaller step than this, radians and units."""
 
     damping: Share = 0.001
-    """Added to the normal equations, shares of their diagonal."""
+    """Added to the normal equations, as a share of their diagonal."""
 
     outlier: Factor = 2.0
-    """Median residuals at which a point counts half: what performs or shines."""
+    """Residual, in medians, at which a point counts half."""
 
     min_opacity: Share = 0.9
-    """Of the volume on a ray that shows the subject's surface."""
+    """Least opacity of the volume on a ray that gives a point."""
 
     min_cosine: Share = 0.3
-    """Between a point's normal and the direction to the camera."""
+    """Least cosine between a point's normal and the direction to the camera."""
 
     min_points: Count = 200
-    """Fewer tell no pose."""
+    """A frame with fewer points gets no pose."""
 
     min_likeness: Share = 0.6
-    """A frame whose pictures, at the pose found, correlate with the reference's less than this share of the median
-    frame's is refused: its pose is bridged."""
+    """A frame is refused, and its pose bridged, if it correlates with the reference less than this share of the median
+    frame."""
 
     max_leap: Annotated[float, Field(gt=0, le=180)] = 8.0
-    """Degrees between a frame's pose and the middle of its neighbours', beyond which it is refused."""
+    """A frame is refused if its pose lies more degrees than this from the middle of its neighbours'."""
 
 
 class NormalizeParams(Section):
     """From a capture to a scene: cameras, images and tracked mesh in the one convention."""
 
     long_side: ImageSide = 768
-    """Images are area-downsampled to fit into this box, pixels (aspect kept, never enlarged)."""
+    """Images are reduced to fit into this many pixels along their longer side; they are never enlarged."""
 
     short_side: ImageSide = 500
-    """The box's other side, pixels."""
+    """Images are reduced to fit into this many pixels along their shorter side."""
 
     max_elevation: Annotated[float, Field(gt=0, le=90)] = 45.0
-    """Cameras beyond are culled; degrees, seen from the subject."""
+    """Cameras beyond this elevation, seen from the subject, are culled; degrees."""
 
     max_azimuth: Annotated[float, Field(gt=0, le=180)] = 90.0
-    """Cameras beyond are culled; degrees, seen from the subject: layers before a centre know no back of a head."""
+    """Cameras farther to a side, seen from the subject, are culled; degrees."""
 
     display_colour: bool = False
     """Apply Multiface's display colour correction."""
 
     stabilize: bool | Literal["auto", "found"] = "auto"
-    """Whether the model is made in the head's own frame: true moves each frame's cameras by the head's pose, false
-    takes the head to stand still, "auto" decides by `motion`. Where the poses of the capture are all alike, those are
-    taken that lay its tracked meshes over one another; where it has no tracked mesh, "auto" looks for them in the
-    pictures, as "found" does whatever the capture has. See docs/guide/subjects.md."""
+    """Whether the model is made in the head's own frame. true uses the head's poses, false takes the head to stand
+    still, "auto" decides by `normalize.motion`. "found" looks for poses in the pictures, as "auto" does where the
+    capture has no tracked mesh. See docs/guide/subjects.md."""
 
     motion: MotionParams = MotionParams()
     """How much motion of the head is much."""

@@ -15,23 +15,22 @@ class ChoiceParams(Section):
     """Candidates are rendered and compared with the photos; the least that is good enough is taken."""
 
     within: Decibels = 0.1
-    """The least candidate is taken whose PSNR against the photos lies at most this far below the best one's, dB,"""
+    """Largest loss of PSNR against the photos of the candidate that is taken, to the best one's, dB."""
 
     fidelity: Decibels = 42.5
-    """and whose pictures have this PSNR to those of the finest one, dB: about as much as the codec leaves
-    (`compress.video.target_psnr`). Where the model itself is far from the photos, these alone would let detail go."""
+    """Least PSNR of its pictures to those of the finest candidate, dB."""
 
     cameras: Count = 4
-    """That are looked at, evenly spread: those for validation, where there are any, else of the training cameras."""
+    """Cameras that are looked at, evenly spread: those for validation where there are any."""
 
     frames: Count = 2
-    """Of each camera, evenly spread."""
+    """Frames of each camera, evenly spread."""
 
     rays: Count = 20_000
-    """Pixels of each picture, at most, drawn at random: enough for hundredths of a dB."""
+    """Pixels of each picture, at most, drawn at random."""
 
     opaque: Share = 0.9
-    """Pixels count where the finest candidate is so opaque: behind others stands a room that textures do not have."""
+    """Pixels count where the finest candidate is at least so opaque."""
 
 
 class MeshChoiceParams(ChoiceParams):
@@ -41,15 +40,14 @@ class MeshChoiceParams(ChoiceParams):
         *(16, 24, 32),
         *(48, 64),
     )
-    """R^m that are tried. Finer meshes than 64 x 64 gained nothing on any capture."""
+    """R^m that are tried."""
 
 
 class TextureChoiceParams(ChoiceParams):
     """How `texture.resolution: auto` is decided."""
 
     within: Decibels = 0.05
-    """As for meshes, but half as much: the codec loses detail of its own, and what both lose adds up to more than the
-    sum. 0.10 dB below the best, `mugsy`'s asset lost 0.3 dB to its model instead of 0.1."""
+    """Largest loss of PSNR to the best candidate, dB. The codec adds a loss of its own."""
 
     candidates: Annotated[Many[Annotated[int, Field(ge=8, le=4096)]], Field(min_length=1, max_length=20)] = (
         *(128, 192, 256),

@@ -25,46 +25,46 @@ class MeshCodec(Section):
     """Draco."""
 
     max_error_pixels: Pixels | None = None
-    """Instead of numbers of bits: the fewest with which, in every training camera, no vertex moves by more than so many
-    pixels, and no texture coordinate by more than so many texels."""
+    """Takes the fewest bits with which no vertex moves by more pixels than this in any training camera, and no texture
+    coordinate by more texels. null takes the numbers of bits."""
 
     quantization_bits: Annotated[int, Field(ge=0, le=24)] = 0
-    """Of positions; 0 stores all floats exactly (the paper's setting)."""
+    """Bits of positions; 0 stores all floats exactly (the paper's setting)."""
 
     texture_coordinate_bits: Annotated[int, Field(ge=1, le=24)] = 12
-    """Of texture coordinates, where positions are quantised."""
+    """Bits of texture coordinates, where positions are quantised."""
 
     compression_level: Annotated[int, Field(ge=0, le=10)] = 0
-    """0 (fastest, the paper's, keeps the order of vertices) to 10."""
+    """Draco's level, from 0 (fastest; keeps the order of vertices; the paper's) to 10."""
 
     max_bits: Annotated[int, Field(ge=1, le=24)] = 20
-    """Of positions and texture coordinates that `max_error_pixels` may take: beyond, floats are no finer."""
+    """Bits that `max_error_pixels` may take, at most."""
 
 
 class VideoCodec(Section):
     """Texture video."""
 
     codec: Annotated[Many[CodecName], BeforeValidator(_one_or_several)] = ("h264",)
-    """One, or a list of them: one file each with the same pictures, the first one first."""
+    """One codec, or a list: one file each with the same pictures."""
 
     crf: ConstantRateFactor = 18
-    """Constant rate factor on x264's scale (smaller is better and larger); other codecs take the factor of about the
-    same quality on theirs."""
+    """Constant rate factor on x264's scale; smaller is better and larger. Other codecs take theirs of about the same
+    quality."""
 
     target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = None
-    """Instead of crf, the quality of rendered training views, dB against those of the textures before the codec; the
-    coarsest factor that reaches it is searched."""
+    """Quality of rendered training views against those of the uncoded textures, dB; takes the place of `crf`, which is
+    searched for."""
 
     lossless: bool = False
-    """No loss beyond 8 bits and 4:2:0. In H.264 that is a profile which few hardware decoders know."""
+    """No loss beyond 8 bits and 4:2:0. Few hardware decoders know H.264's profile for it."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
         "slow"
     )
-    """Of libx264: slower ones make smaller files."""
+    """Preset of libx264: slower ones make smaller files."""
 
     keyframe_interval: Count = 30
-    """Frames between key frames: fewer make smaller files, more make scrubbing faster."""
+    """Frames between key frames: more make smaller files, fewer make scrubbing faster."""
 
     @field_validator("codec")
     @classmethod
@@ -78,22 +78,22 @@ class CrfSearchParams(Section):
     """The search for `video.target_psnr`: few encodings (packaging/rate.py)."""
 
     frames: Count = 30
-    """An attempt encodes at most so many frames, from the first on."""
+    """Frames that an attempt encodes, at most, from the first on."""
 
     max_encodes: Count = 6
     """Attempts; as many again where the target is out of reach."""
 
     tolerance: Decibels = 0.15
-    """dB above the target at which the search ends early."""
+    """The search ends early within this of the target, dB above it."""
 
     spared: Decibels = 0.2
-    """dB given up where the target is out of reach: bits without end would buy nothing."""
+    """Where the target is out of reach, so many dB are given up for fewer bits."""
 
     slope: Annotated[float, Field(gt=0, le=100)] = 0.4
-    """dB that one step of the factor costs, roughly, of any encoder: for the second attempt."""
+    """Rough cost of one step of the factor, dB: for the second attempt."""
 
     noticed: Annotated[float, Field(ge=0, le=80)] = 0.5
-    """dB below the target from which on it is said that it was missed: more than the search's own tolerance."""
+    """A target missed by more than this, dB, is said."""
 
 
 class MeterParams(Section):
@@ -103,71 +103,67 @@ class MeterParams(Section):
     """Training cameras, evenly spread."""
 
     frames: Count = 3
-    """Evenly spread."""
+    """Frames, evenly spread."""
 
     rays_per_camera: Count = 16_000
-    """Of those that hit anything, drawn once."""
+    """Rays of each camera that hit anything, drawn once."""
 
 
 class AttentionParams(Section):
-    """Bits where they show: what hardly shows in training views is coded coarsely (packaging/attention.py). H.264 only:
-    the other encoders know no regions."""
+    """Bits where they show: what hardly shows in training views is coded coarsely. H.264 only."""
 
     strength: Annotated[float, Field(ge=0, le=6)] = 2.0
-    """Steps of the quantiser (six double it) for each halving of what an error does to the pictures; 0 codes all of the
-    atlas alike (the paper's setting), 3 is where errors would cost the same everywhere."""
+    """Steps of the quantiser for each halving of what an error does to the pictures; 0 codes all alike (the paper's
+    setting)."""
 
     least: Annotated[float, Field(gt=0, le=1)] = 0.01
-    """What shows less than this share of what shows most is treated as if it showed as much: someone may look from
-    where no camera stood."""
+    """What shows less than this share of what shows most counts as that much: someone may look from elsewhere."""
 
     cameras: Count = 24
     """Training cameras that are looked through, evenly spread."""
 
     frames: Count = 3
-    """Evenly spread; the one counts in which a place shows most."""
+    """Frames, evenly spread; the one counts in which a place shows most."""
 
     of: Literal["take", "segment"] = "take"
-    """What is looked at for a segment of a stream: those frames of the take, or the one in the segment's middle. With
-    "segment" a frame that changes has only the segments encoded again that changed; with "take" all, if one of those
-    frames is near."""
+    """For segments of a stream: look at frames of the whole take, or at the segment's middle frame. With "segment" a
+    changed frame costs its own segments only."""
 
     rays_per_camera: Count = 16_000
-    """Of those that hit anything, drawn once."""
+    """Rays of each camera that hit anything, drawn once."""
 
 
 class StreamParams(Section):
-    """Long takes as streams: videos that players fetch in segments, at the quality that the connection allows."""
+    """Long takes as streams of segments, at the quality that the connection allows."""
 
     beyond: Annotated[float, Field(ge=0, le=1e9)] = 20.0
-    """Seconds; an asset that is longer is written as a stream. 1e9: none is."""
+    """An asset that is longer, seconds, is written as a stream. 1e9: none is."""
 
     segment_seconds: Annotated[float, Field(ge=0.1, le=60)] = 2.0
-    """Of a segment, rounded to whole frames: short ones switch and seek faster, long ones are smaller."""
+    """Length of a segment, seconds: short ones seek faster, long ones are smaller."""
 
     encoders: Natural = 1
-    """Segments that are encoded at once, each with the memory of an encoder, 200 bytes a pixel of the picture (0.8 GB
-    of 4 megapixels). 1: a long take needs no more than a short one. 0: as many as there are cores and `megabytes` for.
-    The result does not depend on it."""
+    """Segments encoded at once, each with 200 bytes of memory a pixel. 0: as many as there are cores and `megabytes`
+    for."""
 
     megabytes: Annotated[int, Field(ge=1, le=1_000_000)] = 2048
-    """Memory for encoders, if there are several."""
+    """Memory for encoders, if there are several, MB."""
 
 
 class BetweenParams(Section):
     """What lies between the capture's frames, for `frame_rate_factor` above 1 (export/between.py)."""
 
     min_side: Annotated[int, Field(ge=16, le=4096)] = 16
-    """Texels a side below which no motion is looked for: frames are mixed."""
+    """Below so many texels a side no motion is looked for, and frames are mixed."""
 
     fixed_point_steps: Count = 6
-    """To find which texel is at a place at a time."""
+    """Steps to find which texel is at a place at a time."""
 
     min_crowd: Annotated[float, Field(gt=0, le=1)] = 0.001
-    """Weight of a frame whose texels are stretched over a gap, at least."""
+    """Least weight of a frame whose texels are stretched over a gap."""
 
     behind: Share = 0.5
-    """Grey behind the composite whose motion is measured: an outline must not look like the edge of something black."""
+    """Grey behind the composite whose motion is measured."""
 
 
 class GlbParams(Section):
@@ -187,16 +183,16 @@ class LevelParams(Section):
     """Lower case letters, digits, - and _; not "full"."""
 
     mesh_resolution: Annotated[int, Field(ge=4, le=2048)]
-    """At most so many vertices squared a layer, as R^m."""
+    """R^m: at most so many vertices squared a layer."""
 
     texture_resolution: TextureSide
-    """Texels a side of a whole layer, as R^t."""
+    """R^t: texels a side of a whole layer."""
 
     crf: ConstantRateFactor
-    """Of its videos, on x264's scale."""
+    """Constant rate factor of its videos, on x264's scale."""
 
     max_error_pixels: Pixels | None = None
-    """As in `mesh`; null takes the full level's setting."""
+    """As in `compress.mesh`; null takes the full level's setting."""
 
 
 class CompressParams(Section):
@@ -215,8 +211,7 @@ class CompressParams(Section):
     """Photos of held-out cameras that ship with the asset, to compare with: at most so many."""
 
     frame_rate_factor: Annotated[int, Field(ge=1, le=3)] = 1
-    """The asset plays at 1, 2 or 3 times the capture's frames a second; what lies between the capture's frames follows
-    the motion (export/between.py)."""
+    """The asset plays at 1, 2 or 3 times the capture's frames a second; frames between follow the motion."""
 
     stream: StreamParams = StreamParams()
     """Segments, DASH and HLS for long takes."""
@@ -225,10 +220,10 @@ class CompressParams(Section):
     """One frame for programs that read glTF."""
 
     poster_side: Annotated[int, Field(ge=16, le=4096)] = 720
-    """Pixels of the poster's longer side; no more than that of the capture's pictures."""
+    """Longer side of the poster, pixels; no more than the capture's pictures have."""
 
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 92
-    """Of poster and photos, on JPEG's scale."""
+    """Quality of poster and photos, on JPEG's scale."""
 
     search: CrfSearchParams = CrfSearchParams()
     """For `video.target_psnr`."""

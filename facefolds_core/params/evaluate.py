@@ -13,14 +13,13 @@ class ScoreWarningParams(Section):
     """When scores are said not to be well: a line in the terminal, in metrics.json and in the report."""
 
     min_temporal: Share = 0.2
-    """Share of the variance over time that the asset should explain: below, its film stands still where the subject
-    moves."""
+    """Least share of the variance over time that the asset should explain."""
 
     min_frames: Count = 8
-    """With fewer, nothing is said of the change over time."""
+    """With fewer frames nothing is said of the change over time."""
 
     min_change: Share = 0.004
-    """RMS of the photos' change over time, colours in [0, 1], from which on it is more than noise: a step of 8 bits."""
+    """RMS of the photos' change over time, colours in [0, 1], above which it is more than noise."""
 
 
 class EvaluateParams(Section):
@@ -30,23 +29,22 @@ class EvaluateParams(Section):
     """RGB in [0, 1] shown where the model or the asset is transparent."""
 
     sheet_frames: Count = 3
-    """Frames shown for each held-out camera in the contact sheet, evenly spaced."""
+    """Frames of each held-out camera in the contact sheet, evenly spaced."""
 
     band: Pixels = 4.0
-    """To both sides of the outline, pixels: how far the subject's mask is eroded and dilated for the scores inside and
-    along it."""
+    """Pixels to both sides of the outline that are scored apart."""
 
     films: bool = True
-    """Film the held-out cameras, truth and asset side by side: the report plays them."""
+    """Film the held-out cameras, truth and asset side by side, for the report."""
 
     film_crf: Annotated[int, Field(ge=0, le=51)] = 18
-    """Constant rate factor of these films, of libx264: smaller is finer."""
+    """Constant rate factor of the report's films, of libx264: smaller is finer."""
 
     cvvdp_frames: Count = 60
-    """Of each camera that CVVDP judges, where it is installed: they are held in memory together."""
+    """Frames of each camera that CVVDP judges, where it is installed, at most."""
 
     fresh_views: Natural = 0
-    """For the embedded actor: so many new views, filmed for the purpose and scored by their angle; 0 films none."""
+    """New views of the embedded actor that are filmed and scored by their angle; 0 films none."""
 
     warnings: ScoreWarningParams = ScoreWarningParams()
     """When scores are said not to be well."""

@@ -91,113 +91,105 @@ class LossParams(Section):
     """Prices beside the squared error, a ray."""
 
     opacity: Weight = 0.003
-    """Weight of the opacity regulariser 1 - T, T a ray's transmittance, so that what the background explains stays
-    clear."""
+    """Weight of the opacity regulariser 1 - T, T a ray's transmittance: what the background explains stays clear."""
 
     late_opacity: Weight = 0.1
-    """Once the rounds of geometry have decided what the background explains, `opacity` falls to this part of itself,
-    and `binarisation` begins."""
+    """After the rounds of geometry `losses.opacity` falls to this part of itself."""
 
     binarisation: Weight = 0.003
-    """Weight of the binarisation loss t (1 - t), t = min(T, 1/2): rays that are nearly opaque are pressed to be so; a
-    face is solid."""
+    """Weight of t (1 - t), t = min(T, 1/2), after the rounds: rays that are nearly opaque become opaque."""
 
 
 class BackgroundParams(Section):
     """Each camera's static background, learnt without masks."""
 
     stride: Count = 4
-    """For the first guess the volume is looked at on every so-manieth pixel: it is coarser than pixels."""
+    """The first guess looks at the volume on every n-th pixel."""
 
     max_opacity: Share = 0.05
-    """Pixels through which the volume is less opaque show the background itself."""
+    """Pixels on which the volume is less opaque show the background itself."""
 
     frames: Count = 5
-    """Frames whose mean is taken, at most: rooms stand still."""
+    """Frames whose mean is taken, at most."""
 
     moving_frames: Count = 12
-    """The same of a head that turns: each frame uncovers another part of the room, and costs a look at the volume."""
+    """Frames whose mean is taken of a head that turns: each uncovers another part of the room."""
 
     rate: Annotated[float, Field(ge=0, le=1)] = 0.1
-    """A pixel moves by this, times the cube of the transmittance, times its error, each time it is met. Fast
-    ones take up of the subject what each camera sees through it at first: with 0.5 `mugsy` lost 0.6 dB, `moving` 0.6,
-    `fox` 0.2 against 0. With 0 the layers are painted with the room beside the subject."""
+    """A pixel moves by this times the cube of the transmittance times its error. Fast backgrounds take up the subject;
+    at 0 layers are painted with the room."""
 
 
 class MovingParams(Section):
     """What a head that turns (`normalize.stabilize`) needs beside: its rays meet other texels in each frame."""
 
     cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 2048
-    """Memory in which the crossings of all frames' rays are kept, 56 bytes a ray of twelve layers; what does not fit is
-    traced anew each time, which takes longer."""
+    """Memory for the crossings of all frames' rays, MB; what does not fit is traced anew each time."""
 
     shares: Count = 3
-    """The rays of a frame are dealt into shares of as many as a step takes; so many of them are used, in each frame
-    others. Tracing them takes longer than the steps themselves: more cost time, and win little."""
+    """Shares of a frame's rays that are traced, each as large as a step takes."""
 
     background_rate: Share = 0.03
-    """At most, of `background.rate`: in each frame a turning head stands before other pixels, which take up more of it.
-    On cameras left out of `moving` 29.1 dB; with 0.1 28.9, with 0 29.3 and the room painted behind the neck."""
+    """Upper bound of `background.rate`, since a turning head stands before other pixels in each frame."""
 
     volume_frames: Count = 5
-    """Frames that the starting volume is fitted to: the mean pose, and others in which the cameras see the head from
-    elsewhere."""
+    """Frames that the starting volume is fitted to."""
 
     sample: Count = 64
-    """One ray in so many is looked at to know how many meet the subject,"""
+    """One ray in so many is looked at to estimate how many meet the subject."""
 
     sample_frames: Count = 6
-    """in so many frames."""
+    """Frames in which `moving.sample` looks at rays."""
 
 
 class DivergenceParams(Section):
     """When a level of training is begun again, and how often."""
 
     error_ratio: Annotated[float, Field(gt=1, le=1e6)] = 9.0
-    """A mean squared error this many times the best of its level is a divergence: about 10 dB."""
+    """A squared error this many times the best of its level is a divergence."""
 
     smoothing: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """Share of the newest step in the running mean of the error: some ten steps, each on rays of one frame, count."""
+    """Share of the newest step in the running mean of the error."""
 
     attempts: Annotated[int, Field(ge=1, le=100)] = 4
-    """Each at a lower learning rate; then training ends with a message."""
+    """Attempts, each at a lower learning rate; then training ends with a message."""
 
     slow_down: Annotated[float, Field(gt=1, le=1000)] = 3.0
-    """The learning rate is divided by this before a level is begun again: four attempts span a factor of 27."""
+    """The learning rate is divided by this before a level is begun again."""
 
 
 class GpuParams(Section):
     """With `device: cuda`."""
 
     cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 4096
-    """Of the GPU's memory, for the pictures and the crossings of frames; what does not fit is sent again when its turn
-    comes."""
+    """GPU memory for pictures and crossings of frames, MB; what does not fit is sent again when needed."""
 
 
 class ExplicitParams(Section):
     """Model `explicit`: nested radius maps with texel grids. Its defaults are the preset `fast`."""
 
     preset: str = "fast"
-    """Its values fill the keys that are not given: `fast` for this model."""
+    """Its values fill the keys that are not given. `fast` is the explicit model; `quick` and `paper` are
+    perceptrons."""
 
     model: Literal["explicit"] = "explicit"
     """Follows from the preset."""
 
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """"cuda" needs the extra `cuda` and an NVIDIA GPU; "auto" is "cpu": no GPU has been measured yet."""
+    """ "cuda" needs the extra `cuda` and an NVIDIA GPU; "auto" is "cpu", since no GPU has been measured yet."""
 
     gpu: GpuParams = GpuParams()
     """What a GPU needs beside."""
 
     seed: Seed = 0
-    """Of the draws of rays and frames."""
+    """Seed of the draws of rays and frames."""
 
     layers: Annotated[int, Field(ge=1, le=64)] = 12
-    """N, number of manifolds; the paper's."""
+    """Number of nested layers, N."""
 
     iterations: Count = 460
-    """Adam steps of rounds and textures together; at least the rounds (`geometry`) and three more are made, 183, and
-    after the rounds `textures.steps_per_frame` for each frame."""
+    """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
+    them."""
 
     volume: VolumeParams = VolumeParams()
     """The starting volume."""

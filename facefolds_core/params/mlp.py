@@ -17,27 +17,26 @@ class MlpStartParams(Section):
     """Where the manifolds start."""
 
     iterations: Count = 600
-    """Of the regression onto the tracked mesh (`manifold_start: surface`)."""
+    """Steps of the regression onto the tracked mesh (`manifold_start: surface`)."""
 
     points: Annotated[int, Field(ge=8, le=10_000_000)] = 4096
-    """Of each of its steps."""
+    """Points in each of its steps."""
 
     learning_rate: Rate = 5e-3
-    """Adam's, of that regression: a shape is to be found in a few hundred steps."""
+    """Learning rate of the regression onto the tracked mesh."""
 
     final_learning_rate: Rate = 1e-4
-    """To which it falls along a cosine."""
+    """Rate to which it falls along a cosine."""
 
     margin: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """The search ball reaches this far beyond the outermost level's farthest point, units."""
+    """The search ball reaches this far beyond the outermost level, units."""
 
     fill: Annotated[float, Field(gt=0, le=1)] = 0.8
-    """Without a tracked mesh: the subject is taken to fill this fraction of the narrower half field of view."""
+    """Without a tracked mesh, share of the narrower half field of view that the subject fills."""
 
 
 class MlpParams(Section):
-    """Model `mlp`: level sets and textures by perceptrons. Its defaults are the paper's ("Training details" and
-    "Architecture Details" of FaceFolds), the preset `paper`."""
+    """Model `mlp`: level sets and textures by perceptrons. Its defaults are the paper's, the preset `paper`."""
 
     preset: str = "paper"
     """Its values fill the keys that are not given: `paper` or `quick` for this model."""
@@ -49,89 +48,85 @@ class MlpParams(Section):
     """"auto" takes CUDA where there is one."""
 
     seed: Seed = 0
-    """Of initialisation and ray sampling."""
+    """Seed of initialisation and ray sampling."""
 
     layers: Annotated[int, Field(ge=1, le=64)] = 12
-    """N, number of manifolds; the paper's."""
+    """Number of manifolds, N."""
 
     iterations: Count = 500_000
-    """Adam steps; the paper's."""
+    """Adam steps."""
 
     level_halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.03
-    """The N levels lie within this distance of the face surface, units."""
+    """The levels lie within this distance of the face, units."""
 
     manifold_start: Literal["sphere", "surface"] = "sphere"
-    """"sphere" (the paper's), or "surface": the tracked mesh, where there is one, by a short fit before training;
-    without one it is the sphere."""
+    """ "sphere" (the paper's), or "surface": a short fit to the tracked mesh, where there is one."""
 
     start: MlpStartParams = MlpStartParams()
     """Where the manifolds start."""
 
     manifold_layers: Depth = 3
-    """Hidden layers of the manifold predictor; the paper's."""
+    """Hidden layers of the manifold predictor."""
 
     manifold_width: Width = 128
-    """Neurons of each of them; the paper's."""
+    """Neurons of each layer of the manifold predictor."""
 
     output_scale: Factor = 0.36
-    """Factor on its output: how far a step of Adam moves the surfaces. Ours: a step at the paper's rate then moves them
-    as far as in the paper's network (docs/reference/method.md)."""
+    """Factor on its output: how far a step moves the surfaces. Ours; a step then moves them as far as the paper's."""
 
     input_scale: Factor = 6.0
-    """The perceptron sees (x - c) in units of this part of the outermost radius: without it, SiLU layers of He's size
-    are too smooth to follow a face. Fitted to a head for the same time, the median error was 1.2e-3 units at scale 1,
-    0.8e-3 at 3 and 0.5e-3 at 6. A model keeps the scale that it was trained with in its model.json."""
+    """Factor on its input (x - c). Ours: larger values follow a face more closely."""
 
     initial_alpha_logit: Annotated[float, Field(ge=-20, le=20)] = -1.5
-    """Bias of the opacity: sigmoid(-1.5) = 0.18, so that all 12 layers are seen (and learn) at the start."""
+    """Bias of the opacity at the start, before the sigmoid. Ours: all layers are seen."""
 
     texture_layers: Depth = 8
-    """Hidden layers of the texture predictor; the paper's."""
+    """Hidden layers of the texture predictor."""
 
     texture_width: Width = 256
-    """Neurons of each of them; the paper's."""
+    """Neurons of each layer of the texture predictor."""
 
     latent_dim: Width = 32
-    """Numbers in a frame's latent; the paper's."""
+    """Numbers in a frame's latent."""
 
     uv_frequencies: Octaves = 10
-    """Octaves of the positional encoding of u and v; the paper's."""
+    """Octaves of the positional encoding of u and v."""
 
     level_frequencies: Octaves = 4
-    """Octaves of that of the level; the paper's."""
+    """Octaves of the encoding of the level."""
 
     view_frequencies: Octaves = 4
-    """Octaves of that of the viewing direction; the paper's."""
+    """Octaves of the encoding of the viewing direction."""
 
     search_samples: Annotated[int, Field(ge=8, le=65_536)] = 256
-    """M, samples a ray for the first crossings; the paper's."""
+    """Samples a ray for the first crossings, M."""
 
     rays: Count = 32768
-    """In a batch; the paper's."""
+    """Rays in a batch."""
 
     lr_manifold: Annotated[float, Field(ge=0, le=1000)] = 7e-4
-    """Initial learning rate of the manifolds; the paper's."""
+    """Initial learning rate of the manifolds."""
 
     lr_texture: Rate = 1e-3
-    """Initial learning rate of the textures; the paper's."""
+    """Initial learning rate of the textures."""
 
     decay_manifold: Annotated[float, Field(gt=0, le=1)] = 0.05
-    """Factor by which the manifolds' rate falls each `decay_interval` iterations, exponentially; the paper's."""
+    """Factor by which the manifolds' rate falls each `decay_interval` iterations."""
 
     decay_texture: Annotated[float, Field(gt=0, le=1)] = 0.20
-    """The same for the textures; the paper's."""
+    """Factor by which the textures' rate falls each `decay_interval` iterations."""
 
     decay_interval: Count = 200_000
-    """Iterations; the paper's."""
+    """Iterations over which rates fall by these factors."""
 
     lambda_view: Weight = 1.0
-    """Weight of the mean |view term|^2, so that little depends on the view; the paper's."""
+    """Weight of the mean |view term|^2."""
 
     lambda_reg: Weight = 1e-4
-    """Weight of the sum of |manifold weights|^2, so that surfaces are smooth; the paper's."""
+    """Weight of the sum of |manifold weights|^2."""
 
     checkpoint_seconds: Annotated[float, Field(gt=0, le=1e6)] = 60.0
-    """A checkpoint is written this often."""
+    """Seconds between checkpoints."""
 
 
 QUICK: dict[str, object] = {

@@ -13,76 +13,71 @@ class ReflectionParams(Section):
     """The shared reflection: gloss(s, t) times an environment in the reflected direction."""
 
     enabled: bool = True
-    """Try it; it is left out all the same where it does not help (`min_gain`)."""
+    """Try a reflection; it is left out all the same where it does not help."""
 
     begin: Literal["rounds", "full", "end"] = "rounds"
-    """When it is fitted first: in the first round of geometry, at full resolution, or once the textures are done, which
-    then are those of a model without it. Trained with them from the start it gains most on cameras left out (`mugsy`
-    1.2 dB more than at the end); for programs that cannot draw it (GLB, OpenUSD) `end` gives the better picture."""
+    """When the reflection is first fitted: in the first round of geometry, at full resolution, or to finished textures.
+    "end" is best for programs that cannot draw it (GLB, OpenUSD)."""
 
     texels: Annotated[int, Field(ge=2, le=256)] = 96
-    """Of the maps of gloss, offset and normals, along the longer side of the window."""
+    """Texels of the maps of gloss, offset and normals, along the window's longer side."""
 
     environment_texels: Annotated[int, Field(ge=2, le=256)] = 16
-    """A side of the environment's picture."""
+    """Texels a side of the environment's picture."""
 
     normal_blur: Pixels = 1.5
-    """Smoothing of the radius map before normals are taken of it, standard deviation, nodes of the map."""
+    """Smoothing of the radius map before normals are taken of it, standard deviation, nodes."""
 
     normals: bool = True
-    """Let the normals lean from those of the radius map, as the reflection asks for."""
+    """Let the normals lean from those of the radius map."""
 
     normal_smoothness: Weight = 0.3
-    """Of how they lean, as of gloss."""
+    """Weight of the smoothness of how they lean."""
 
     max_tilt: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Tangent of the angle by which they lean at most, along each of two tangents."""
+    """Largest tangent of the angle by which they lean, along each of two tangents."""
 
     gloss_smoothness: Weight = 0.1
-    """Of the maps of gloss and offset: price of squared differences between neighbours, in the mean weight of a
-    texel's rays."""
+    """Weight of the smoothness of gloss and offset."""
 
     environment_smoothness: Weight = 0.03
-    """Of the environment, likewise."""
+    """Weight of the smoothness of the environment."""
 
     fits: Annotated[int, Field(ge=1, le=100)] = 3
-    """Fits in each level of training, evenly spaced, the last at its end."""
+    """Fits in each level of training, the last at its end."""
 
     frames: Count = 3
-    """Frames whose mean is looked at, at most: gloss does not follow expressions."""
+    """Frames whose mean is looked at, at most."""
 
     moving_frames: Count = 8
-    """Of a head that turns, frames that are looked at one by one, at most: in each the light comes from elsewhere."""
+    """Frames of a turning head that are looked at one by one, at most."""
 
     rays: Count = 300_000
-    """Looked at in a fit, at most: some hundred for each unknown."""
+    """Rays looked at in a fit, at most."""
 
     rounds: Count = 4
-    """Times that environment, gloss, offset and normals are solved for in turn, in a fit."""
+    """Times that its parts are solved for in turn, in a fit."""
 
     first_rounds: Count = 12
-    """The same in the first fit, which has nothing to start from, and in those that tell whether it helps."""
+    """Such times in the first fit, and in those that tell whether the reflection helps."""
 
     min_opacity: Share = 0.9
-    """Rays that are less opaque show the room, too, and are left out of the fits."""
+    """Rays that are less opaque are left out of the fits."""
 
     max_residual: Share = 0.25
-    """Larger differences between photo and model are clipped: they are hair or outline, not gloss."""
+    """Larger differences between photo and model are clipped."""
 
     folds: Annotated[int, Field(ge=2, le=100)] = 4
-    """The cameras are left out in so many groups, in turn, to tell whether the reflection helps."""
+    """Groups of cameras that are left out in turn to tell whether it helps."""
 
     asked_smoothness: Factor = 10.0
-    """The smoothnesses of gloss and environment times this in the fits by which it is decided: few cameras, of which
-    some are left out, and textures that are still coarse do not determine finer maps (of 13 cameras of `studio` -0.3 dB
-    with 1, 0.5 with 10; in the end it gains 2)."""
+    """Factor on the smoothness in the fits that tell whether it helps, which have fewer cameras."""
 
     smoother: Annotated[float, Field(ge=1, le=1e6)] = 10.0
-    """Where it gains little (`sure_gain`) it is asked again with gloss and environment so many times as smooth, and
-    fitted so if that gains more: eight of the actor's cameras do not determine finer maps, and win 0.8 dB inside."""
+    """Factor on the smoothness with which it is asked again where it gains little."""
 
     sure_gain: Annotated[float, Field(ge=0, le=100)] = 0.5
-    """dB on rays of cameras left out, from which on no smoother one is asked for."""
+    """Gain on cameras left out, dB, from which on no smoother one is asked for."""
 
     min_gain: Annotated[float, Field(ge=0, le=100)] = 0.05
-    """dB on rays of cameras left out of a fit, after the rounds of geometry; with less there is no reflection."""
+    """Least gain on cameras left out, dB; with less there is no reflection."""

@@ -85,33 +85,32 @@ class Subject(Overrides):
     """Folder of the capture; for "actor" the generator's package."""
 
     segment: str | None = None
-    """Which of a capture's segments (Multiface), sequences or performances; null takes the only one."""
+    """A capture's segment (Multiface), sequence or performance; null takes the only one."""
 
     frames: FrameRange | Many[str] | None = None
     """A range of positions, or a list of frame names; null takes all."""
 
     holdout: Many[str] | HoldoutEvery = HoldoutEvery(every=12)
-    """Camera names, or {every: n}: cameras for scoring only. Nothing is chosen by them. [] holds out none."""
+    """Camera names, or {every: n}: cameras for scoring only. [] holds out none."""
 
     validation: Annotated[Many[str] | HoldoutEvery | None, Field(alias="validate")] = None
-    """Camera names, or {every: n} of the cameras that are not held out: set aside from training and scored apart, while
-    something is to be chosen (sweeps, `recommend`). null trains on all."""
+    """Camera names, or {every: n} of the others: set aside from training and scored apart, while something is to be
+    chosen. null trains on all."""
 
     front: str | None = None
     """For captures without a tracked mesh, a camera that faces the subject upright; null finds the front."""
 
     centre: Triple[Coordinate] | None = None
-    """[x, y, z], the subject's middle in the coordinates of the capture; null takes the tracked mesh's, or the point
-    nearest to all optical axes. `normalize` draws it over the pictures (scene/place.png)."""
+    """[x, y, z], the subject's middle in the capture's coordinates; null finds it. `normalize` draws it over the
+    pictures (scene/place.png)."""
 
     radius: Annotated[float, Field(gt=0, le=1e9)] | None = None
-    """Of the ball about the centre that holds the subject, in the capture's unit of length: nothing beyond it is
-    modelled, and nothing larger is tried. null takes `train.volume.reach`, and more where that cuts the subject off."""
+    """Radius of the ball about the centre that holds the subject, in the capture's unit of length. null takes
+    `train.volume.reach`, and more where that cuts the subject off."""
 
     mattes: str | None = None
-    """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png, as the stage `matte` leaves them in
-    data/SUBJECT/mattes; they take the place of those that come with the capture or are found, picture by picture, and
-    train unless `matte.train` is "none". Relative paths start at the project's folder."""
+    """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png. They take the place of the capture's
+    own or of found ones. Relative paths start at the project's folder."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

@@ -16,56 +16,50 @@ class StartParams(Section):
         *(-0.1, -0.15, -0.2, -0.25),
         *(-0.3, -0.35, -0.4),
     )
-    """Candidates for the sphere centre c: (x, 0, 0) with these x, units. The paper's is -0.25."""
+    """Candidates for x of the sphere centre c = (x, 0, 0), units. The paper's is -0.25."""
 
     belts: Annotated[Many[Annotated[float, Field(ge=0, le=80)]], Field(max_length=100)] = (10.0,)
-    """Degrees below level from which on the rays of the UV map fall no further, but start lower down on the neck's axis
-    instead: candidates, tried with each centre beside the plain sphere. They hold a collar under hair."""
+    """Candidates for a belt, degrees below level, tried with each centre beside the plain sphere. Below it rays start
+    lower on the neck's axis."""
 
     centre_tie: Share = 0.02
-    """Of the charts that lose a share of the visible surface within this of the least, the one farthest back wins:
-    directions fan out less."""
+    """Of the charts within this of the least loss of visible surface, the one farthest back wins."""
 
     centre_nodes: Annotated[int, Field(ge=8, le=4096)] = 96
-    """Rows of the coarse radius map, over all (u, v) that a chart may hold, by which charts are compared."""
+    """Rows of the coarse radius map by which charts are compared."""
 
     window_limit: Annotated[float, Field(ge=0.1, le=1)] = 0.9
-    """No window reaches beyond |u| of this: at the poles a radius map has no meaning."""
+    """Largest |u| of a window: at the poles a radius map has no meaning."""
 
     column_limit: Annotated[float, Field(ge=0.1, le=1.9)] = 1.5
-    """With a belt no window reaches below u of minus this."""
+    """Largest -u of a window below a belt."""
 
     azimuth_limit: Annotated[float, Field(ge=0.1, le=1.9)] = 1.5
-    """No window reaches beyond |v| of this; 1 is straight sideways from c."""
+    """Largest |v| of a window; 1 is straight sideways from c."""
 
     window_margin: Share = 0.04
-    """The window reaches this far in u and v beyond what holds the subject: the volume is coarse."""
+    """Margin of the window in u and v beyond what holds the subject."""
 
     subject_opacity: Share = 0.5
-    """Of the volume, from which on a direction is taken to hold the subject."""
+    """Opacity of the volume from which on a direction holds the subject."""
 
     fog_depth: Length = 0.13
-    """Median depth over which the subject is spread in the volume, units, from which on it is fog: smooth pale plaster
-    is explained as well by fog as by a surface. `studio` has 0.04, `fox` 0.10, `buddha` 0.15."""
+    """Median depth over which the subject is spread in the volume, units, from which on it counts as fog."""
 
     fog_gain: Annotated[float, Field(ge=1, le=1000)] = 10.0
-    """Fog is taken to be so many times as dense: its middle lies deep within the subject, and where few cameras look it
-    is thin. 1 leaves it as thin."""
+    """Fog is taken to be so many times as dense. 1 leaves it as it is."""
 
     fog_holes: Annotated[float, Field(ge=0, le=1)] = 0.12
-    """Units. Holes and dents of such fog that a ball of this radius does not fit into are filled with what was left to
-    the room there (at least with `subject.body_depth`): where that is as pale nothing told them apart. 0: none."""
+    """Holes and dents of fog that a ball of this radius, units, does not fit into are filled. 0: none."""
 
     beside_opacity: Share = 0.3
-    """Directions in which the volume is less opaque lie beside the subject: what was painted there is room, and is made
-    transparent at the end."""
+    """Directions in which the volume is less opaque lie beside the subject and become transparent."""
 
     min_opacity: Annotated[float, Field(gt=0, lt=1)] = 0.02
-    """Of all layers together at the start, at least. Their weights are equal: one alpha for all would favour the outer
-    ones, and the rounds of geometry would drift outwards."""
+    """Least opacity of all layers together at the start."""
 
     max_opacity: Annotated[float, Field(gt=0, lt=1)] = 0.9
-    """Of all layers together at the start, at most: what is opaque at once never shows the layers within."""
+    """Largest opacity of all layers together at the start, so that inner layers are seen."""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -78,63 +72,57 @@ class MeshParams(Section):
     """How far a tracked mesh is believed, where there is one."""
 
     reach: Length = 0.03
-    """Where the volume lies outside the tracked mesh by more, units, it is believed: a mesh knows no hair and no
-    clothes. Where it lies deeper it never is: it has holes at dark eyes, open mouths and where few cameras look."""
+    """Where the volume lies outside the tracked mesh by more, units, the volume is believed: a mesh knows no hair."""
 
     max_distance: Length = 0.02
-    """In a direction in which the mesh lies farther than this from the volume, units, it is off."""
+    """A direction in which mesh and volume lie farther apart, units, is off."""
 
     max_share_off: Share = 0.5
-    """A tracked mesh that is off in more than this share of the directions in which both have a surface is wrong as a
-    whole (its scale, its place) and is left out. `actor` and `mugsy` have 0.03 and 0.04; enlarged by 5, 10 and 20 % the
-    actor's has 0.53, 0.92 and 1.00, shrunk by 10 % 0.70."""
+    """A mesh that is off in more than this share of the directions is left out."""
 
     nodes: Annotated[int, Field(ge=8, le=4096)] = 128
-    """Rows and columns of (u, v), of all that the chart may hold, at which the mesh is compared with the volume."""
+    """Rows and columns of (u, v) at which mesh and volume are compared."""
 
     trust: Annotated[float, Field(ge=0, le=10)] = 0.004
-    """Where the opacity found is nearer to the tracked mesh than this, the mesh is kept; farther offsets lose as much,
-    units."""
+    """The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""
 
     opacity: Share = 0.9
-    """At the start where only the tracked mesh says that there is something."""
+    """Opacity at the start where only the tracked mesh has a surface."""
 
 
 class GeometryParams(Section):
     """The radius maps of the layers, and the rounds in which they move to the opacity found."""
 
     nodes: Annotated[int, Field(ge=8, le=4096)] = 384
-    """Along the longer side of the radius maps."""
+    """Nodes along the longer side of the radius maps."""
 
     halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
-    """The layers lie within this distance of their middle, units, where the volume is sharp: layers farther apart than
-    a surface is uncertain show it several times."""
+    """The layers lie within this distance of their middle, units, where the volume is sharp."""
 
     max_halfwidth: Length = 0.015
-    """No layers lie farther from their middle than this, units, however blurred the volume is,"""
+    """Largest distance of a layer from the middle, units."""
 
     max_halfwidth_pixels: Factor = 8.0
-    """nor than so many pixels of the median training camera (but `halfwidth` they may): what lies farther apart shows
-    each camera its own picture. In fog `max_halfwidth` alone counts."""
+    """Largest distance of a layer from the middle, pixels of the median camera; `halfwidth` is always allowed."""
 
     min_radius: Annotated[float, Field(ge=0.02, le=10)] = 0.08
-    """No layer's middle comes nearer to c, units: the search for crossings takes strides of less than half of that."""
+    """Least radius of a layer's middle, units."""
 
     rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (
         2.5,
         1.6,
         1.0,
     )
-    """Halfwidths of the rounds of geometry, in halfwidths of the model: each moves the layers to the opacity found."""
+    """Halfwidths of the rounds of geometry, in halfwidths of the model."""
 
     round_iterations: Count = 60
-    """Adam steps of each round, at a quarter of the final texels a side."""
+    """Adam steps of each round."""
 
     round_stride: Count = 8
-    """At most every so-manieth pixel of each camera is looked at in the rounds: their textures are coarse;"""
+    """At most every n-th pixel is looked at in the rounds."""
 
     round_rays: Count = 250000
-    """but so many of all cameras are, where there are as many: with fewer, hair of small pictures becomes lumpy."""
+    """Rays of all cameras that are looked at in the rounds, at least."""
 
     blur: Pixels = 6.0
     """Smoothing of the layers' motion between rounds, standard deviation, nodes."""

@@ -31,78 +31,71 @@ class VolumeLevel(Section):
     """Adam steps."""
 
     room: Annotated[int, Field(ge=8, le=512)] = 64
-    """Voxels along a side of the outer zone (`train.room`), coarser than the volume's: it shows what is behind."""
+    """Voxels along a side of the outer zone (`train.room`)."""
 
 
 class VolumeParams(Section):
     """The volume that the geometry starts from: density and colour on a grid, fitted to the images of one frame."""
 
     reach: Length = 0.45
-    """The box lies within this distance of the origin, units: a head, hair, neck and the upper chest; cameras are about
-    1 away."""
+    """The volume's box lies within this distance of the origin, units."""
 
     min_view_share: Share = 0.06
-    """Voxels that a smaller share of the training cameras sees are empty: what only one camera sees can be anything."""
+    """Voxels that a smaller share of the training cameras sees are empty."""
 
     shared_view_share: Share = 0.35
-    """Where at least this share of the cameras sees a voxel, the fog of the start is as thick as `fog` says; it falls
-    to nothing where only `min_view_share` of them do. What few cameras see must show that it is there: a dark room
-    would stay as dark fog."""
+    """Share of the cameras from which on the fog of the start is as thick as `fog` says."""
 
     fog: Factor = 2.0
-    """Optical depth along the box at the start: thick enough to be shaped, thin enough to see what is behind."""
+    """Optical depth along the box at the start."""
 
     opacity_weight: Weight = 0.001
-    """Of the opacity regulariser, the sum over rays of 1 - T (T: a ray's transmittance): what the background explains
-    stays clear."""
+    """Weight of the opacity regulariser 1 - T: what the background explains stays clear."""
 
     binarisation_weight: Weight = 0.003
-    """Of the binarisation loss, the sum over rays of t (1 - t), t = min(T, 1/2): a face is solid."""
+    """Weight of the binarisation loss t (1 - t), t = min(T, 1/2)."""
 
     matte_weight: Weight = 0.3
-    """Of half the squared distance of a ray's opacity from the capture's matte, where it has mattes. Colours may be off
-    by 0.1, opacities are known: what is beside the subject is empty, whatever it looks like."""
+    """Weight of half the squared distance of a ray's opacity from the matte, where there are mattes."""
 
     smoothness_weight: Weight = 0.001
-    """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
+    """Weight of the smoothness of raw density."""
 
     learning_rate: Rate = 0.3
-    """Of raw density, Adam's: it moves over twenty units and has 240 steps."""
+    """Learning rate of raw density."""
 
     colour_learning_rate: Rate = 0.03
-    """Of colours, Adam's."""
+    """Learning rate of colours."""
 
     final_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """To this part of themselves both rates fall along the last level."""
+    """Part of themselves to which both rates fall along the last level."""
 
     betas: Betas = (0.9, 0.99)
-    """Adam's beta 1 and beta 2: shares of the moments that a step keeps. The second is lower than the usual 0.999:
-    there are 240 steps."""
+    """Adam's beta 1 and beta 2."""
 
     rays: Count = 16384
-    """In one step."""
+    """Rays in one step."""
 
     step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
-    """Between samples on a ray, voxels: no voxel is stepped over."""
+    """Distance between samples on a ray, voxels."""
 
     pixel: Pixels = 0.7
-    """Images are reduced until a pixel covers this many voxels at the origin: finer ones say nothing to such a grid."""
+    """Images are reduced until a pixel covers this many voxels at the origin."""
 
     levels: Annotated[Many[VolumeLevel], Field(min_length=1, max_length=16)] = (
         VolumeLevel(resolution=48, iterations=120, room=48),
         VolumeLevel(resolution=96, iterations=120, room=80),
     )
-    """From coarse to fine: the coarse one finds where the subject is, the fine one its outline."""
+    """Levels of the fit, from coarse to fine."""
 
     min_contrast: Weight = 0.005
-    """Squared colour distance, summed over channels, from what lies behind: a voxel whose rays are all nearer to it is
-    cleared. It explains nothing that the background does not, as a dark shell before a dark wall."""
+    """A voxel whose rays all differ less from what lies behind, in squared colour distance, is cleared."""
 
     empty_depth: Annotated[float, Field(gt=0, le=1)] = 0.001
-    """Blocks whose voxels all have a smaller optical depth a voxel are skipped: speed."""
+    """Blocks whose voxels all have a smaller optical depth are skipped, for speed."""
 
     body_depth: Weight = 0.1
-    """Optical depth of a voxel from which on it belongs to a body, before a far sphere; else `train.subject`'s."""
+    """Optical depth from which on a voxel belongs to a body, before a far sphere."""
 
     @model_validator(mode="after")
     def _shared_is_more(self) -> Self:
@@ -112,91 +105,83 @@ class VolumeParams(Section):
 
 
 class RoomParams(Section):
-    """The outer zone: density and colour of all space beyond the ball of `volume.reach`, contracted towards infinity. A
-    near wall has parallax; without a place of its own it becomes fog around the head. Rates are the volume's."""
+    """The outer zone: all space beyond the ball of `volume.reach`. Without a place of its own a near wall becomes fog
+    around the head (docs/research/backgrounds-and-rooms.md)."""
 
     needed_below: Annotated[float, Field(ge=0, le=100)] = 28.0
-    """There is an outer zone only where the coarse level has a smaller PSNR without one, dB; 0 is never. Before plain
-    walls it has 30 to 33 and an outer zone explains nothing better, but takes up hair and highlights of the subject;
-    before near, bright or patterned ones it has 20 to 26 (docs/research/2026-11-22-rooms.md). Then it is asked:"""
+    """An outer zone is considered where the coarse level has a smaller PSNR without one, dB. 0 is never."""
 
     asked_cameras: Count = 6
-    """one of so many training cameras, at least one, is left out of two fits of the coarse level,"""
+    """One of so many training cameras is left out to decide whether the zone helps."""
 
     least_gain: Annotated[float, Field(ge=-100, le=100)] = 0.0
-    """and there is an outer zone only if it shows these better by so much, dB. -100: always."""
+    """The outer zone is used if it gains this much on the cameras left out, dB. -100: always."""
 
     seen_rays: Factor = 1.0
-    """Colours of voxels that fewer rays have reached are those of their neighbours: behind the head there would be
-    a picture of the face, left from when the head was fog."""
+    """Voxels that fewer rays have reached take their neighbours' colours."""
 
     fog: Factor = 1.0
-    """Optical depth at the start, from the ball to infinity: half of the volume's, behind which it lies."""
+    """Optical depth at the start, from the ball to infinity."""
 
     step: Annotated[float, Field(ge=0.05, le=10)] = 0.7
-    """Between samples on a ray, voxels: no voxel is stepped over."""
+    """Distance between samples on a ray, voxels."""
 
     farthest: Annotated[float, Field(gt=1, le=1000)] = 20.0
-    """What lies farther from the centre, in radii of the ball, is left to the far sphere: nothing moves there."""
+    """What lies farther from the centre, in radii of the ball, is left to the far sphere."""
 
     smoothness_weight: Weight = 0.001
-    """Of the sum of sqrt(1 + d^2) over differences d of raw density between neighbours."""
+    """Weight of the smoothness of raw density."""
 
     betas: Betas = (0.9, 0.99)
-    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
+    """Adam's beta 1 and beta 2."""
 
 
 class WallParams(Section):
-    """Walls, floors and tables that the subject touches: planes with nothing behind them. Looked for only where there
-    is an outer zone."""
+    """Walls, floors and tables that the subject touches: planes with nothing behind them. Only where there is an outer
+    zone."""
 
     most: Annotated[int, Field(ge=0, le=8)] = 3
-    """As many are looked for; 0 looks for none."""
+    """Walls that are looked for, at most."""
 
     tolerance: Factor = 1.5
-    """Points within so many voxels lie on a plane: a surface is three voxels thick in the volume."""
+    """Points within so many voxels lie on a plane."""
 
     spread: Length = 0.12
-    """Standard deviation of a wall's points along it, the smaller of the two, units: the flattest parts of heads have
-    0.1."""
+    """Least standard deviation of a wall's points along it, units."""
 
     behind: Share = 0.05
-    """Of all visible points that may lie behind a wall. Planes through heads have 6 % and more behind them."""
+    """Largest share of the visible points that may lie behind a wall."""
 
     margin: Length = 0.05
-    """What stands out from a wall by less belongs to it, units: panelling, a shield that a trophy is mounted on."""
+    """What stands out from a wall by less belongs to it, units."""
 
     points: Count = 4000
-    """In the sample among which planes are looked for; with fewer there are none."""
+    """Points among which planes are looked for."""
 
     trials: Count = 1000
-    """Planes through three random points that are tried (RANSAC): one of them lies on a wall that a fifth of the points
-    belongs to, but for one time in three thousand."""
+    """Planes through three random points that are tried."""
 
     seed: Natural = 0
-    """Of the trials."""
+    """Seed of the trials."""
 
 
 class SubjectParams(Section):
-    """Which part of the volume is the subject: the body at the cameras' common centre, without the walls it touches."""
+    """Which part of the volume is the subject: the body at the cameras' common centre, without walls."""
 
     near: Length = 0.1
-    """Standard deviation of the weight, over the distance from the common centre, by which bodies are compared, units:
-    half a head."""
+    """Standard deviation of the weight by which bodies near the common centre are preferred, units."""
 
     body_depth: Weight = 0.03
-    """Optical depth of a voxel from which on it belongs to a body, where there is an outer zone: smooth pale surfaces
-    are faint (of a plaster head 0.1 loses chin and cheeks), and the room no longer stands around the subject as fog."""
+    """Optical depth from which on a voxel belongs to a body, where there is an outer zone."""
 
     below: Share = 0.35
-    """Directions that fall by more (the sine) are below: there a subject goes on beyond the ball."""
+    """Directions that fall by more, as a sine, are below, where a subject may go on beyond the ball."""
 
     larger: Annotated[Many[Length], Field(max_length=8)] = (0.65,)
-    """Radii of the ball that are tried one after the other where the subject is cut off by `volume.reach`; only
-    where there is an outer zone."""
+    """Radii of the ball that are tried in turn where the subject is cut off."""
 
     max_cut: Share = 0.005
-    """Share of the subject's voxels at the edge of the ball, not below, above which it is cut off."""
+    """The subject is cut off where a larger share of its voxels lies at the edge of the ball."""
 
     walls: WallParams = WallParams()
     """What it stands on or hangs at."""
@@ -206,49 +191,45 @@ class EnvironmentParams(Section):
     """What is behind the room: one blurred picture on a large sphere, shared by all cameras."""
 
     rows: Annotated[int, Field(ge=2, le=4096)] = 24
-    """Texels from pole to pole; twice as many around. Few: it may take up walls, not the subject."""
+    """Texels from pole to pole; twice as many around."""
 
     radius: Annotated[float, Field(gt=1, le=1000)] = 2.5
-    """Of the sphere around the scene's origin, in distances of the farthest camera from it."""
+    """Radius of the sphere, in distances of the farthest camera from the origin."""
 
     learning_rate: Rate = 0.02
-    """Of its colours, Adam's."""
+    """Learning rate of its colours."""
 
     betas: Betas = (0.9, 0.99)
-    """Adam's beta 1 and beta 2: shares of the moments that a step keeps; the volume's."""
+    """Adam's beta 1 and beta 2."""
 
 
 class WarningParams(Section):
-    """When a training that ended well is said not to be well: a line in the terminal and in fit.json."""
+    """When a training that ended well is said not to be well."""
 
     min_volume_psnr: Annotated[float, Field(ge=0, le=100)] = 28.0
-    """Of the starting volume on training rays, dB. 30 to 36 where the result is good, 20 to 27 where spikes stood
-    around the head or ears were cut off."""
+    """Least PSNR of the starting volume on training rays, dB."""
 
     max_lost: Share = 0.05
-    """Share of the visible surface without a place before the chosen centre."""
+    """Largest share of the visible surface without a place in the chart."""
 
 
 class CameraParams(Section):
     """What single cameras do differently: exposure and white balance (gains), and calibration that contradicts."""
 
     min_opacity: Share = 0.95
-    """Of the volume on rays that count: what is behind is no surface that several cameras see alike."""
+    """Least opacity of the volume on rays that count."""
 
     min_rays: Count = 50
-    """A camera with fewer such rays keeps the gain 1."""
+    """A camera with fewer opaque rays than this keeps the gain 1."""
 
     prior: Share = 0.02
-    """Colours are taken to be uncertain by this much when the gains are fitted: it draws gains towards 1, those of dark
-    subjects most."""
+    """Uncertainty of colours when gains are fitted, which draws gains towards 1."""
 
     outlier: Factor = 2.5
-    """Rays with a residual larger than this many times the camera's median are left out of the second fit: silhouettes,
-    highlights, hair."""
+    """Rays with a residual beyond this many medians are left out of the second fit."""
 
     min_gain_spread: Weight = 0.03
-    """Standard deviation of the gains over cameras below which they are taken to be all 1: it may be the fit's own
-    error."""
+    """Gains whose standard deviation over cameras is smaller are taken to be 1."""
 
     max_error_ratio: Annotated[float, Field(ge=1, le=1e6)] = 2.0
-    """A camera whose error is over so many times the median camera's is left out."""
+    """A camera with an error over this many medians is left out."""

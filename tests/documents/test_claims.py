@@ -23,8 +23,9 @@ def documented_keys(root: Path) -> set[str]:
         if heading := re.match(r"#+ `([\w.]+)`", line):
             section = heading.group(1)
             keys.add(section)
-        elif key := re.match(r"\| `(\w+)` \|", line):
-            keys.add(f"{section}.{key.group(1)}")
+        elif key := re.match(r"\|`([\w.]+)`\|", line):
+            name = key.group(1)
+            keys.add(name if "." in name else f"{section}.{name}")
     return keys
 
 

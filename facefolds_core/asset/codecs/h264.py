@@ -10,7 +10,7 @@ X264_FIXED = {
     "bframes": 0,
     "chromaloc": 1,  # centre
     # The next three are for the eye: ST-LPIPS .050 instead of .065 at equal bytes on mugsy, for 0.03 dB
-    # (docs/research/2026-11-22-geometry.md).
+    # (docs/research/codec.md).
     "psy": 1,
     "psy-rd": "1.0,0",  # beyond 1.0, and with its second number (trellis), more bytes for as little error
     "deblock": "-3,-3",  # what this filter smooths are pores and hairs as often as the edges of blocks
