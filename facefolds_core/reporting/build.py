@@ -153,6 +153,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "curves": curves(facts),
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "waterfall": tables.waterfall(facts.waterfall),
+        "waterfall_on": words.waterfall_words(facts.waterfall_on),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
         "config": tables.configuration(facts.config),
@@ -170,14 +171,21 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
     """The figures at the head of the page."""
     metrics, manifest = subject.facts.metrics, subject.asset.manifest
     asset, cost, suffix = metrics.get("asset", {}), metrics.get("cost", {}), key.removeprefix("psnr")
-    where = HEADLINE_WORDS[key]
     # There is no ST-LPIPS over a plate: that of the subject stands for it.
     near = suffix if suffix != "_over_plate" else "_subject"
     beside = HEADLINE_WORDS[f"psnr{near}"]
     files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
     return [
-        {"name": "PSNR", "value": number_unit(asset.get(key), "dB"), "note": f"{where}, held-out cameras"},
-        {"name": "SSIM", "value": words.number(asset.get(f"ssim{suffix}"), 3), "note": f"{where}, 1 is best"},
+        {
+            "name": "PSNR",
+            "value": number_unit(asset.get(key), "dB"),
+            "note": f"{words.region_words(metrics)}; held-out cameras",
+        },
+        {
+            "name": "SSIM",
+            "value": words.number(asset.get(f"ssim{suffix}"), 3),
+            "note": f"{HEADLINE_WORDS[key]}, 1 is best",
+        },
         {"name": "ST-LPIPS", "value": words.number(asset.get(f"st_lpips{near}"), 3), "note": f"{beside}, 0 is best"},
         {"name": "Size", "value": words.size(files), "note": "meshes and video"},
         {

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from facefolds_core.captures.scene import Split
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.truths import MatteKind
 
 NAME, CELL = 42, 12
 """Columns of the terminal: of a row's name, and of each figure."""
@@ -17,6 +19,12 @@ HEADLINE_WORDS = {
     "psnr": "over the whole frame",
 }
 """Metric -> what it is taken over, on held-out cameras."""
+
+SPLIT_WORDS: dict[Split, str] = {"train": "for training", "validate": "for validation", "holdout": "held out"}
+"""What a camera is for, in words."""
+
+REGION_WORDS: dict[MatteKind, str] = {"true": "the masks", "scene": "the mattes", "found": "the model's own opacity"}
+"""What says where the subject is, in words."""
 
 ROWS = (
     ("psnr_over_plate", "PSNR over the room's plate, dB", "{:.2f}"),
@@ -43,9 +51,9 @@ ROWS = (
 
 def score_lines(metrics: Mapping[str, Any]) -> list[str]:
     """The held-out cameras' means, and those of the cameras for validation."""
-    lines = _lines(metrics, "held out")
+    lines = _lines(metrics, SPLIT_WORDS["holdout"])
     if isinstance(metrics.get("validate"), dict):
-        lines += ["", *_lines(metrics["validate"], "for validation")]
+        lines += ["", *_lines(metrics["validate"], SPLIT_WORDS["validate"])]
     return lines
 
 

@@ -17,7 +17,7 @@ class _Log(Live):
 
     def make_summary(self) -> None:
         try:
-            super().make_summary()
+            super().make_summary()  # type: ignore[no-untyped-call]
         except OSError as error:  # of a write it names none
             error.filename = error.filename or self.metrics_file
             raise
