@@ -142,7 +142,7 @@ def drawing_speed(asset: Path) -> tuple[float, str]:
     taken = []
     try:
         with OpenGLRenderer(read_asset(asset)) as renderer:
-            for eye in turntable(Eye(), 11, 30.0):
+            for eye in turntable(Eye(), 11, (30.0, 30.0)):
                 camera = camera_of(eye, 1280, 720, 35.0)
                 start = time.perf_counter()
                 renderer.render(camera, 0)
