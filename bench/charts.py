@@ -21,6 +21,7 @@ from bench.results import Cell, Measurement, Row
 from bench.tables import PAPER, RATES, cell_text
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
+from facefolds_core.scoring.terminal import SPLIT_WORDS
 from facefolds_core.sweeps.frontier import frontier
 
 STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
@@ -271,6 +272,12 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
         axes.legend(loc="lower right")
 
 
+def waterfall_title(step: Mapping[str, Any]) -> str:
+    """The subject, and the pictures on which the steps of its export were measured, where that is noted."""
+    split = step.get("split")
+    return f"{step['subject']}, {step['images']} pictures {SPLIT_WORDS[split]}" if split else str(step["subject"])
+
+
 def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Bars a subject: PSNR against the photos, what each step gained or lost, the bytes; below it ST-LPIPS, if any."""
     found = {name: [row for row in rows if row["subject"] == name] for name in sorted({r["subject"] for r in rows})}
@@ -287,4 +294,6 @@ def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
                 size = step["mesh_bytes"] + step["texture_bytes"] if first else 0
                 axes.annotate(f"{value:.{digits}f}{change}", (i, value), ha="center", va="bottom")
                 axes.annotate(f"{size / 1e6:.2f} MB" if size else "", (i, low + 0.1), ha="center", color="white")
-            axes.set(ylim=(low, high), ylabel=METRICS[key], title=f"{name}, held out" if first else "lower is better")
+            axes.set(
+                ylim=(low, high), ylabel=METRICS[key], title=waterfall_title(steps[0]) if first else "lower is better"
+            )

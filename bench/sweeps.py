@@ -28,7 +28,7 @@ from dvc.api import DVCFileSystem
 from bench import charts
 from bench.results import Row, Store, commit_name, machine_name, now
 from bench.run import own_params
-from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table
+from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table, waterfall_rows
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
@@ -142,7 +142,7 @@ def drawing_speed(asset: Path) -> tuple[float, str]:
     taken = []
     try:
         with OpenGLRenderer(read_asset(asset)) as renderer:
-            for eye in turntable(Eye(), 11, 30.0):
+            for eye in turntable(Eye(), 11, (30.0, 30.0)):
                 camera = camera_of(eye, 1280, 720, 35.0)
                 start = time.perf_counter()
                 renderer.render(camera, 0)
@@ -210,7 +210,7 @@ def draw(results: Results = RESULTS) -> None:
             charts.rate(rates, IMAGES / f"{name}.png", f"{film}, {RATE_FRAMES} frames")
             typer.echo(f"{film}:\n\n{rate_tables(rates)}")
         files = sorted(Path("data").glob("*/waterfall/waterfall.json"))
-        steps = [{"subject": found["subject"]} | step for found in map(read_json, files) for step in found["steps"]]
+        steps = [row for path in files for row in waterfall_rows(read_json(path))]
         there = results.with_name("waterfall.json")
         steps = [old for old in read_json(there) if old["subject"] not in {new["subject"] for new in steps}] + steps
         write_json(there, steps)

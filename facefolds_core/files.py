@@ -181,8 +181,13 @@ def _errors_name(target: Path) -> Iterator[None]:
             error.file = Path(_final(str(error.file), target))
         raise
     except OSError as error:
-        if error.errno is not None and not isinstance(error.filename, int):
-            error.filename = _final(os.fsdecode(error.filename or ""), target) or str(target)
+        if error.errno is None or isinstance(error.filename, int):
+            raise
+        name = _final(os.fsdecode(error.filename or ""), target) or str(target)
+        try:
+            error.filename = name
+        except AttributeError:  # PyAV's name of the file cannot be changed
+            raise OSError(error.errno, error.strerror, name) from error
         raise
 
 

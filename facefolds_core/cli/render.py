@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from fractions import Fraction
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated
 
@@ -17,18 +19,34 @@ from PIL import Image
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import rgb_to_yuv420
+from facefolds_core.asset.filmed import direction_of, swing_filmed, unfilmed_words
+from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
 from facefolds_core.cli.cameras import enlarged, named_camera
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file
 from facefolds_core.params import VideoCodec
-from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, turntable
+from facefolds_core.rendering.camera_paths import (
+    SIDEWAYS,
+    UP,
+    Eye,
+    camera_of,
+    distance_to_fit,
+    fly_through,
+    frame_due,
+    turntable,
+)
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 
-STILL_RATE = 30
-"""Pictures a second of a film of an asset that does not move."""
+FILM_RATE = Fraction(30)
+"""Pictures a second of a film whose asset has fewer than `OWN_RATE` frames a second: a camera that moves less often
+jerks."""
+OWN_RATE = 24
+"""Frames a second of an asset from which on a film takes its rate: each picture shows another frame."""
+WIDEST = 55.0
+"""Degrees to each side, of a turntable."""
 FILM = VideoCodec(crf=16, preset="medium")
 LARGEST_SIDE = 16_384
 """Pixels, with anti-aliasing: what graphics drivers draw at once."""
@@ -38,6 +56,7 @@ LIMITS = {
     "distance": (1e-3, 1e3),
     "field-of-view": (1.0, 150.0),
     "seconds": (0.1, 3600.0),
+    "fps": (1.0, 240.0),
     "sweep": (-3600.0, 3600.0),
 }
 """Options with numbers, from and to. The command line's own check of bounds lets `nan` through."""
@@ -129,6 +148,42 @@ def far_enough(asset: Asset, eyes: Sequence[Eye], width: int, height: int, field
     return 1.0 if box is None else max(1.0, distance_to_fit(box.min, box.max, eyes, width, height, field_of_view))
 
 
+def film_rate(asset: Fraction, frames: int, wanted: float | None) -> Fraction:
+    """Pictures a second of a film: as wanted; else the asset's own rate, or `FILM_RATE` where that is low.
+
+    Args:
+        asset: its frames a second.
+        frames: of the asset.
+    """
+    if wanted is not None:
+        return Fraction(wanted).limit_denominator(1001)
+    return asset if frames > 1 and asset >= OWN_RATE else FILM_RATE
+
+
+def film_path(view: FilmedView | None, kind: Kind, start: Eye, count: int, sweep: float | None) -> list[Eye]:
+    """Where the camera is in each picture of a film: where the asset was filmed, but for a sweep that is asked for.
+
+    Args:
+        view: what was filmed, if that is known.
+        count: pictures.
+        sweep: degrees to each side, of a turntable; None for `WIDEST`, or as far as was filmed.
+    """
+    sideways = WIDEST if kind is Kind.TURNTABLE else SIDEWAYS
+    sides, heights = (sideways, sideways), (UP, UP)
+    if view is not None:
+        sides, heights = swing_filmed(view, start.azimuth, start.elevation, sideways, UP)
+    if kind is Kind.FLY:
+        return fly_through(start, count, sides, heights)
+    return turntable(start, count, sides if sweep is None else (sweep, sweep))
+
+
+def warn_of_unfilmed(view: FilmedView | None, directions: Sequence[tuple[float, float]]) -> None:
+    """A line where pictures look from where no camera stood: azimuth and elevation, degrees."""
+    words = None if view is None else unfilmed_words(view, directions)
+    if words is not None:
+        typer.echo(f"render: warning: {words}", err=True)
+
+
 def command(
     asset: Annotated[Path, typer.Argument(help="Folder of the asset: it holds manifest.json.")],
     out: Annotated[Path, typer.Option(help="File to write: .png for a still, .mp4 for a film.")],
@@ -149,7 +204,17 @@ def command(
     field_of_view: Annotated[float, typer.Option(help="Degrees, of the shorter side.", min=1, max=150)] = 30.0,
     background: Annotated[str, typer.Option(help="Colour behind the subject, #rrggbb.")] = "#16181d",
     seconds: Annotated[float, typer.Option(help="Length of a film; the sequence repeats as needed.", min=0.1)] = 8.0,
-    sweep: Annotated[float, typer.Option(help="Degrees to each side, of a turntable.")] = 55.0,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            help="Pictures a second of a film; the camera moves in each, the sequence keeps its own time. "
+            "Left out: as the sequence, or 30 where that has fewer than 24."
+        ),
+    ] = None,
+    sweep: Annotated[
+        float | None,
+        typer.Option(help="Degrees to each side, of a turntable. Left out: 55, or as far as was filmed."),
+    ] = None,
     samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
     reflection: Annotated[bool, typer.Option(help="With the reflection, where the asset has one.")] = True,
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
@@ -169,7 +234,7 @@ def command(
             )
         check_limits(azimuth=azimuth, elevation=elevation, field_of_view=field_of_view)
         check_limits(distance=1.0 if distance is None else distance)
-        check_limits(seconds=seconds, sweep=sweep)
+        check_limits(seconds=seconds, sweep=sweep or 0.0, fps=1.0 if fps is None else fps)
         if out.suffix.lower() != SUFFIXES[kind]:
             remedy = f"name a file that ends in {SUFFIXES[kind]}, or choose another --kind"
             raise UserError(f"the wrong kind of file for {kind.value}", file=out, remedy=remedy)
@@ -185,29 +250,35 @@ def command(
             width, height = given.width, given.height
             if kind is not Kind.STILL:
                 raise UserError("a film of one camera", place="--camera", remedy="leave out --kind, or --camera")
-        sides = [Eye(azimuth + turn, elevation) for turn in ((-sweep, 0, sweep) if kind is Kind.TURNTABLE else (0,))]
-        away = far_enough(read, sides, width, height, field_of_view) if distance is None else distance
-        start = Eye(azimuth, elevation, away)
+        view, texture = read.manifest.view, shown.entry.texture
+        rate = film_rate(texture.rate, shown.num_frames, fps)
+        start, eyes = Eye(azimuth, elevation), [Eye(azimuth, elevation)]
+        if kind is not Kind.STILL:
+            eyes = film_path(view, kind, start, max(2, round(seconds * rate)), sweep)
+        seen = [direction_of(given)] if given is not None else [(eye.azimuth, eye.elevation) for eye in eyes]
+        warn_of_unfilmed(view, seen)
+        turns = (
+            [min(eyes, key=attrgetter("azimuth")), start, max(eyes, key=attrgetter("azimuth"))]
+            if kind is Kind.TURNTABLE
+            else [start]
+        )
+        away = far_enough(read, turns, width, height, field_of_view) if distance is None else distance
         with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
 
             def picture(eye: Eye, index: int) -> NDArray[np.uint8]:
-                seen = camera_of(eye, samples * width, samples * height, field_of_view)
-                return shrink(renderer.render(seen, index % shown.num_frames, colour)[0], samples)
+                far = replace(eye, distance=away * eye.distance)
+                camera = camera_of(far, samples * width, samples * height, field_of_view)
+                return shrink(renderer.render(camera, index, colour)[0], samples)
 
-            if given is not None:
-                with atomic_file(out) as temporary:
+            with atomic_file(out) as temporary:
+                if given is not None:
                     still = shrink(renderer.render(enlarged(given, samples), frame, colour)[0], samples)
                     Image.fromarray(still).save(temporary)
-            elif kind is Kind.STILL:
-                with atomic_file(out) as temporary:
+                elif kind is Kind.STILL:
                     Image.fromarray(picture(start, frame)).save(temporary)
-            else:
-                rate = shown.entry.texture.fps if shown.num_frames > 1 else STILL_RATE
-                count = max(2, round(seconds * rate))
-                eyes = turntable(start, count, sweep) if kind is Kind.TURNTABLE else fly_through(start, count)
-                pictures = (picture(eye, frame + index) for index, eye in enumerate(eyes))
-                with atomic_file(out) as temporary:
-                    write_film(temporary, pictures, (width, height), Fraction(rate).limit_denominator(1001))
+                else:
+                    due = (frame_due(i, rate, texture.rate, shown.num_frames, frame) for i in range(len(eyes)))
+                    write_film(temporary, map(picture, eyes, due), (width, height), rate)
             typer.echo(f"render: {out} ({width} x {height}, {renderer.device})")
 
 

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from facefolds_core.captures.chosen_mattes import scored_scene
-from facefolds_core.captures.scene import Split
 from facefolds_core.cli.report import evaluated_subjects
 from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import report_user_errors
@@ -19,11 +18,8 @@ from facefolds_core.model.device import device_of
 from facefolds_core.params import EvaluateParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.perceptual import load_st_lpips
-from facefolds_core.scoring.truths import MatteKind
+from facefolds_core.scoring.terminal import REGION_WORDS, SPLIT_WORDS
 from facefolds_core.scoring.waterfall import Step, Waterfall, waterfall
-
-CAMERAS: dict[Split, str] = {"validate": "for validation", "holdout": "held out"}
-REGIONS: dict[MatteKind, str] = {"true": "the masks", "scene": "the mattes", "found": "the model's own opacity"}
 
 
 def command(
@@ -48,7 +44,7 @@ def command(
 
 def measured_on(found: Waterfall) -> str:
     """Which pictures, and which pixels of them."""
-    cameras, where = CAMERAS[found.split], REGIONS[found.region]
+    cameras, where = SPLIT_WORDS[found.split], REGION_WORDS[found.region]
     return f"pictures: {found.images}, of cameras {cameras}; region: {found.region}, the pixels of {where}"
 
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 
 from facefolds_core.geometry.cameras import Camera
 
 Point = tuple[float, float, float]
+Sides = tuple[float, float]
+"""Degrees to both sides: towards lower and higher azimuths or elevations."""
 
 STEEPEST = 89.0
 """Degrees of elevation: straight up has no upright."""
+
+SIDEWAYS, UP = 40.0, 18.0
+"""Degrees to both sides, and up and down, of a flight."""
 
 
 @dataclass(frozen=True)
@@ -72,29 +78,52 @@ def distance_to_fit(
     return least
 
 
-def turntable(start: Eye, count: int, sweep: float) -> list[Eye]:
+def turntable(start: Eye, count: int, sides: Sides) -> list[Eye]:
     """From `start` to one side, to the other and back: the subject has a front only. Ends where it begins.
 
     Args:
         count: pictures.
-        sweep: degrees to each side.
+        sides: degrees to the subject's right and left.
     """
-    phases = 2 * math.pi * np.arange(count) / count
+    return [replace(start, azimuth=start.azimuth + _swing(phase, sides)) for phase in _phases(count)]
+
+
+def fly_through(start: Eye, count: int, sides: Sides = (SIDEWAYS, SIDEWAYS), heights: Sides = (UP, UP)) -> list[Eye]:
+    """A closed flight around `start`: to both sides, up and down, near and far, twice as often near as to one side.
+
+    Args:
+        sides: degrees to the subject's right and left.
+        heights: degrees down and up.
+    """
     return [
-        Eye(start.azimuth + sweep * math.sin(phase), start.elevation, start.distance, start.target) for phase in phases
+        replace(
+            start,
+            azimuth=start.azimuth + _swing(phase, sides),
+            elevation=start.elevation + _swing(2 * phase, heights),
+            distance=start.distance * (1 - 0.3 * (1 - math.cos(2 * phase)) / 2),
+        )
+        for phase in _phases(count)
     ]
 
 
-def fly_through(start: Eye, count: int) -> list[Eye]:
-    """A closed flight around `start`: to both sides, up and down, near and far, twice as often near as to one side."""
-    eyes = []
-    for phase in 2 * math.pi * np.arange(count) / count:
-        eyes.append(
-            Eye(
-                start.azimuth + 40 * math.sin(phase),
-                start.elevation + 18 * math.sin(2 * phase),
-                start.distance * (1 - 0.3 * (1 - math.cos(2 * phase)) / 2),
-                start.target,
-            )
-        )
-    return eyes
+def _phases(count: int) -> list[float]:
+    return [2 * math.pi * index / count for index in range(count)]
+
+
+def _swing(phase: float, sides: Sides) -> float:
+    """Degrees: a sine whose negative half goes as far as the first of `sides`, the positive one as the second."""
+    swing = math.sin(phase)
+    return swing * sides[swing > 0]
+
+
+def frame_due(index: int, rate: Fraction, sequence: Fraction, frames: int, first: int = 0) -> int:
+    """The frame that a player shows with picture `index` of a film: the last one that has begun; the sequence repeats.
+
+    Args:
+        index: of the picture, from 0.
+        rate: pictures a second, of the film.
+        sequence: frames a second, of the asset.
+        frames: of the asset.
+        first: the frame that the film begins with.
+    """
+    return int(first + index * sequence / rate) % frames

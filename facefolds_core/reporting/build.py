@@ -154,6 +154,7 @@ def context(subject: Subject) -> dict[str, Any]:
         "curves": curves(facts),
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "waterfall": tables.waterfall(facts.waterfall),
+        "waterfall_on": words.waterfall_words(facts.waterfall_on),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
         "config": tables.configuration(facts.config),
@@ -171,10 +172,13 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
     """The figures at the head of the page."""
     metrics, manifest = subject.facts.metrics, subject.asset.manifest
     asset, cost = metrics.get("asset", {}), metrics.get("cost", {})
-    where = HEADLINE_WORDS[key]
     files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
     return [
-        {"name": "PSNR", "value": number_unit(asset.get(key), "dB"), "note": f"{where}, held-out cameras"},
+        {
+            "name": "PSNR",
+            "value": number_unit(asset.get(key), "dB"),
+            "note": f"{words.region_words(metrics)}; held-out cameras",
+        },
         *optional_tile("Worst patch", asset.get("worst_patch"), "of any held-out picture"),
         *optional_tile("What moves", asset.get("psnr_moving"), "where and when the photos change"),
         {"name": "Size", "value": words.size(files), "note": "meshes and video"},

@@ -11,7 +11,9 @@ from markupsafe import Markup, escape
 from matplotlib import colormaps
 from matplotlib.ticker import MaxNLocator
 
+from facefolds_core.captures.scene import Split
 from facefolds_core.scoring.metrics import Array
+from facefolds_core.scoring.terminal import SPLIT_WORDS
 
 WIDTH, HEIGHT = 320, 190
 LEFT, RIGHT, TOP, BOTTOM = 46, 10, 10, 30
@@ -77,11 +79,7 @@ class Dot:
     azimuth: float
     elevation: float
     name: str
-    split: str
-
-
-KINDS = {"train": "for training", "validate": "for validation", "holdout": "held out"}
-"""Split -> in words."""
+    split: Split
 
 
 def camera_map(dots: Sequence[Dot]) -> Markup:
@@ -91,11 +89,11 @@ def camera_map(dots: Sequence[Dot]) -> Markup:
     middle, half = (min(heights) + max(heights)) / 2, max(10.0, (max(heights) - min(heights)) / 2 * 1.25)
     frame = Frame((-across, across), (middle - half, middle + half))
     marks = []
-    for dot in sorted(dots, key=lambda one: list(KINDS).index(one.split)):
+    for dot in sorted(dots, key=lambda one: list(SPLIT_WORDS).index(one.split)):
         x, y = frame.at((dot.azimuth, dot.elevation))
         held = dot.split == "holdout"
         kind = "held" if held else dot.split
-        words = f"{dot.name}, {KINDS[dot.split]}"
+        words = f"{dot.name}, {SPLIT_WORDS[dot.split]}"
         radius = 6 if held else 4
         marks.append(
             f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius}"><title>{escape(words)}</title></circle>'

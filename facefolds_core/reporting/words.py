@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.reporting.facts import Facts, ImageScores, StageCost, finite
 from facefolds_core.scoring.record import AngleBin, Seen
 from facefolds_core.scoring.report import headline
-from facefolds_core.scoring.terminal import HEADLINE_WORDS
+from facefolds_core.scoring.terminal import HEADLINE_WORDS, REGION_WORDS, SPLIT_WORDS
 
 NONE = "–"
 """Stands for a value that is not there."""
@@ -76,6 +76,13 @@ def quality_key(metrics: dict[str, Any]) -> str:
     return headline(metrics)
 
 
+def region_words(metrics: dict[str, Any]) -> str:
+    """Over which pixels `quality_key` is taken; and what says so, where that is noted."""
+    key = quality_key(metrics)
+    by = REGION_WORDS.get(metrics.get("matte", "")) if key in ("psnr_subject", "psnr_found") else None
+    return f"{HEADLINE_WORDS[key]}, the pixels of {by}" if by else HEADLINE_WORDS[key]
+
+
 def image_psnr(image: ImageScores, key: str) -> float | None:
     value: float | None = getattr(image, key)
     return value
@@ -117,7 +124,7 @@ def quality_words(metrics: dict[str, Any]) -> str:
     ssim, high = asset.get(key.replace("psnr", "ssim")), asset.get("ssim_high")
     images = metrics.get("images_with_mask" if key == "psnr_subject" else "images")
     text = f"On {count(images)} held-out pictures the asset reaches {number(asset.get(key))} dB PSNR"
-    text += f" {HEADLINE_WORDS[key]}" if ssim is None else f" and {number(ssim, 3)} SSIM {HEADLINE_WORDS[key]}"
+    text += f" {region_words(metrics)}" if ssim is None else f" and {number(ssim, 3)} SSIM {region_words(metrics)}"
     text += "." if high is None else f", and {number(high, 3)} SSIM of high frequencies."
     here, before = finite(asset.get(key)), finite(diffuse.get(key))
     if here is not None and before is not None:
@@ -200,6 +207,15 @@ def export_words(steps: tuple[dict[str, Any], ...]) -> str | None:
     if change >= 0:
         return "No step of the export loses PSNR."
     return f"Of the export's steps, “{name}” loses most: {number(-change)} dB."
+
+
+def waterfall_words(found: dict[str, Any]) -> str:
+    """On which pictures the steps of the export were measured, and over which pixels; an older file does not say."""
+    cameras, region = SPLIT_WORDS.get(found.get("split", "")), REGION_WORDS.get(found.get("region", ""))
+    if cameras is None or region is None:
+        return "Each step as its stage left it"
+    pictures = plural(found.get("images", 0), "picture")
+    return f"{pictures} of cameras {cameras}, the pixels of {region}; each step as its stage left it"
 
 
 def time_words(metrics: dict[str, Any], training: dict[str, Any] | None, stages: tuple[StageCost, ...]) -> str:

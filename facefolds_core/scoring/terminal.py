@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from facefolds_core.captures.scene import Split
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.truths import MatteKind
 
 NAME, CELL = 42, 12
 """Columns of the terminal: of a row's name, and of each figure."""
@@ -21,6 +23,12 @@ HEADLINE_WORDS = {
 
 NAMES = {"diffuse": "no gloss", "asset_diffuse": "no gloss"}
 """What the terminal calls variants, in few letters: each stands beside the one that it is a part of."""
+
+SPLIT_WORDS: dict[Split, str] = {"train": "for training", "validate": "for validation", "holdout": "held out"}
+"""What a camera is for, in words."""
+
+REGION_WORDS: dict[MatteKind, str] = {"true": "the masks", "scene": "the mattes", "found": "the model's own opacity"}
+"""What says where the subject is, in words."""
 
 ROWS = (
     ("psnr_any", "PSNR over any background, dB", "{:.2f}"),
@@ -54,9 +62,9 @@ ROWS = (
 
 def score_lines(metrics: Mapping[str, Any]) -> list[str]:
     """The held-out cameras' means, and those of the cameras for validation."""
-    lines = _lines(metrics, "held out")
+    lines = _lines(metrics, SPLIT_WORDS["holdout"])
     if isinstance(metrics.get("validate"), dict):
-        lines += ["", *_lines(metrics["validate"], "for validation")]
+        lines += ["", *_lines(metrics["validate"], SPLIT_WORDS["validate"])]
     return lines
 
 

@@ -12,6 +12,17 @@ from dvclive.live import Live
 from facefolds_core.training.patience import patiently
 
 
+class _Log(Live):
+    """dvclive's log; an error of the disk names the file."""
+
+    def make_summary(self) -> None:
+        try:
+            super().make_summary()  # type: ignore[no-untyped-call]
+        except OSError as error:  # of a write it names none
+            error.filename = error.filename or self.metrics_file
+            raise
+
+
 def open_log(folder: Path, resume: bool = False) -> Live:
     """dvclive's log in `folder`: no experiment, no report, no dvc.yaml, nothing sent anywhere.
 
@@ -21,7 +32,7 @@ def open_log(folder: Path, resume: bool = False) -> Live:
     """
     # A user's token for DVC Studio must not make dvclive send the log there.
     os.environ["DVC_STUDIO_OFFLINE"] = "true"
-    return Live(dir=str(folder), resume=resume, save_dvc_exp=False, dvcyaml=None, report=None, monitor_system=False)
+    return _Log(dir=str(folder), resume=resume, save_dvc_exp=False, dvcyaml=None, report=None, monitor_system=False)
 
 
 def log_metrics(live: Live, step: int, values: Mapping[str, float]) -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import av
 import pytest
 
 from facefolds_core.errors import UserError
@@ -201,6 +202,9 @@ def test_errors_name_the_file_that_was_to_be(tmp_path: Path) -> None:
     ):
         raise OSError(errno.ENOSPC, "No space left on device", str(file))
     assert inside.value.filename == str(tmp_path / "asset" / "sub" / "poster.jpg")
+    with pytest.raises(OSError) as pyav, atomic_folder(tmp_path / "asset") as temporary:
+        raise av.error.OSError(errno.EFBIG, "File too large", str(temporary / "films" / "000.mp4"))
+    assert (pyav.value.errno, pyav.value.filename) == (errno.EFBIG, str(tmp_path / "asset" / "films" / "000.mp4"))
     with pytest.raises(UserError) as users, atomic_folder(tmp_path / "asset") as temporary:
         raise UserError("bad", file=temporary / "full.mp4")
     assert users.value.file == tmp_path / "asset" / "full.mp4"

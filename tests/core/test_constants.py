@@ -151,6 +151,8 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
     "how something is shown to people: pictures, pages, lines": {
         "cluster/job.py": ("LAST_LINES",),
         "asset/audio.py": ("AAC_BITS_A_SECOND", "AAC_FRAME"),
+        "asset/filmed.py": ("FREE", "ROUND"),
+        "rendering/camera_paths.py": ("SIDEWAYS", "UP"),
         "cli/render.py": ALL,
         "engines/godot.py": ("QUALITY",),
         "engines/usd.py": ("QUALITY",),

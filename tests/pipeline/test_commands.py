@@ -14,7 +14,6 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from facefolds_core.asset import read_asset
 from facefolds_core.cli import COMMANDS, app, view
 from facefolds_core.files import read_json
 from facefolds_core.paths import SubjectFolders
@@ -60,9 +59,8 @@ def test_render_a_still(level: str, tmp_path: Path) -> None:
 
 
 def test_render_a_film(tmp_path: Path) -> None:
-    seconds = f"{6 / read_asset(Path(ASSET)).full.entry.texture.fps:.3f}"
     facefolds(
-        "render", ASSET, "--kind", "turntable", "--seconds", seconds, "--out", tmp_path / "a.mp4", "--size", "64x48"
+        "render", ASSET, "--kind", "turntable", "--seconds", "0.2", "--out", tmp_path / "a.mp4", "--size", "64x48"
     )
     with av.open(str(tmp_path / "a.mp4")) as film:
         assert len(list(film.decode(video=0))) == 6

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 
 import av
@@ -13,17 +16,18 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.cli.render import parse_colour, parse_size, shrink
+from facefolds_core.asset.manifest_extras import FilmedView
+from facefolds_core.cli.render import Kind, film_path, film_rate, parse_colour, parse_size, shrink
 from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, turntable
+from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.assets import make_asset
+from tests.assets import SOURCE, make_asset
 from tests.engines.tracks import with_track
 from tests.scenes import look_at_origin
-from tests.viewer.fixtures import random_reflection
+from tests.viewer.fixtures import change_manifest, random_reflection
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +125,7 @@ def test_from_the_distance_to_fit_a_box_just_fills_the_picture() -> None:
     assert distance_to_fit(*flat, aside, 100, 100, 30) == pytest.approx(0.1 + 0.5 / np.tan(np.radians(15)))
 
 
-@pytest.mark.parametrize("path", [lambda start, n: turntable(start, n, 50), fly_through])
+@pytest.mark.parametrize("path", [lambda start, n: turntable(start, n, (50, 50)), fly_through])
 def test_films_are_closed_and_stay_in_front(path: object) -> None:
     start = Eye(azimuth=5, elevation=3, distance=1.5)
     eyes = path(start, 48)  # type: ignore[operator]
@@ -131,6 +135,47 @@ def test_films_are_closed_and_stay_in_front(path: object) -> None:
     steps = np.abs(np.diff([*azimuths, azimuths[0]]))
     assert steps.max() < 8  # no jump, not at the end either
     assert min(eye.distance for eye in eyes) > 0.9
+
+
+FILMED = FilmedView(azimuth=(-30, 20), elevation=(-5, 10))
+
+
+def test_films_stay_where_the_asset_was_filmed() -> None:
+    wide, high = film_path(None, Kind.TURNTABLE, Eye(), 48, None), film_path(None, Kind.FLY, Eye(), 48, None)
+    assert [max(eye.azimuth for eye in eyes) for eyes in (wide, high)] == pytest.approx([55, 40], abs=0.5)
+    for kind in (Kind.TURNTABLE, Kind.FLY):
+        eyes = film_path(FILMED, kind, Eye(azimuth=5), 48, None)
+        azimuths, elevations = [eye.azimuth for eye in eyes], [eye.elevation for eye in eyes]
+        assert (min(azimuths), max(azimuths)) == pytest.approx((-34, 24))
+        assert min(elevations) >= -9 and max(elevations) <= 14
+    asked = film_path(FILMED, Kind.TURNTABLE, Eye(), 48, 90)
+    assert max(eye.azimuth for eye in asked) == pytest.approx(90)
+    behind = film_path(FILMED, Kind.TURNTABLE, Eye(azimuth=180), 48, None)  # asked for as well
+    assert [min(eye.azimuth for eye in behind), max(eye.azimuth for eye in behind)] == pytest.approx([125, 235])
+
+
+@pytest.mark.parametrize(
+    ("asset", "frames", "wanted", "expected"),
+    [
+        (Fraction(8), 12, None, 30),
+        (Fraction(30000, 1001), 12, None, Fraction(30000, 1001)),
+        (Fraction(24), 12, None, 24),
+        (Fraction(60), 12, None, 60),
+        (Fraction(60), 1, None, 30),
+        (Fraction(8), 12, 59.94, Fraction(2997, 50)),
+    ],
+)
+def test_the_rate_of_a_film(asset: Fraction, frames: int, wanted: float | None, expected: Fraction) -> None:
+    assert film_rate(asset, frames, wanted) == expected
+
+
+def test_a_film_shows_the_frame_that_a_player_would() -> None:
+    thirty, eight = Fraction(30), Fraction(8)
+    shown = [frame_due(index, thirty, eight, 12) for index in range(46)]
+    assert shown == [int(index / 30 * 8 + 1e-9) % 12 for index in range(46)]
+    assert shown[:9] == [0, 0, 0, 0, 1, 1, 1, 1, 2] and shown[44:] == [11, 0]  # 12 frames are a second and a half
+    assert [frame_due(index, eight, eight, 3, first=2) for index in range(4)] == [2, 0, 1, 2]
+    assert [frame_due(index, eight, thirty, 12) for index in range(4)] == [0, 3, 7, 11]
 
 
 def test_shrinking_takes_means() -> None:
@@ -204,6 +249,47 @@ def test_a_film(caps: Asset, tmp_path: Path, project_root: Path) -> None:
     assert len(frames) == 6
     assert frames[0].shape == (128, 160, 3)
     assert len({frame.tobytes() for frame in frames}) == 6  # it moves
+
+
+@pytest.mark.parametrize(("options", "rate", "count"), [([], 30, 30), (["--fps", "12.5"], 12.5, 12)])
+def test_a_films_camera_moves_more_often_than_the_sequence(
+    tmp_path: Path, project_root: Path, options: list[str], rate: float, count: int
+) -> None:
+    make_asset(tmp_path / "asset", frames=3, resolution=32, source=replace(SOURCE, fps=4.0))
+    film = ["--kind", "turntable", "--size", "64x48", "--seconds", "1", "--out", str(tmp_path / "film.mp4")]
+    done = run(project_root, str(tmp_path / "asset"), *film, *options)
+    assert done.returncode == 0, done.stderr
+    with av.open(str(tmp_path / "film.mp4")) as container:
+        video = container.streams.video[0]
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video)]
+        assert video.average_rate == rate and video.duration is not None and video.time_base is not None
+        assert float(video.duration * video.time_base) == pytest.approx(1, abs=0.51 / rate)
+    assert len(pictures) == count
+    assert all((a != b).any() for a, b in pairwise(pictures))  # the camera moves in each
+
+
+def test_where_no_camera_stood_is_said(tmp_path: Path, project_root: Path) -> None:
+    make_asset(tmp_path / "asset", frames=1, resolution=32)
+    change_manifest(tmp_path / "asset", lambda value: value.update(view=FILMED.model_dump(exclude_none=True)))
+    small = ["--size", "64x48", "--samples", "1"]
+    still, film = ["--out", str(tmp_path / "a.png")], ["--out", str(tmp_path / "a.mp4"), "--seconds", "0.4"]
+    camera = look_at_origin("behind", 180, 0, 64)
+    there = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": 64, "height": 64}
+    (tmp_path / "behind.json").write_text(json.dumps(there))
+    for arguments, said in (
+        ([*still, "--azimuth", "180"], "this looks from where no camera stood, 150 degrees beyond the last one"),
+        ([*still, "--azimuth", "340"], ""),
+        ([*still, "--camera", str(tmp_path / "behind.json")], "150 degrees beyond"),
+        ([*film, "--kind", "turntable"], ""),
+        ([*film, "--kind", "fly"], ""),
+        ([*film, "--kind", "turntable", "--sweep", "60"], "8 of 12 pictures look from where no camera stood, 40 deg"),
+    ):
+        done = run(project_root, str(tmp_path / "asset"), *arguments, *small)
+        assert done.returncode == 0, done.stderr
+        if said:
+            assert said in done.stderr and "azimuth -30 to 20 and elevation -5 to 10" in done.stderr
+        else:
+            assert done.stderr == ""
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,26 @@ def test_each_step_of_the_export_has_its_figures(subject: SubjectFolders) -> Non
     assert len(re.findall(cells, page_of(subject))) == len(STEPS)
 
 
+def test_the_steps_of_the_export_say_which_pictures_and_pixels_they_are_of(copy: SubjectFolders) -> None:
+    assert "6 pictures of cameras for validation, the pixels of the masks; each step" in page_of(copy)
+    found = json.loads(copy.waterfall.read_text())
+    write_json(copy.waterfall, found | {"split": "holdout", "region": "found", "images": 1})
+    assert "1 picture of cameras held out, the pixels of the model&#39;s own opacity; each step" in page_of(copy)
+    write_json(copy.waterfall, {"steps": found["steps"]})  # of an earlier version
+    assert '<p class="caption">Each step' in page_of(copy)
+
+
+def test_the_headline_says_over_which_pixels_it_is(copy: SubjectFolders) -> None:
+    note = '<dd class="note">of the subject, the pixels of {}; held-out cameras</dd>'
+    metrics = json.loads(copy.metrics.read_text())
+    assert metrics["matte"] == "true" and note.format("the masks") in page_of(copy)
+    metrics["asset"] |= {"psnr_found": metrics["asset"]["psnr_subject"], "psnr_subject": None}
+    write_json(copy.metrics, metrics | {"headline": "psnr_found", "matte": "found"})
+    page = page_of(copy)
+    assert "within the matte that was found, the pixels of the model&#39;s own opacity; held-out cameras" in page
+    assert "SSIM within the matte that was found, the pixels of the model&#39;s own opacity." in page
+
+
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
     assert "level 3: &lt;diverged&gt;" in page_of(subject)
 

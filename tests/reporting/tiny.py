@@ -85,5 +85,7 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
         | {"ssim": 0.9, "ssim_high": 0.8, "st_lpips": 0.0456}
         for i, name in enumerate(STEPS)
     ]
-    write_json(folders.waterfall, {"subject": "spheres", "steps": steps})
+    write_json(
+        folders.waterfall, {"subject": "spheres", "region": "true", "split": "validate", "images": 6} | {"steps": steps}
+    )
     return folders

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
 
+from facefolds_core.files import atomic_folder
 from facefolds_core.scoring.films import FilmFolder
+from tests.hostile.fuzz_disk import limited_files
 
 
 def decoded(path: Path) -> list[np.ndarray]:
@@ -49,3 +52,20 @@ def test_a_still_scene_has_none(tmp_path: Path) -> None:
     with folder.roll("a") as roll:
         assert roll is None
     assert (folder.files, list(tmp_path.iterdir())) == ([], [])
+
+
+def test_a_film_that_may_not_grow_is_named(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OSError) as caught,
+        limited_files(198),
+        atomic_folder(tmp_path / "evaluation") as folder,
+        FilmFolder(folder, 30.0, 18).roll("a") as roll,
+    ):
+        assert roll is not None
+        for frame in ("0", "1"):
+            roll.add(frame, np.zeros((16, 16, 3)), np.ones((16, 16, 3)))
+    assert (caught.value.errno, caught.value.filename) == (
+        errno.EFBIG,
+        str(tmp_path / "evaluation" / "films" / "000.mp4"),
+    )
+    assert list(tmp_path.iterdir()) == []

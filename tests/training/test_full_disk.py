@@ -91,3 +91,12 @@ def test_the_log_has_no_half_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         assert path.read_text() == before
         log_metrics(live, 2, {"psnr": 2.5})
     assert path.read_text() == "step\tpsnr\n1\t1.5\n2\t2.5\n"
+
+
+def test_a_summary_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with open_log(tmp_path / "log") as live:
+        live.summary["psnr"] = 30.0
+        for end in (live.make_summary, live.sync):
+            with pytest.raises(OSError) as caught, limited_files(3):
+                end()
+            assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(tmp_path / "log" / "metrics.json"))
