@@ -23,7 +23,7 @@ from facefolds_core.rendering.reflection import reflected_colours
 
 Image = NDArray[np.float32]
 
-SIDE = 3
+SIDE = 2
 """Rays along each side of a pixel: see `docs/reference/metrics.md`, "areas", for how it was chosen."""
 
 ROWS_AT_ONCE = 64
