@@ -218,13 +218,14 @@ def signals_end_cleanly() -> Iterator[None]:
 
 
 @contextmanager
-def report_user_errors(what: str) -> Iterator[None]:
+def report_user_errors(what: str, ended: str = "") -> Iterator[None]:
     """Turn what a user can mend into a message and exit status 1; Ctrl+C and SIGTERM into a line and 130 and 143.
 
     A user's mistakes are `UserError`, the disk's and the memory's errors. Every other exception keeps its traceback.
 
     Args:
         what: the name of the command or stage, printed before the message.
+        ended: what else to say where a signal ended it.
     """
     try:
         with signals_end_cleanly():
@@ -234,7 +235,8 @@ def report_user_errors(what: str) -> Iterator[None]:
         sys.exit(128 + signal.SIGINT)
     except Ended as error:
         name = signal.Signals(error.number).name
-        sys.stderr.write(f"\n{what}: ended by {name}; run the same command again to go on\n")
+        more = f"; {ended}" if ended else ""
+        sys.stderr.write(f"\n{what}: ended by {name}; run the same command again to go on{more}\n")
         sys.exit(128 + error.number)
     except BrokenPipeError as error:
         if error.filename is not None:

@@ -9,14 +9,22 @@ import time
 
 import psutil
 
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables of the environment that say how many threads a process may have."""
+
+OPENBLAS = "OPENBLAS_NUM_THREADS"
+"""The same of numpy's and scipy's linear algebra: one is best, however many cores there are (stages/__init__.py)."""
 
 LOOK = 0.25
 """Seconds between two looks at the parent's process."""
 
 GRACE = 10.0
 """Seconds that a process may clean up after its parent ended, before it is killed."""
+
+
+def with_threads(count: int) -> dict[str, str]:
+    """Variables of the environment for a process with so many threads."""
+    return {**dict.fromkeys(THREADS, str(count)), OPENBLAS: "1"}
 
 
 def end_with_parent() -> None:

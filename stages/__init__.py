@@ -4,10 +4,12 @@ import os
 import sys
 from types import TracebackType
 
-# Threads of torch (libgomp) that wait for each other sleep instead of spinning: measured as fast on idle cores, and
-# five times as fast where other work shares them (docs/research/performance.md). To be set before torch is
-# imported.
+# Threads of torch and numba (libgomp) that wait for each other sleep instead of spinning: measured as fast on idle
+# cores, and five times as fast where other work shares them. OpenBLAS (numpy, scipy) has one thread: its threads spin,
+# too, and our systems of equations are made of blocks far too small to be shared. To be set before torch and numpy are
+# imported (docs/research/performance.md#beside-other-work).
 os.environ.setdefault("GOMP_SPINCOUNT", "0")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

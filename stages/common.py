@@ -28,6 +28,9 @@ CHOICE = "choice.json"
 LOCK_WAIT = 20.0
 """Seconds that a stage waits for another run of it, which may be ending, on the same subject."""
 
+KILLED = "if DVC was killed, and says the next time that a file is corrupted, `facefolds doctor` mends it"
+"""What a stage says that ends with its DVC: a DVC that is killed can leave files that stop it before any stage runs."""
+
 LOOK = 0.25
 """Seconds between two looks at DVC's lock."""
 
@@ -53,7 +56,7 @@ def run_stage(name: str, work: Work, help_text: str) -> None:
         subject: Annotated[str, typer.Option(help="Name of the subject in params.yaml; DVC tells it itself.")] = "",
         data: Data = Path("data"),
     ) -> None:
-        with report_user_errors(name):
+        with report_user_errors(name, KILLED if "DVC_STAGE" in os.environ else ""):
             end_with_dvc()
             folders = subject_folders(data, subject or subject_of_dvc_stage(name, os.environ.get("DVC_STAGE", "")))
             with alone(name, folders.root / "locks"):
@@ -79,7 +82,7 @@ def run_for_all(name: str, work: Callable[[Path], str], help_text: str) -> None:
         subject: Annotated[str, typer.Option(help="Not needed: all subjects' files are written.")] = "",
         data: Data = Path("data"),
     ) -> None:
-        with report_user_errors(name):
+        with report_user_errors(name, KILLED if "DVC_STAGE" in os.environ else ""):
             end_with_dvc()
             if subject:
                 check_subject_name(subject)

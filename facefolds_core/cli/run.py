@@ -11,6 +11,7 @@ import typer
 from dask.utils import parse_bytes
 from dvc.config import Config
 
+from facefolds_core.cli.mending import mend
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
 from facefolds_core.cluster.jobs import how_to_repeat, read_grid, record, subject_jobs, sweep_jobs
@@ -45,6 +46,8 @@ def command(
     with report_user_errors("run"):
         root = Path.cwd()
         params = load_params("params.yaml")
+        for line in mend(root):
+            typer.echo(f"run: {line}")
         if segments and (subjects or sweep):
             raise UserError("--segments goes alone", remedy="name the subjects in it; leave --subjects and --sweep out")
         chosen = subjects or segments

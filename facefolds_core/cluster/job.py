@@ -28,7 +28,7 @@ from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.pointers import keep, made_by, put_pointers, read_pointers, take_folder
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
-from facefolds_core.processes import THREADS
+from facefolds_core.processes import with_threads
 from facefolds_core.training.segments.names import BASE, PLAN
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
@@ -185,8 +185,8 @@ def _make_part(shell: _Shell, place: Path, job: Job, push: bool, begun: Path) ->
 def _environment(worker: Any, job: Job) -> dict[str, str]:
     """Of the job's processes: its share of the threads, the programs of this environment."""
     at_once = min(worker.state.nthreads, job.at_once or worker.state.nthreads)
-    threads = str(max(1, dask.system.CPU_COUNT // at_once))
-    environment = {**dict.fromkeys(THREADS, threads), **os.environ, "PYTHONUNBUFFERED": "1"}
+    threads = max(1, dask.system.CPU_COUNT // at_once)
+    environment = {**with_threads(threads), **os.environ, "PYTHONUNBUFFERED": "1"}
     environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
     return environment
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from facefolds_core.cli import mending
+from facefolds_core.cli import app, mending
 from facefolds_core.cli.mending import mend
 from facefolds_core.errors import UserError
 from facefolds_core.locks import try_lock
+from facefolds_core.params import STAGE_SECTIONS
+from stages import common
 
 PIPELINE = """\
 stages:
@@ -29,6 +33,50 @@ DAMAGED = {
     "conflict": '<<<<<<< HEAD\nschema: "2.0"\n',
     "no text": "\udcff",
 }
+
+
+RWLOCK_WORDS = "Unable to read RWLock-file '.dvc/tmp/rwlock'. JSON structure is corrupted"
+LOCK_WORDS = "'./dvc.lock' validation failed"
+
+
+def says(text: str, words: str) -> bool:
+    """Whether the words are there, however the lines are broken."""
+    return words in " ".join(text.split())
+
+
+def test_the_documents_have_the_words_by_which_one_finds_them(project_root: Path) -> None:
+    text = (project_root / "docs" / "reference" / "command.md").read_text(encoding="utf-8")
+    assert says(text, RWLOCK_WORDS) and says(text, LOCK_WORDS)
+    assert says((project_root / "README.md").read_text(encoding="utf-8"), "say that a file is corrupted")
+
+
+def test_facefolds_run_mends_before_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("dask")
+    monkeypatch.chdir(tmp_path)
+    sections = "".join(f"{name}: {{}}\n" for name in STAGE_SECTIONS)
+    (tmp_path / "params.yaml").write_text(f"subjects:\n  anna: {{source: actor, path: .}}\n{sections}")
+    (tmp_path / ".dvc" / "tmp").mkdir(parents=True)
+    (tmp_path / ".dvc" / "tmp" / "rwlock").write_text("")
+    done = CliRunner().invoke(app, ["run", "--subjects", "nobody"])
+    assert "rwlock was empty: deleted" in done.output and "nobody" in done.output
+    assert not (tmp_path / ".dvc" / "tmp" / "rwlock").exists()
+
+
+def test_a_stage_whose_dvc_was_killed_says_what_may_be_damaged(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for dvc_stage, said in (("train@anna", True), (None, False)):
+        if dvc_stage is None:
+            monkeypatch.delenv("DVC_STAGE", raising=False)
+        else:
+            monkeypatch.setenv("DVC_STAGE", dvc_stage)
+        monkeypatch.setattr(sys, "argv", ["train", "--subject", "anna"])
+        monkeypatch.setattr(common, "end_with_parent", lambda: None)
+        with pytest.raises(SystemExit) as ended:
+            common.run_stage("train", lambda _: os.kill(os.getpid(), signal.SIGTERM) or "", "")
+        assert ended.value.code == 128 + signal.SIGTERM
+        told = capsys.readouterr().err
+        assert "train: ended by SIGTERM" in told and ("`facefolds doctor` mends it" in told) is said
 
 
 def dvc(root: Path) -> tuple[int, str]:
@@ -65,6 +113,7 @@ def test_a_damaged_dvc_lock_is_moved_away_and_nothing_runs_again(project: Path, 
     (project / "dvc.lock").write_bytes(content)
     status, output = dvc(project)
     assert status != 0, output
+    assert name != "empty" or says(output, LOCK_WORDS)
     ran = (project / "ran.txt").read_text()
     (line,) = mend(project)
     assert "dvc.lock" in line
@@ -82,6 +131,7 @@ def test_a_damaged_list_of_files_in_use(project: Path) -> None:
     (project / "dvc.lock").unlink()
     status, output = dvc(project)
     assert status != 0, output
+    assert says(output, RWLOCK_WORDS)
     (line,) = mend(project)
     assert "rwlock" in line
     status, output = dvc(project)

@@ -16,7 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from facefolds_core.errors import UserError
-from facefolds_core.processes import THREADS
+from facefolds_core.processes import with_threads
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.handed import Fitting, handed
 from facefolds_core.training.segments.messages import Failed, FrameDone, SegmentDone
@@ -110,7 +110,7 @@ class Workers:
         """A process by a command of its own: multiprocessing's would import the user's script once more."""
         ours, theirs = Pipe()
         path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-        environment = {**os.environ, **dict.fromkeys(THREADS, str(self.threads)), "PYTHONPATH": path}
+        environment = {**os.environ, **with_threads(self.threads), "PYTHONPATH": path}
         numbers = [str(theirs.fileno()), str(handles[0])]
         process = subprocess.Popen(
             [sys.executable, "-m", "facefolds_core.training.segments.worker", *numbers],
