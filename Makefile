@@ -24,7 +24,7 @@ PLAYER := viewer/dist/index.html
 
 # Tests with threads of their own need two; more would wait for one another.
 WORKERS ?= $(shell nproc 2>/dev/null || getconf _NPROCESSORS_ONLN)
-PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
+PYTEST  := NUMBA_NUM_THREADS=2 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 4
 
 .PHONY: repro check test nightly view report hero docs lint lint-player wheel package gate bench charts blender clean
 
