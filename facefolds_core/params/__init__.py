@@ -25,6 +25,7 @@ from facefolds_core.params.explicit import (
     BackgroundParams,
     DivergenceParams,
     ExplicitParams,
+    FollowParams,
     GridTextureParams,
     LossParams,
     MovingParams,

@@ -24,6 +24,7 @@ from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
+from facefolds_core.training.explicit.follow import follow
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.silhouettes import silhouettes
@@ -222,12 +223,23 @@ class Trainer:
         rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
+    def _follow(self) -> None:
+        """Frames where they lag behind what moves."""
+        assert self.state is not None and self.views is not None
+        to, slower = self.params.follow, self.rate / self.params.textures.learning_rate
+        rates = slower * to.rate * np.array([1, self.params.textures.alpha_rate])
+        share = follow(
+            self.state, self.views, self.images, self._weights(False), rates.astype(np.float32), self.gloss.light
+        )
+        self.events.append(fact("followed", share=share))
+
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""
         assert self.state is not None
         state, n = self.state, self.params.layers
-        state.forget_moments()
         assert self.views is not None
+        self._follow()
+        state.forget_moments()
         outlines = silhouettes(self.scene, self.volume, self.params)
         size = self.scene.height, self.scene.width
         self.events += clear_texels(

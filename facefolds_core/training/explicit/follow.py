@@ -1,0 +1,160 @@
+"""Where frames have not followed what moves: steps of each frame alone, on few texels and the rays that meet them.
+
+A blink is in one frame of twelve, on a hundredth of the texels. The steps before make all frames alike where they
+are alike, and share what a step costs among all texels; a lid that closes in one frame would need many more of them.
+Which texels lag is seen in the photos: C - I, averaged over the rays that meet a texel, with the rays of all cameras,
+is small of a texel that is right, whatever the noise of single pixels. What it is in all frames is no motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.hit_codes import before
+from facefolds_core.training.adam import corrections, decays
+from facefolds_core.training.explicit import follow_kernel, shading_kernel
+from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.views import Pictures, Rays, Views
+
+Light = Callable[[TextureState, Views, int], None]
+"""Sets the state's `shine` for rays of a frame."""
+
+Errors = NDArray[np.float32]
+
+
+def follow(
+    state: TextureState,
+    source: Rays,
+    images: Pictures,
+    weights: LossWeights,
+    rates: NDArray[np.float32],
+    light: Light,
+) -> float:
+    """All frames, each where its texels' mean error differs from their usual one.
+
+    Args:
+        weights: of the losses.
+        rates: (2,) of colour and of logits of alpha, in the first step.
+
+    Returns:
+        share of the texels that moved, mean over the frames.
+    """
+    frames, least = len(state.steps), state.params.follow.min_error
+    errors = np.stack([mean_errors(state, source, images, k, light) for k in range(frames)])
+    lag = [lagging(one, state.shape, least) for one in errors - np.median(errors, 0)]
+    for frame, chosen in enumerate(lag):
+        follow_frame(state, source, images, frame, chosen, errors[frame], weights, rates, light)
+    return float(np.mean(lag))
+
+
+def mean_errors(state: TextureState, source: Rays, images: Pictures, frame: int, light: Light) -> Errors:
+    """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
+    (h, w), n = state.shape, state.layers.shape[2]
+    sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
+    background, least = state.background.numpy(), state.params.textures.min_light
+    picture = images.frame(frame)
+    for views in source.in_use(frame):
+        light(state, views, frame)
+        follow_kernel.errors_by_texel(
+            views.codes, views.camera, views.pixel, picture, background, texture, state.shine, sums, least
+        )
+    total = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
+    sums[:] = 0
+    known = total[:, 3:] >= 0.5
+    return np.where(known, total[:, :3] / np.where(known, total[:, 3:], 1), 0)
+
+
+def lagging(errors: Errors, shape: tuple[int, int], least: float) -> NDArray[np.bool_]:
+    """(M,) texels with a channel in error by more than `least`, and their eight neighbours, which share their rays."""
+    found = (np.abs(errors).max(1) > least).reshape(shape)
+    return np.asarray(ndimage.binary_dilation(found, np.ones((3, 3)))).ravel()
+
+
+def follow_frame(
+    state: TextureState,
+    source: Rays,
+    images: Pictures,
+    frame: int,
+    chosen: NDArray[np.bool_],
+    errors: Errors,
+    weights: LossWeights,
+    rates: NDArray[np.float32],
+    light: Light,
+) -> None:
+    """What one frame adds at the chosen texels (M,): its colour less the mean errors (M, 3), a step as far as it takes;
+    then Adam steps on the rays of which they are enough."""
+    views, shine = _rays_on(state, source, frame, chosen, light)
+    if not len(views.pixel):
+        return
+    (h, w), n = state.shape, state.layers.shape[2]
+    own, near = np.flatnonzero(chosen), _met(views, state.shape)
+    near = np.union1d(own, near)
+    colours, alphas = np.zeros((2, len(own), 3), np.float32), np.zeros((2, len(own), n), np.float32)
+    values = state.frame_colour[0, frame].numpy(), state.frame_alpha[0, frame].numpy()
+    values[0][own] -= errors[own]
+    picture, background, texture = images.frame(frame), state.background.numpy(), _texture(state, frame)
+    params, textures = state.params.follow, state.params.textures
+    for step in range(params.steps):
+        shading_kernel.shade(
+            views.codes,
+            views.camera,
+            views.pixel,
+            np.arange(step % 2, len(views.pixel), 2),
+            picture,
+            background,
+            texture,
+            shine,
+            state.gradient.numpy().reshape(n, h, w, 4),
+            weights.opacity,
+            weights.binarisation,
+            0.0,
+            weights.min_alpha,
+            textures.min_light,
+        )
+        falling = 1 - (1 - textures.final_rate) * step / params.steps
+        follow_kernel.follow_step(
+            own,
+            near,
+            state.colour[0].numpy(),
+            state.layers[0].numpy(),
+            *values,
+            colours,
+            alphas,
+            texture.reshape(h * w, n, 4),
+            state.gradient.numpy(),
+            rates * np.float32(falling),
+            np.array(corrections(textures.betas, step + 1), np.float32),
+            decays(textures.betas),
+        )
+
+
+def _texture(state: TextureState, frame: int) -> NDArray[np.float32]:
+    """(H, W, N, 4) of one frame."""
+    (h, w), n = state.shape, state.layers.shape[2]
+    return state.activated(frame).numpy().reshape(h, w, n, 4)
+
+
+def _rays_on(
+    state: TextureState, source: Rays, frame: int, chosen: NDArray[np.bool_], light: Light
+) -> tuple[Views, NDArray[np.float32]]:
+    """The rays of which chosen texels are enough, and what the reflection adds to them."""
+    texture, least, params = _texture(state, frame), state.params.textures.min_light, state.params.follow
+    parts, shine = [], []
+    for views in source.in_use(frame):
+        light(state, views, frame)
+        found = follow_kernel.share_on(views.codes, texture, chosen.reshape(state.shape), least)
+        rays = np.flatnonzero(found >= params.min_share)
+        parts.append(views.part(rays))
+        shine.append(state.shine[rays] if len(state.shine) else state.shine)
+    return Views.together(parts), np.concatenate(shine)
+
+
+def _met(views: Views, shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Texels around all crossings of rays, with any layer."""
+    column, row = (before(views.codes[..., axis], size) for axis, size in ((0, shape[1]), (1, shape[0])))
+    corners = np.unique(row * shape[1] + column)
+    return np.unique(np.concatenate([corners + step for step in (0, 1, shape[1], shape[1] + 1)]))
