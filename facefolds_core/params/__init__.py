@@ -84,6 +84,7 @@ __all__ = [
     "EvaluateParams",
     "ExplicitParams",
     "FewCameraParams",
+    "FollowParams",
     "FrameRange",
     "GeometryParams",
     "GlbParams",

@@ -88,7 +88,8 @@ class GridTextureParams(Section):
 
 
 class FollowParams(Section):
-    """After the last level: steps of each frame alone, where it does not follow yet what moves."""
+    """After the levels at half and at full resolution: steps of each frame alone, where it does not follow yet what
+    moves."""
 
     min_error: Annotated[float, Field(gt=0, le=1)] = 0.02
     """A texel does not follow a frame whose mean error over the rays that meet it differs by more than this, in a

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.hit_codes import before
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.state import LossWeights, TextureState
@@ -33,7 +34,7 @@ def follow(
     weights: LossWeights,
     rates: NDArray[np.float32],
     light: Light,
-) -> float:
+) -> tuple[Errors, float]:
     """All frames, each where its texels' mean error differs from their usual one.
 
     Args:
@@ -41,14 +42,21 @@ def follow(
         rates: (2,) of colour and of logits of alpha, in the first step.
 
     Returns:
-        share of the texels that moved, mean over the frames.
+        (M, 3) the usual mean errors, and the share of the texels that moved, mean over the frames.
     """
     frames, least = len(state.steps), state.params.follow.min_error
     errors = np.stack([mean_errors(state, source, images, k, light) for k in range(frames)])
-    lag = [lagging(one, state.shape, least) for one in errors - np.median(errors, 0)]
+    usual = np.median(errors, 0).astype(np.float32)
+    lag = [lagging(one - usual, state.shape, least) for one in errors]
     for frame, chosen in enumerate(lag):
         follow_frame(state, source, images, frame, chosen, errors[frame], weights, rates, light)
-    return float(np.mean(lag))
+    return usual, float(np.mean(lag))
+
+
+def follow_rates(params: ExplicitParams, rate: float) -> NDArray[np.float32]:
+    """(2,) for colours and for logits of alpha, after a training whose own learning rate has come to `rate`."""
+    own = params.follow.rate * rate / params.textures.learning_rate
+    return own * np.array([1, params.textures.alpha_rate], np.float32)
 
 
 def mean_errors(state: TextureState, source: Rays, images: Pictures, frame: int, light: Light) -> Errors:

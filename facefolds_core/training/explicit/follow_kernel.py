@@ -1,6 +1,6 @@
-"""What frames have not followed, texel by texel, and the steps that make up for it, compiled. Reference: `reference.py`.
+"""What frames have not followed, texel by texel, and the steps that make up for it, compiled.
 
-For how threads share the work see `facefolds_core.scatter`."""
+Reference: `reference.py`. For how threads share the work see `facefolds_core.scatter`."""
 
 from __future__ import annotations
 
@@ -182,4 +182,3 @@ def _follow(
     for c in range(3):
         g = sum0 if c == 0 else (sum1 if c == 1 else sum2)
         _adam(frame_colour, (k, c), colours, (q, c), g, rates[0], correct, decay)
-
