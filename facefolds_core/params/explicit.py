@@ -99,7 +99,7 @@ class FollowParams(Section):
     """Rays count of whose colour at least this share is of such texels."""
 
     steps: Count = 20
-    """A frame, each on every second one of these rays; the rates fall along them."""
+    """A frame, each on every second one of these rays, fewer where these are many; the rates fall along them."""
 
     rate: Rate = 0.02
     """Adam's, of colours; of logits of alpha times `textures.alpha_rate`."""

@@ -11,7 +11,7 @@ from facefolds_core import hit_codes
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import follow_kernel, reference
-from facefolds_core.training.explicit.follow import follow, follow_frame, lagging, mean_errors
+from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
 from facefolds_core.training.explicit.state import LossWeights, TextureState
 from facefolds_core.training.explicit.views import StillRays, Views
 
@@ -184,3 +184,19 @@ def test_following_does_not_depend_on_the_number_of_threads() -> None:
         found.append(state.frame_colour.clone())
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     assert torch.equal(*found)
+
+
+def test_where_everything_moves_a_step_takes_a_quarter_of_a_usual_one() -> None:
+    assert [_apart(rays, 40_000.0) for rays in (10, 8_000, 20_000, 100_000)] == [2, 2, 2, 10]
+
+
+def test_texels_with_a_gradient_are_all_known() -> None:
+    views = random_views(40)
+    sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
+    rays = views.codes, views.camera, views.pixel
+    blank = np.zeros((1, 40, 3), np.float32)
+    follow_kernel.errors_by_texel(
+        *rays, blank.astype(np.uint8), blank, random_texture() * 0.3, np.zeros((0, 3), np.float32), sums, 0.0
+    )
+    met = np.flatnonzero(sums[..., 3].sum(0).ravel())
+    assert not np.setdiff1d(met, _met(views, SHAPE)).size

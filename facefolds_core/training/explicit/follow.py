@@ -8,6 +8,7 @@ is small of a texel that is right, whatever the noise of single pixels. What it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -106,12 +107,13 @@ def follow_frame(
     values[0][own] -= errors[own]
     picture, background, texture = images.frame(frame), state.background.numpy(), _texture(state, frame)
     params, textures = state.params.follow, state.params.textures
+    apart = _apart(len(views.pixel), h * w * textures.rays_per_texel)
     for step in range(params.steps):
         shading_kernel.shade(
             views.codes,
             views.camera,
             views.pixel,
-            np.arange(step % 2, len(views.pixel), 2),
+            np.arange(step % apart, len(views.pixel), apart),
             picture,
             background,
             texture,
@@ -161,8 +163,19 @@ def _rays_on(
     return Views.together(parts), np.concatenate(shine)
 
 
+def _apart(rays: int, usual: float) -> int:
+    """One of so many rays is taken in a step: every second, and at most a quarter as many as in a `usual` step, so that
+    a capture in which everything moves takes little longer, too."""
+    return max(2, math.ceil(rays / (usual / 4)))
+
+
 def _met(views: Views, shape: tuple[int, int]) -> NDArray[np.int64]:
-    """Texels around all crossings of rays, with any layer."""
-    column, row = (before(views.codes[..., axis], size) for axis, size in ((0, shape[1]), (1, shape[0])))
-    corners = np.unique(row * shape[1] + column)
-    return np.unique(np.concatenate([corners + step for step in (0, 1, shape[1], shape[1] + 1)]))
+    """Texels around all crossings of rays, with any layer; layer by layer, since there may be many rays."""
+    met = np.zeros(shape[0] * shape[1], bool)
+    for n in range(views.codes.shape[1]):
+        column, row = (before(views.codes[:, n, axis], size) for axis, size in ((0, shape[1]), (1, shape[0])))
+        met[row * shape[1] + column] = True
+    corners = np.flatnonzero(met)
+    for step in (1, shape[1], shape[1] + 1):
+        met[corners + step] = True
+    return np.flatnonzero(met)
