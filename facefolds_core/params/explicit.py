@@ -93,12 +93,13 @@ class FollowParams(Section):
 
     min_error: Annotated[float, Field(gt=0, le=1)] = 0.02
     """A texel does not follow a frame whose mean error over the rays that meet it differs by more than this, in a
-    channel, from its median over the frames; its eight neighbours move with it."""
+    channel, from its median over the frames; its eight neighbours move with it. Where a texel does not follow one frame,
+    the others are asked by their whole error."""
 
     min_share: Share = 0.3
     """Rays count of whose colour at least this share is of such texels."""
 
-    steps: Count = 20
+    steps: Count = 30
     """A frame, each on every second one of these rays, fewer where these are many; the rates fall along them."""
 
     rate: Rate = 0.02

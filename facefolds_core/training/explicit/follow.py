@@ -3,7 +3,8 @@
 A blink is in one frame of twelve, on a hundredth of the texels. The steps before make all frames alike where they
 are alike, and share what a step costs among all texels; a lid that closes in one frame would need many more of them.
 Which texels lag is seen in the photos: C - I, averaged over the rays that meet a texel, with the rays of all cameras,
-is small of a texel that is right, whatever the noise of single pixels. What it is in all frames is no motion.
+is small of a texel that is right, whatever the noise of single pixels. What it is in all frames is no motion, but
+where something moves: there the static part is a mean over the frames.
 """
 
 from __future__ import annotations
@@ -43,12 +44,15 @@ def follow(
         rates: (2,) of colour and of logits of alpha, in the first step.
 
     Returns:
-        (M, 3) the usual mean errors, and the share of the texels that moved, mean over the frames.
+        (M, 3) the usual mean errors, 0 where something moves; the share of the texels that moved, mean over the
+        frames.
     """
     frames, least = len(state.steps), state.params.follow.min_error
     errors = np.stack([mean_errors(state, source, images, k, light) for k in range(frames)])
     usual = np.median(errors, 0).astype(np.float32)
-    lag = [lagging(one - usual, state.shape, least) for one in errors]
+    moves = np.any([lagging(one - usual, state.shape, least) for one in errors], 0)
+    usual[moves] = 0  # there the static part is a mean of what moves, and errs in all frames
+    lag = [lagging(one - usual, state.shape, least) & moves for one in errors]
     for frame, chosen in enumerate(lag):
         follow_frame(state, source, images, frame, chosen, errors[frame], weights, rates, light)
     return usual, float(np.mean(lag))
