@@ -93,8 +93,8 @@ class FollowParams(Section):
 
     min_error: Annotated[float, Field(gt=0, le=1)] = 0.02
     """A texel does not follow a frame whose mean error over the rays that meet it differs by more than this, in a
-    channel, from its median over the frames; its eight neighbours move with it. Where a texel does not follow one frame,
-    the others are asked by their whole error."""
+    channel, from its median over the frames; its eight neighbours move with it. Where a texel does not follow one
+    frame, the others are asked by their whole error."""
 
     min_share: Share = 0.3
     """Rays count of whose colour at least this share is of such texels."""
