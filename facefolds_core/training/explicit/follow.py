@@ -70,11 +70,13 @@ def mean_errors(state: TextureState, source: Rays, images: Pictures, frame: int,
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
     background, least = state.background.numpy(), state.params.textures.min_light
     picture = images.frame(frame)
+    apart = max(
+        1, int(source.count / (4 * state.params.textures.rays_per_texel * h * w))
+    )  # four steps' rays are enough
     for views in source.in_use(frame):
         light(state, views, frame)
-        follow_kernel.errors_by_texel(
-            views.codes, views.camera, views.pixel, picture, background, texture, state.shine, sums, least
-        )
+        rays = (array[::apart] for array in (views.codes, views.camera, views.pixel))
+        follow_kernel.errors_by_texel(*rays, picture, background, texture, state.shine[::apart], sums, least)
     total = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
     sums[:] = 0
     known = total[:, 3:] >= 0.5
