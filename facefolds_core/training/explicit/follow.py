@@ -70,10 +70,10 @@ def mean_errors(state: TextureState, source: Rays, images: Pictures, frame: int,
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
     background, least = state.background.numpy(), state.params.textures.min_light
     picture = images.frame(frame)
-    apart = max(
-        1, int(source.count / (4 * state.params.textures.rays_per_texel * h * w))
-    )  # four steps' rays are enough
-    for views in source.in_use(frame):
+    shares = list(source.in_use(frame))
+    enough = 4 * state.params.textures.rays_per_texel * h * w  # as many rays as of four steps
+    apart = max(1, int(sum(len(views.pixel) for views in shares) / enough))
+    for views in shares:
         light(state, views, frame)
         rays = (array[::apart] for array in (views.codes, views.camera, views.pixel))
         follow_kernel.errors_by_texel(*rays, picture, background, texture, state.shine[::apart], sums, least)
