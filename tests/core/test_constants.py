@@ -75,6 +75,7 @@ ALLOWED: dict[str, dict[str, tuple[str, ...]]] = {
         "scatter.py": ALL,
         "export/collapse_kernel.py": ("MOST_NEIGHBOURS",),
         "export/quadrics_kernel.py": ("TERMS",),
+        "training/explicit/follow_kernel.py": ("_scatter",),
         "training/explicit/shading_kernel.py": ("_scatter",),
         "training/explicit/kernels_gpu.py": ("_put", "LAYERS"),
         "training/explicit/state.py": ("UNSEEN_LOGIT",),

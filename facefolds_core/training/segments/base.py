@@ -164,6 +164,7 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
         tensors = {
             "background": torch.from_numpy(found.background),
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
+            "usual": torch.from_numpy(found.usual),
         }
         # One entry: safetensors writes several in any order, and equal bases are to be equal files.
         about = {"about": json.dumps({"splits": found.splits, "rate": found.rate, "losses": found.losses.model_dump()})}
@@ -195,6 +196,7 @@ def read_base(folder: Path, fingerprint: str) -> Base:
         tensors["background"].numpy(),
         about["rate"],
         LossParams.model_validate(about["losses"]),
+        tensors["usual"].numpy(),
     )
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 
