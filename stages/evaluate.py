@@ -32,7 +32,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
     """What is not well with the capture, the training, the files and the scores."""
     video = read_stage(CompressParams, folders.config)
     quality = asset.manifest.full.quality
-    codec = codec_warning(quality.psnr_to_model if quality else None, video.video, video.search.noticed)
+    codec = codec_warning(quality.psnr_to_model if quality else None, video.video)
     limits = read_stage(EvaluateParams, folders.config).warnings
     return warnings_among(
         [
