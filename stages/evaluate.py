@@ -23,7 +23,7 @@ from facefolds_core.scoring.record import write_record
 from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
-from facefolds_core.scoring.training_views import bad_views, warnings_of
+from facefolds_core.scoring.training_scores import bad_views, warnings_of
 from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
 from stages.common import run_stage
 
