@@ -73,6 +73,7 @@ WORDS = {
     "g {g[0]:.2f} to {g[1]:.2f}, b {b[0]:.2f} to {b[1]:.2f} (fit.json: cameras)",
     "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
     "from what the images show (is its scale or its place wrong?)",
+    "followed": "frames moved once more, where they did not follow what moves: {share:.1%} of the texels each",
     "diverged": "level {level}: diverged, begun again with learning rate {rate:.3g}",
     "specks_cleared": "{count} patches of texels beside the subject made transparent, each under {share:.0%} of it "
     "(train.pruning.speck_share)",

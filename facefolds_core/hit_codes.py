@@ -27,3 +27,9 @@ def corner(code, size):  # type: ignore[no-untyped-def]
     x = min(max((code - 1) * (size / SCALE) - 0.5, 0.0), size - 1.0)
     i = min(int(x), size - 2)
     return i, np.float32(x - i)
+
+
+def before(codes: NDArray[np.uint16], size: int) -> NDArray[np.int64]:
+    """The indices of `corner`, of an array; any for misses."""
+    x = np.clip((codes.astype(np.float64) - 1) * (size / SCALE) - 0.5, 0, size - 1)
+    return np.minimum(x.astype(np.int64), size - 2)

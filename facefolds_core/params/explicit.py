@@ -87,6 +87,25 @@ class GridTextureParams(Section):
     """Layers with less alpha are skipped once the textures are at half resolution: speed, half a code of a pixel."""
 
 
+class FollowParams(Section):
+    """After the levels at half and at full resolution: steps of each frame alone, where it does not follow yet what
+    moves."""
+
+    min_error: Annotated[float, Field(gt=0, le=1)] = 0.02
+    """A texel does not follow a frame whose mean error over the rays that meet it differs by more than this, in a
+    channel, from its median over the frames; its eight neighbours move with it. Where a texel does not follow one
+    frame, the others are asked by their whole error."""
+
+    min_share: Share = 0.3
+    """Rays count of whose colour at least this share is of such texels."""
+
+    steps: Count = 30
+    """A frame, each on every second one of these rays, fewer where these are many; the rates fall along them."""
+
+    rate: Rate = 0.02
+    """Adam's, of colours; of logits of alpha times `textures.alpha_rate`."""
+
+
 class LossParams(Section):
     """Prices beside the squared error, a ray."""
 
@@ -223,6 +242,9 @@ class ExplicitParams(Section):
 
     textures: GridTextureParams = GridTextureParams()
     """The texel grids."""
+
+    follow: FollowParams = FollowParams()
+    """What moves."""
 
     reflection: ReflectionParams = ReflectionParams()
     """What gloss adds, by the direction."""

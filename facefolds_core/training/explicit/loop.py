@@ -95,6 +95,7 @@ class Surroundings:
         background: (C, pixels, 3) float32, of the same.
         rate: the learning rate that it ended with.
         losses: its own, after `for_notes`.
+        usual: (M, 3) mean errors of the texels in most frames.
     """
 
     splits: tuple[Split, ...]
@@ -102,6 +103,7 @@ class Surroundings:
     background: NDArray[np.float32]
     rate: float
     losses: LossParams
+    usual: NDArray[np.float32]
 
 
 def fit_with_surroundings(
@@ -157,5 +159,7 @@ def fit_with_surroundings(
     draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
     assert trainer.state is not None
     background = trainer.state.background.cpu().numpy()
-    surroundings = Surroundings(cameras.scene.splits, cameras.gains, background, trainer.rate, own.losses)
+    surroundings = Surroundings(
+        cameras.scene.splits, cameras.gains, background, trainer.rate, own.losses, trainer.usual
+    )
     return Trained(model, spec, report, trainer.summary(spec), draw), surroundings

@@ -123,3 +123,58 @@ def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, 
     values.copy_(torch.where(met, (values - step) * keep, values))
     first.copy_(torch.where(met, new_first, first))
     second.copy_(torch.where(met, new_second, second))
+
+
+def errors_by_texel(
+    codes: Tensor,  # [R, N, 2] int32
+    target: Tensor,  # [R, 3] in [0, 1]
+    background: Tensor,  # [R, 3]
+    texture: Tensor,  # [H, W, N, 4]
+    shine: Tensor,  # [R, 3]
+    min_light: float,
+) -> Tensor:
+    """As `follow_kernel.errors_by_texel`: [H, W, N, 4]."""
+    texture = texture.detach().clone().requires_grad_()
+    with torch.enable_grad():
+        rgba = look_up(codes, texture)
+        alpha = torch.where(visible(rgba[..., 3], 0.0, min_light), rgba[..., 3], 0.0).detach()
+        weights, transmittance = compositing_weights(alpha)
+        colour = (weights[..., None] * (rgba[..., :3] + shine[:, None])).sum(1) + transmittance[:, None] * background
+        # A colour's derivative is its weight.
+        (errors,) = torch.autograd.grad(0.5 * (colour - target).square().sum(), texture, retain_graph=True)
+        (shares,) = torch.autograd.grad(colour[:, 0].sum(), texture)
+    return torch.cat([errors[..., :3], shares[..., :1]], -1)
+
+
+def share_on(codes: Tensor, texture: Tensor, chosen: Tensor, min_light: float) -> Tensor:
+    """As `follow_kernel.share_on`: [R, N, 2] int32, [H, W, N, 4], [H, W] bool -> [R]."""
+    own = texture.clone()
+    own[..., 3] *= chosen[..., None]
+    alpha = look_up(codes, texture)[..., 3]
+    before, _ = transmittances(alpha)
+    return (torch.where(before >= min_light, before, 0.0) * look_up(codes, own)[..., 3]).sum(1)
+
+
+def follow_step(
+    own: Tensor,  # [m], which texels move
+    static: tuple[Tensor, Tensor],  # colour [M, 3] and layers [M, N, 4]
+    frame_colour: Tensor,  # [M, 3], updated in place, as all below
+    frame_alpha: Tensor,  # [M, N]
+    colour_moments: Tensor,  # [2, m, 3]
+    alpha_moments: Tensor,  # [2, m, N]
+    texture: Tensor,  # [M, N, 4]
+    gradient: Tensor,  # [M, N, 4]
+    rates: Tensor,  # [2]
+    correct: Tensor,  # [2]
+    betas: Betas,
+) -> None:
+    """As `follow_kernel.follow_step`."""
+    alpha, g = texture[own, :, 3], gradient[own]
+    slopes = g[..., :3].sum(1), g[..., 3] * alpha * (1 - alpha)
+    parts = (frame_colour, colour_moments), (frame_alpha, alpha_moments)
+    for (values, moments), slope, rate in zip(parts, slopes, rates, strict=True):
+        stacked = torch.cat([values[own][None], moments])
+        _adam(stacked, slope, torch.ones_like(slope, dtype=torch.bool), rate, correct, 1.0, betas)
+        values[own] = stacked[0]
+        moments.copy_(stacked[1:])
+    texture[own] = activate(static[0][own], static[1][own], frame_colour[own], frame_alpha[own])

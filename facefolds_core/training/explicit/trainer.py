@@ -24,6 +24,7 @@ from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
+from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.silhouettes import silhouettes
@@ -38,6 +39,7 @@ class Trainer:
 
     Attributes:
         logged: lines of the log: iteration, PSNR, rows of texels.
+        usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
         keep: called after each step; for checkpoints.
     """
 
@@ -57,6 +59,7 @@ class Trainer:
         self.events = list(cameras.notes)
         self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses)
         self.logged: list[tuple[int, float, int]] = []
+        self.usual = np.zeros((0, 3), np.float32)
         self.keep: Callable[[Trainer, Attempt], None] | None = None
 
     def manifolds(self) -> RadialManifolds:
@@ -77,6 +80,8 @@ class Trainer:
         while at.tries < self.params.divergence.attempts:
             if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
+                if number >= len(self.params.geometry.rounds):
+                    self._follow()
                 return
             self.state.restore(at.saved)
             self.gloss.maps, self.state.shine = lit
@@ -222,12 +227,19 @@ class Trainer:
         rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
         return rates.astype(np.float32)
 
+    def _follow(self) -> None:
+        """Frames where they lag behind what moves."""
+        assert self.state is not None and self.views is not None
+        rates = follow_rates(self.params, self.rate)
+        self.usual, share = follow(self.state, self.views, self.images, self._weights(False), rates, self.gloss.light)
+        self.events.append(fact("followed", share=share))
+
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""
         assert self.state is not None
         state, n = self.state, self.params.layers
-        state.forget_moments()
         assert self.views is not None
+        state.forget_moments()
         outlines = silhouettes(self.scene, self.volume, self.params)
         size = self.scene.height, self.scene.width
         self.events += clear_texels(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -39,6 +40,12 @@ class Views:
     def part(self, chosen: NDArray[np.integer]) -> Views:
         """Some of the rays, copied."""
         return Views(self.codes[chosen], self.camera[chosen], self.pixel[chosen], self.directions[chosen])
+
+    @staticmethod
+    def together(parts: Sequence[Views]) -> Views:
+        """One after the other."""
+        arrays = ((part.codes, part.camera, part.pixel, part.directions) for part in parts)
+        return Views(*(np.concatenate(array) for array in zip(*arrays, strict=True)))
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
@@ -110,6 +117,10 @@ class Rays(Protocol):
         """One of `parts` shares of the rays of a frame: views, and which of their rays."""
         ...
 
+    def in_use(self, frame: int) -> Iterator[Views]:
+        """All rays of a frame that steps take."""
+        ...
+
 
 @dataclass(frozen=True)
 class StillRays:
@@ -123,6 +134,10 @@ class StillRays:
 
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
         return self.views, np.arange(phase, self.count, parts)
+
+    def in_use(self, frame: int) -> Iterator[Views]:
+        """See `Rays`."""
+        yield self.views
 
 
 class MovingRays:
@@ -177,6 +192,11 @@ class MovingRays:
                 self._room -= size
         finer = max(1, round(parts / self.shares))
         return views, np.arange(rest % finer, len(views.pixel), finer)
+
+    def in_use(self, frame: int) -> Iterator[Views]:
+        """See `Rays`; share by share."""
+        for turn in range(self._used):
+            yield self.part(frame, turn, 1)[0]
 
     def _traced(self, frame: int, phase: int, parts: int) -> Views:
         """Every `parts`-th of the pixels that there are, from number `phase` on."""

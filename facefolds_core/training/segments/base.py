@@ -87,8 +87,7 @@ def digest_of_training(params: ExplicitParams) -> bytes:
 
 def digest_of_fitting(params: ExplicitParams) -> bytes:
     """Of the parameters by which frames are fitted to a base."""
-    names = {"cameras", "thumbnail", "vertices", "neighbours", "blend", "steps", "rate"}
-    values = params.segments.model_dump(mode="json", include=names)
+    values = params.segments.model_dump(mode="json", include={"steps"})
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).digest()
 
 
@@ -164,6 +163,7 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
         tensors = {
             "background": torch.from_numpy(found.background),
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
+            "usual": torch.from_numpy(found.usual),
         }
         # One entry: safetensors writes several in any order, and equal bases are to be equal files.
         about = {"about": json.dumps({"splits": found.splits, "rate": found.rate, "losses": found.losses.model_dump()})}
@@ -195,6 +195,7 @@ def read_base(folder: Path, fingerprint: str) -> Base:
         tensors["background"].numpy(),
         about["rate"],
         LossParams.model_validate(about["losses"]),
+        tensors["usual"].numpy(),
     )
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 

@@ -18,7 +18,8 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
-from facefolds_core.training.explicit.state import LossWeights, state_type
+from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
+from facefolds_core.training.explicit.state import LossWeights, TextureState, state_type
 from facefolds_core.training.explicit.views import Images, MovingRays, Rays, Shown, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
 
@@ -105,10 +106,23 @@ class FrameFitter:
             rays += len(which)
         if not np.isfinite(errors).all():
             raise _diverged(self.scene, frame)
+        self._follow(frame, views, images, weights)
         psnr = -10 * float(np.log10(max(float(np.mean(errors[-parts:])), 1e-12)))
         h, w = state.shape
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
         return FittedFrame(colour.half(), alpha.half(), psnr, rays)
+
+    def _follow(self, frame: int, views: Rays, images: Shown, weights: LossWeights) -> None:
+        """Where the frame does not follow yet what moves."""
+        state, found = self.state, self.base.surroundings
+
+        def light(state: TextureState, seen: Views, _: int) -> None:
+            if self.maps is not None and self.scene.poses is not None:
+                state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
+
+        errors = mean_errors(state, views, images, 0, light)
+        chosen = lagging(errors - found.usual, state.shape, self.params.follow.min_error)
+        follow_frame(state, views, images, 0, chosen, errors, weights, follow_rates(self.params, found.rate), light)
 
     def _start(self, shares: NDArray[np.float64]) -> None:
         colour, alpha = self.base.mixed(shares)
@@ -130,7 +144,7 @@ class FrameFitter:
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         to = self.params.textures
-        rate = self.base.surroundings.rate * self.params.segments.rate * (1 - (1 - to.final_rate) * progress)
+        rate = self.base.surroundings.rate * (1 - (1 - to.final_rate) * progress)
         return np.array([0, 0, 0, rate * to.frame_rate, rate * to.frame_rate * to.alpha_rate], np.float32)
 
 
@@ -145,5 +159,5 @@ def _diverged(scene: Scene, frame: int) -> UserError:
         "training diverged",
         place=f"frame {scene.frame_ids[frame]}",
         expected="a finite error",
-        remedy="lower train.segments.rate; if that does not help, look at the frame's pictures",
+        remedy="look at the frame's pictures",
     )

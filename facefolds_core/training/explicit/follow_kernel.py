@@ -1,0 +1,184 @@
+"""What frames have not followed, texel by texel, and the steps that make up for it, compiled.
+
+Reference: `reference.py`. For how threads share the work see `facefolds_core.scatter`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from facefolds_core.hit_codes import corner
+from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
+from facefolds_core.training.adam import EPSILON
+from facefolds_core.training.explicit.adam_kernel import activate_texel
+from facefolds_core.training.explicit.shading_kernel import rgba_tap, tap_share
+
+_scatter = scatter_of(4)
+
+
+@kernel(parallel=True)
+def errors_by_texel(codes, camera, pixel, images, background, texture, shine, sums, min_light):  # type: ignore[no-untyped-def]
+    """Add to sums (N, H, W, 4), over all P rays, w (C - I) and w: w is what a texel adds to a ray's colour.
+
+    codes (P, N, 2), camera and pixel (P,), images, background, texture (H, W, N, 4), shine as of
+    `shading_kernel.shade`; layers behind less transmittance than `min_light` are skipped.
+    """
+    layers, count = texture.shape[2], codes.shape[0]
+    index = np.empty((layers, CHUNK), np.int32)
+    wish = np.empty((layers, CHUNK, 6), np.float32)
+    for start in range(0, count, CHUNK):
+        own = min(CHUNK, count - start)
+        for block in prange((own + BLOCK - 1) // BLOCK):
+            for k in range(block * BLOCK, min((block + 1) * BLOCK, own)):
+                _errors(k, start + k, codes, camera, pixel, images, background, texture, shine, index, wish, min_light)
+        for task in prange(layers):
+            n = spread(task, layers)
+            _scatter(index[n, :own], wish[n, :own], sums[n])
+
+
+@compiled
+def _errors(
+    k: Any,
+    p: Any,
+    codes: Any,
+    camera: Any,
+    pixel: Any,
+    images: Any,
+    background: Any,
+    texture: Any,
+    shine: Any,
+    index: Any,
+    wish: Any,
+    min_light: Any,
+) -> None:
+    """What ray p wants of each layer, into index[:, k] and wish[:, k]."""
+    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
+    one, inverse = np.float32(1.0), np.float32(1 / 255.0)
+    transmittance = one
+    r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+    e0, e1, e2 = r0, r1, r2
+    if shine.shape[0] > 0:
+        e0, e1, e2 = shine[p, 0], shine[p, 1], shine[p, 2]
+    for n in range(layers):
+        index[n, k] = -1
+        if codes[p, n, 0] == 0 or transmittance < min_light:
+            continue
+        column, b = corner(codes[p, n, 0], width)
+        row, a = corner(codes[p, n, 1], height)
+        i, j, of = np.uint64(row), np.uint64(column), np.uint64(n)
+        light = transmittance * rgba_tap(texture, i, j, of, 3, a, b)
+        r0 += light * (rgba_tap(texture, i, j, of, 0, a, b) + e0)
+        r1 += light * (rgba_tap(texture, i, j, of, 1, a, b) + e1)
+        r2 += light * (rgba_tap(texture, i, j, of, 2, a, b) + e2)
+        index[n, k] = row * width + column
+        wish[n, k, 0], wish[n, k, 1], wish[n, k, 5] = a, b, light
+        transmittance -= light
+    cam, pix = camera[p], pixel[p]
+    d0 = r0 + transmittance * background[cam, pix, 0] - images[cam, pix, 0] * inverse
+    d1 = r1 + transmittance * background[cam, pix, 1] - images[cam, pix, 1] * inverse
+    d2 = r2 + transmittance * background[cam, pix, 2] - images[cam, pix, 2] * inverse
+    for n in range(layers):
+        if index[n, k] >= 0:
+            light = wish[n, k, 5]
+            wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * d0, light * d1, light * d2
+
+
+@kernel(parallel=True)
+def share_on(codes, texture, chosen, min_light):  # type: ignore[no-untyped-def]
+    """(P,) float32: how much of each ray's colour is of chosen texels.
+
+    codes (P, N, 2), texture (H, W, N, 4), chosen (H, W) bool.
+    """
+    found = np.zeros(codes.shape[0], np.float32)
+    for p in prange(codes.shape[0]):
+        found[p] = _share(p, codes, texture, chosen, min_light)
+    return found
+
+
+@compiled
+def _share(p: Any, codes: Any, texture: Any, chosen: Any, min_light: Any) -> Any:
+    transmittance, found = np.float32(1.0), np.float32(0.0)
+    for n in range(texture.shape[2]):
+        if codes[p, n, 0] == 0:
+            continue
+        added = np.float32(0.0)
+        for tap in range(4):
+            i, j, share = tap_share(codes, p, n, tap, texture)
+            added += share
+            if chosen[i, j]:
+                found += transmittance * share
+        transmittance *= np.float32(1.0) - added
+        if transmittance < min_light:
+            break
+    return found
+
+
+@inlined
+def _adam(values, index, moments, at, g, rate, correct, decay):  # type: ignore[no-untyped-def]
+    """One Adam step on values[index], its moments being moments[0][at] and moments[1][at]."""
+    first, second = moments
+    first[at] = decay[0] * first[at] + decay[1] * g
+    second[at] = decay[2] * second[at] + decay[3] * g * g
+    values[index] -= rate * (first[at] * correct[0]) / (math.sqrt(second[at] * correct[1]) + np.float32(EPSILON))
+
+
+@kernel(parallel=True)
+def follow_step(  # type: ignore[no-untyped-def]
+    own,  # (m,) int64, which texels move
+    near,  # (n,) int64, all texels with a gradient
+    colour,  # (M, 3)
+    layers,  # (M, N, 4)
+    frame_colour,  # (M, 3) of one frame, changed in place
+    frame_alpha,  # (M, N)
+    colour_moments,  # (2, m, 3)
+    alpha_moments,  # (2, m, N)
+    texture,  # (M, N, 4) as activated, and activated anew where texels move
+    gradient,  # (N, M, 4) with respect to `texture`; zero afterwards
+    rates,  # (2,) of colour and of alpha
+    correct,  # (2,) bias corrections of both moments
+    decay,  # (4,) of `adam.decays`
+):
+    """Adam on what one frame adds at some texels, and nothing else."""
+    colours = colour_moments[0], colour_moments[1]
+    alphas = alpha_moments[0], alpha_moments[1]
+    for q in prange(own.shape[0]):
+        _follow(q, own[q], frame_colour, frame_alpha, colours, alphas, texture, gradient, rates, correct, decay)
+        activate_texel(own[q], colour, layers, frame_colour, frame_alpha, texture)
+    for q in prange(near.shape[0]):
+        k = near[q]
+        for n in range(gradient.shape[0]):
+            for c in range(4):
+                gradient[n, k, c] = 0
+
+
+@compiled
+def _follow(
+    q: Any,
+    k: Any,
+    frame_colour: Any,
+    frame_alpha: Any,
+    colours: Any,
+    alphas: Any,
+    texture: Any,
+    gradient: Any,
+    rates: Any,
+    correct: Any,
+    decay: Any,
+) -> None:
+    """Texel k, number q of those that move."""
+    zero = np.float32(0.0)
+    sum0, sum1, sum2 = zero, zero, zero
+    for n in range(gradient.shape[0]):
+        sum0 += gradient[n, k, 0]
+        sum1 += gradient[n, k, 1]
+        sum2 += gradient[n, k, 2]
+        alpha = texture[k, n, 3]
+        g = gradient[n, k, 3] * alpha * (1 - alpha)
+        _adam(frame_alpha, (k, n), alphas, (q, n), g, rates[1], correct, decay)
+    for c in range(3):
+        g = sum0 if c == 0 else (sum1 if c == 1 else sum2)
+        _adam(frame_colour, (k, c), colours, (q, c), g, rates[0], correct, decay)

@@ -1,0 +1,213 @@
+"""Frames that lag behind what moves: which texels those are, and that a change in one frame and place is followed."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+import torch
+
+from facefolds_core import hit_codes
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.adam import decays
+from facefolds_core.training.explicit import follow_kernel, reference
+from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
+from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.views import StillRays, Views
+
+PARAMS = ExplicitParams()
+LIGHT = PARAMS.textures.min_light
+LAYERS, SHAPE, RAYS = 4, (9, 7), 600
+FREE = LossWeights(0.0, 0.0, 0.0)
+RATES = np.array([PARAMS.follow.rate, PARAMS.follow.rate * PARAMS.textures.alpha_rate], np.float32)
+
+
+def random_views(rays: int = RAYS) -> Views:
+    rng = np.random.default_rng(0)
+    codes = rng.integers(1, 65536, (rays, LAYERS, 2)).astype(np.uint16)
+    codes[rng.random((rays, LAYERS)) < 0.2] = 0
+    return Views(codes, np.zeros(rays, np.int32), np.arange(rays, dtype=np.int32), np.zeros((rays, 3), np.float32))
+
+
+def random_texture() -> np.ndarray:
+    return np.random.default_rng(1).random((*SHAPE, LAYERS, 4), np.float32)
+
+
+@pytest.mark.parametrize("least", [LIGHT, 0.3])
+def test_errors_by_texel_match_autograd(least: float) -> None:
+    rng, views, texture = np.random.default_rng(2), random_views(), random_texture()
+    images = rng.integers(0, 256, (1, RAYS, 3)).astype(np.uint8)
+    background, shine = rng.random((1, RAYS, 3), np.float32), rng.random((RAYS, 3), np.float32) * 0.2
+    sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
+    rays = views.codes, views.camera, views.pixel
+    follow_kernel.errors_by_texel(*rays, images, background, texture, shine, sums, least)
+    given = (torch.from_numpy(x) for x in (images[0] / np.float32(255), background[0], texture, shine))
+    expected = reference.errors_by_texel(torch.from_numpy(views.codes.astype(np.int32)), *given, least)
+    torch.testing.assert_close(torch.from_numpy(sums).permute(1, 2, 0, 3), expected, atol=2e-5, rtol=0)
+
+
+def test_shares_match_the_reference() -> None:
+    views, texture = random_views(), random_texture()
+    chosen = np.random.default_rng(3).random(SHAPE) < 0.5
+    found = follow_kernel.share_on(views.codes, texture, chosen, LIGHT)
+    given = torch.from_numpy(views.codes.astype(np.int32)), torch.from_numpy(texture), torch.from_numpy(chosen)
+    torch.testing.assert_close(torch.from_numpy(found), reference.share_on(*given, LIGHT), atol=1e-6, rtol=0)
+
+
+def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
+    torch.manual_seed(0)
+    m, own = SHAPE[0] * SHAPE[1], np.array([3, 4, 20])
+    near = np.array([3, 4, 5, 20, 21])
+    static = torch.rand(m, 3), torch.randn(m, LAYERS, 4)
+    values = torch.randn(m, 3) * 0.1, torch.randn(m, LAYERS)
+    moments = torch.rand(2, 3, 3), torch.rand(2, 3, LAYERS)
+    texture = reference.activate(*static, *values)
+    gradient = torch.zeros(m, LAYERS, 4)
+    gradient[near] = torch.randn(len(near), LAYERS, 4)
+    rates, correct = torch.tensor([0.02, 0.3]), torch.tensor([1.5, 2.0])
+    compiled = [x.clone().numpy() for x in (*values, *moments, texture)]
+    pushed = gradient.permute(1, 0, 2).contiguous().numpy()
+    betas = PARAMS.textures.betas
+    tail = rates.numpy(), correct.numpy(), decays(betas)
+    follow_kernel.follow_step(own, near, *(x.numpy() for x in static), *compiled, pushed, *tail)
+    expected = [x.clone() for x in (*values, *moments, texture)]
+    reference.follow_step(torch.from_numpy(own), static, *expected, gradient, rates, correct, betas)
+    for a, b in zip(compiled, expected, strict=True):
+        torch.testing.assert_close(torch.from_numpy(a), b, atol=1e-5, rtol=1e-4)
+    others = np.setdiff1d(np.arange(m), own)
+    np.testing.assert_array_equal(compiled[0][others], values[0].numpy()[others])
+    assert not pushed.any()
+
+
+def test_corners_of_an_array_are_those_of_the_kernels() -> None:
+    codes = np.random.default_rng(4).integers(1, 65536, 1000).astype(np.uint16)
+    alone = [hit_codes.corner.py_func(int(code), 37)[0] for code in codes]
+    np.testing.assert_array_equal(hit_codes.before(codes, 37), alone)
+
+
+def test_texels_in_error_take_their_neighbours_along() -> None:
+    errors = np.zeros((5 * 6, 3), np.float32)
+    errors[2 * 6 + 3, 1] = -0.1
+    errors[0, 0] = 0.01
+    expected = np.zeros((5, 6), bool)
+    expected[1:4, 2:5] = True
+    np.testing.assert_array_equal(lagging(errors, (5, 6), 0.02).reshape(5, 6), expected)
+
+
+class Film:
+    """Pictures of rays that meet one opaque layer, bilinear, at random; in one frame a patch has another colour."""
+
+    shape, frames, moved, rays = (16, 16), 5, 3, 6000
+    usual, other = np.array([0.8, 0.6, 0.5]), np.array([0.2, 0.3, 0.1])
+
+    def __init__(self, noise: float = 0.0) -> None:
+        rng = np.random.default_rng(5)
+        codes = rng.integers(1, 65536, (self.rays, 1, 2)).astype(np.uint16)
+        numbers = np.arange(self.rays, dtype=np.int32)
+        views = Views(codes, np.zeros(self.rays, np.int32), numbers, np.zeros((self.rays, 3), np.float32))
+        self.source = StillRays(views)
+        place = (codes[:, 0, :].astype(float) - 1) / hit_codes.SCALE
+        self.inside = ((place > 0.37) & (place < 0.53)).all(1)
+        self.truth = np.tile(self.usual, (self.frames, self.rays, 1))
+        self.truth[self.moved, ((place > 0.3) & (place < 0.6)).all(1)] = self.other
+        self.images = np.rint(255 * (self.truth + noise * rng.normal(size=self.truth.shape)).clip(0, 1))
+
+    def frame(self, index: int) -> np.ndarray:
+        return self.images[index].astype(np.uint8)[None]
+
+    def state(self) -> TextureState:
+        start = torch.tensor([*self.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
+        state = TextureState(self.shape, 1, self.frames, start, torch.zeros(1, self.rays, 3), PARAMS)
+        state.layers[0, ..., 3] = 9
+        return state
+
+    def error(self, state: TextureState, frame: int) -> float:
+        """RMS over the rays of a frame in the patch, a texel from its edge."""
+        codes = torch.from_numpy(self.source.views.codes.astype(np.int32))
+        seen = reference.look_up(codes, state.activated(frame).view(*self.shape, 1, 4))[:, 0, :3].numpy()
+        return float(np.sqrt(((seen - self.truth[frame])[self.inside] ** 2).mean()))
+
+
+def unlit(state: TextureState, views: Views, frame: int) -> None:
+    """No reflection."""
+
+
+def test_a_patch_that_changes_in_one_frame_is_followed() -> None:
+    film = Film()
+    state = film.state()
+    assert film.error(state, film.moved) > 0.4
+    _, share = follow(state, film.source, film, FREE, RATES, unlit)
+    assert film.error(state, film.moved) < 0.04
+    for frame in set(range(film.frames)) - {film.moved}:
+        assert not state.frame_colour[0, frame].any() and not state.frame_alpha[0, frame].any()
+    assert 0 < share < 0.1
+    assert not state.gradient.any()
+    for values in (state.colour, state.layers, state.frame_colour, state.frame_alpha):
+        assert not values[1:].any()  # moments of the steps before
+
+
+def test_noise_and_what_all_frames_show_are_no_motion() -> None:
+    film = Film(noise=0.02)
+    film.images[film.moved] = film.images[0]
+    state = film.state()
+    state.colour[0] += 0.1  # wrong, in all frames alike
+    usual, share = follow(state, film.source, film, FREE, RATES, unlit)
+    assert share == 0 and usual.min() > 0.09
+    assert not state.frame_colour.any()
+
+
+def test_mean_errors_are_those_of_the_texture() -> None:
+    film = Film()
+    film.images[:] = np.rint(255 * film.usual)
+    state = film.state()
+    state.frame_colour[0, 1] += torch.tensor([0.1, 0.0, -0.05])
+    errors = mean_errors(state, film.source, film, 1, unlit)
+    np.testing.assert_allclose(errors, np.tile([0.1, 0.0, -0.05], (256, 1)), atol=3e-3)  # alpha .9999, 8 bits
+
+
+def test_a_frame_alone_goes_towards_its_pictures() -> None:
+    film = Film()
+    state = film.state()
+    errors = mean_errors(state, film.source, film, film.moved, unlit)
+    chosen = lagging(errors, film.shape, PARAMS.follow.min_error)
+    follow_frame(state, film.source, film, film.moved, chosen, errors, FREE, RATES, unlit)
+    assert film.error(state, film.moved) < 0.04
+
+
+def test_following_does_not_depend_on_the_number_of_threads() -> None:
+    found = []
+    for threads in (1, 2):
+        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+        film = Film()
+        state = film.state()
+        follow(state, film.source, film, FREE, RATES, unlit)
+        found.append(state.frame_colour.clone())
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    assert torch.equal(*found)
+
+
+def test_where_everything_moves_a_step_takes_a_quarter_of_a_usual_one() -> None:
+    assert [_apart(rays, 40_000.0) for rays in (10, 8_000, 20_000, 100_000)] == [2, 2, 2, 10]
+
+
+def test_texels_with_a_gradient_are_all_known() -> None:
+    views = random_views(40)
+    sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
+    rays = views.codes, views.camera, views.pixel
+    blank = np.zeros((1, 40, 3), np.float32)
+    follow_kernel.errors_by_texel(
+        *rays, blank.astype(np.uint8), blank, random_texture() * 0.3, np.zeros((0, 3), np.float32), sums, 0.0
+    )
+    met = np.flatnonzero(sums[..., 3].sum(0).ravel())
+    assert not np.setdiff1d(met, _met(views, SHAPE)).size
+
+
+def test_where_something_moves_all_frames_are_asked_by_their_whole_error() -> None:
+    film = Film()
+    state = film.state()
+    state.colour[0] += 0.1  # as a mean over the frames would be
+    usual, _ = follow(state, film.source, film, FREE, RATES, unlit)
+    followed = state.frame_colour[0].abs().amax(-1) > 0
+    assert followed[0].any() and not followed[0].all()
+    assert not usual[followed[0].numpy()].any()
+    assert all(film.error(state, frame) < 0.04 for frame in range(film.frames))
