@@ -72,7 +72,7 @@ def fit_start(scene: Scene, frame: int = 0, params: StartParams | None = None, s
 def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: StartParams, seed: int = 0) -> Splats:
     """Gaussians of some pictures (H, W, 3) float32 in [0, 1]."""
     random = np.random.default_rng(seed)
-    state = State.of(seeds(cameras, pictures, int(params.seeds * params.count), random))
+    state = State.of(seeds(cameras, pictures, int(params.seeds * params.count), params.ball, random))
     begun = len(state.values)
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
     targets: list[Target] = []
@@ -86,12 +86,20 @@ def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: S
         if not len(order):
             order = random.permutation(len(targets))
         target, order = targets[order[0]], order[1:]
-        drawing = draw(state.values, target.view)
+        values = state.values
+        if params.dropped > 0:  # DropGaussian
+            gone = random.random(len(values)) < params.dropped
+            values = values.copy()
+            values[gone, OPACITY] = -20
+        drawing = draw(values, target.view)
         wish, wish_light = picture_loss(drawing, target.picture, background, params.ssim)
-        gradient, moved = differentiate(state.values, drawing, wish, wish_light)
+        gradient, moved = differentiate(values, drawing, wish, wish_light)
         seen = np.diff(drawing.first) > 0
         state.moved += moved * max(target.view.size) / 2
         state.met += seen
+        if params.opacity_price > 0:
+            o = 1 / (1 + np.exp(-state.values[seen, OPACITY]))
+            gradient[seen, OPACITY] += params.opacity_price / len(values) * o * (1 - o)
         correct = np.array(corrections(BETAS, step + 1), np.float32)
         adam_step(state.values, state.first, state.second, gradient, seen, _rates(params, done), correct, decay)
         if (step + 1) % params.every == 0 and done < params.grown:

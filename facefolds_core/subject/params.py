@@ -20,7 +20,7 @@ class StartParams:
     """Share of the count with which it begins."""
     levels: tuple[tuple[float, float], ...] = ((0.0, 0.25), (0.2, 0.5), (0.5, 1.0))
     """From which share of the iterations on pictures of which size."""
-    rate_mean: tuple[float, float] = (4e-4, 1e-5)
+    rate_mean: tuple[float, float] = (1e-4, 2e-6)
     """Adam's rates, units a step, first and last; farther than 1 unit from the origin in proportion to the distance."""
     rate_scale: float = 0.01
     rate_turn: float = 0.004
@@ -34,4 +34,7 @@ class StartParams:
     fewest: float = 0.01
     """Opacity under which a Gaussian is taken away."""
     opacity_price: float = 0.0
+    dropped: float = 0.0
     ssim: float = 0.2
+    ball: float = 0.3
+    """Radius about the origin in which the subject is looked for, units."""
