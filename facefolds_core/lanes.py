@@ -1,7 +1,7 @@
 """Eight float32 at once, in compiled kernels: what LLVM does not find by itself without fast-math.
 
 `load(array, at)` is the eight values of a flat float32 array from `at` on, `store` puts them back, `fill` repeats a
-number, `total` adds the eight up in a fixed order. `+ - * /` work on them, `least` and `most` compare them, and
+number, `total` adds the eight up in a fixed order, `highest` is the largest. `+ - * /` work on them, `least` and `most` compare them, and
 `where_less(a, b, x, y)` takes x where a < b, else y. All is IEEE arithmetic: results are the same on each CPU.
 """
 
@@ -90,18 +90,6 @@ def fill(typing: Any, value: Any) -> Any:
 
 
 @intrinsic
-def lane(typing: Any, values: Any, number: Any) -> Any:
-    """One of the eight."""
-
-    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.extract_element(
-            arguments[0], context.cast(builder, arguments[1], signature.args[1], types.int32)
-        )
-
-    return types.float32(values, number), build
-
-
-@intrinsic
 def where_less(typing: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
     """x where a < b, else y."""
 
@@ -112,13 +100,14 @@ def where_less(typing: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
     return LANES_TYPE(a, b, x, y), build
 
 
-def _half(builder: Any, values: Any, size: int) -> Any:
-    """The sum of both halves of a vector, (2 size,) -> (size,)."""
+def _halves(builder: Any, values: Any, size: int) -> tuple[Any, Any]:
+    """Both halves of a vector, (2 size,) -> (size,)."""
     undefined = ir.Constant(values.type, ir.Undefined)
     masks = (
         ir.Constant(ir.VectorType(ir.IntType(32), size), list(range(start, start + size))) for start in (0, size)
     )
-    return builder.fadd(*(builder.shuffle_vector(values, undefined, mask) for mask in masks))
+    first, second = (builder.shuffle_vector(values, undefined, mask) for mask in masks)
+    return first, second
 
 
 @intrinsic
@@ -128,7 +117,21 @@ def total(typing: Any, values: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         left = arguments[0]
         for size in (4, 2, 1):
-            left = _half(builder, left, size)
+            left = builder.fadd(*_halves(builder, left, size))
+        return builder.extract_element(left, ir.Constant(ir.IntType(32), 0))
+
+    return types.float32(values), build
+
+
+@intrinsic
+def highest(typing: Any, values: Any) -> Any:
+    """The largest of the eight."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        left = arguments[0]
+        for size in (4, 2, 1):
+            one, two = _halves(builder, left, size)
+            left = builder.select(builder.fcmp_ordered("<", one, two), two, one)
         return builder.extract_element(left, ir.Constant(ir.IntType(32), 0))
 
     return types.float32(values), build

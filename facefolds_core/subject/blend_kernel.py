@@ -15,11 +15,12 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.lanes import LANES, fill, lane, least, load, most, store, total, where_less
+from facefolds_core.lanes import LANES, fill, highest, least, load, most, store, total, where_less
 from facefolds_core.subject.project_kernel import FAINT, FLAT
 
 TILE = (LANES, 16)
 """Pixels, width and height."""
+PIXELS = TILE[0] * TILE[1]
 SOLID = 0.99
 """No Gaussian is more opaque, so that what is behind it keeps a gradient."""
 DARK = 1e-4
@@ -79,29 +80,24 @@ def fall(p):
     return e * e
 
 
-@compiled
-def rows_of(seen: Any, left: Any, top: Any, bottom: Any) -> Any:
+@inlined
+def rows_of(seen, top):
     """First and last + 1 row of pixels of a tile that a Gaussian may meet.
 
     Args:
         seen: (PLANE,) of `project`.
-        left: first column of the tile; its Gaussian's p is smallest there within the tile's columns or between.
+        top: first row of the tile.
     """
-    a, b, c = seen[2], seen[3], seen[4]
-    reach = math.log(seen[5] / np.float32(FAINT))
-    # The range of dy where p <= reach, over all dx: p's least over dx is (c - b^2 / 4a) dy^2.
-    high = math.sqrt(reach / max(c - b * b / (4 * a), np.float32(1e-12)))
-    y0 = max(math.ceil(seen[1] - high - np.float32(0.5)), top)
-    y1 = min(math.floor(seen[1] + high - np.float32(0.5)) + 1, bottom)
-    return y0, y1, reach
+    half = np.float32(0.5)
+    y0 = max(math.ceil(seen[1] - seen[11] - half), top)
+    return y0, min(math.floor(seen[1] + seen[11] - half) + 1, top + TILE[1])
 
 
 @inlined
-def misses(seen, dx0, dy, reach):
+def misses(seen, dx0, dy):
     """Whether a row of lanes, from dx0 from the mean on, lies outside of a Gaussian."""
-    a, b, c = seen[2], seen[3], seen[4]
-    best = min(max(-b * dy / (2 * a), dx0), dx0 + np.float32(LANES - 1))
-    return (a * best + b * dy) * best + c * dy * dy > reach
+    best = min(max(seen[12] * dy, dx0), dx0 + np.float32(LANES - 1))
+    return (seen[2] * best + seen[3] * dy) * best + seen[4] * dy * dy > seen[10]
 
 
 @kernel(parallel=True)
@@ -122,37 +118,38 @@ def blend(plane, colours, listed, starts, across, out, light):  # type: ignore[n
     count = starts.shape[0] - 1
     for k in prange(count):
         left, top = k % across * LANES, k // across * TILE[1]
-        for y in range(top, top + TILE[1]):
-            at = y * width + left
-            store(light_flat, at, fill(np.float32(1)))
-            for q in range(3):
-                store(out_flat, q * pixels + at, fill(np.float32(0)))
+        light_here, colours_here = np.ones(PIXELS, np.float32), np.zeros(3 * PIXELS, np.float32)
         ramp = np.empty(LANES, np.float32)
         for i in range(LANES):
             ramp[i] = left + i + np.float32(0.5)
         columns = load(ramp, 0)
         for place in range(starts[k], starts[k + 1]):
-            if (place - starts[k]) % OFTEN == OFTEN - 1 and full(light_flat, width, left, top):
+            if (place - starts[k]) % OFTEN == OFTEN - 1 and full(light_here):
                 break
             n = listed[place, 1]
             seen = plane[n]
-            y0, y1, reach = rows_of(seen, left, top, top + TILE[1])
+            y0, y1 = rows_of(seen, top)
             dx = columns - seen[0]
             dx0 = ramp[0] - seen[0]
             square, slant = dx * dx * seen[2], dx * seen[3]
             c0, c1, c2, o = colours[n, 0], colours[n, 1], colours[n, 2], seen[5]
             for y in range(y0, y1):
                 dy = np.float32(y) + np.float32(0.5) - seen[1]
-                if misses(seen, dx0, dy, reach):
+                if misses(seen, dx0, dy):
                     continue
-                at = y * width + left
+                at = (y - top) * LANES
                 a = opacity(square + slant * dy + seen[4] * dy * dy, o)
-                t = load(light_flat, at)
+                t = load(light_here, at)
                 w = shown(a, t)
-                store(light_flat, at, t - w)
-                store(out_flat, at, load(out_flat, at) + w * c0)
-                store(out_flat, pixels + at, load(out_flat, pixels + at) + w * c1)
-                store(out_flat, 2 * pixels + at, load(out_flat, 2 * pixels + at) + w * c2)
+                store(light_here, at, t - w)
+                store(colours_here, at, load(colours_here, at) + w * c0)
+                store(colours_here, PIXELS + at, load(colours_here, PIXELS + at) + w * c1)
+                store(colours_here, 2 * PIXELS + at, load(colours_here, 2 * PIXELS + at) + w * c2)
+        for y in range(TILE[1]):
+            at, here = (top + y) * width + left, y * LANES
+            store(light_flat, at, load(light_here, here))
+            for q in range(3):
+                store(out_flat, q * pixels + at, load(colours_here, q * PIXELS + here))
 
 
 @inlined
@@ -169,15 +166,12 @@ def shown(a, t):
 
 
 @compiled
-def full(light_flat: Any, width: Any, left: Any, top: Any) -> Any:
-    """Whether no light is left in a tile."""
-    brightest = load(light_flat, top * width + left)
-    for y in range(top + 1, top + TILE[1]):
-        brightest = most(brightest, load(light_flat, y * width + left))
-    for i in range(LANES):
-        if lane(brightest, i) >= np.float32(DARK):
-            return False
-    return True
+def full(light: Any) -> Any:
+    """Whether no light is left in a tile (PIXELS,)."""
+    brightest = load(light, 0)
+    for at in range(LANES, PIXELS, LANES):
+        brightest = most(brightest, load(light, at))
+    return highest(brightest) < np.float32(DARK)
 
 
 @kernel(parallel=True)
@@ -197,8 +191,8 @@ def unblend(plane, colours, listed, starts, across, wish, rest, flat):  # type: 
     count = starts.shape[0] - 1
     for k in prange(count):
         left, top = k % across * LANES, k // across * TILE[1]
-        light = np.ones(TILE[1] * LANES, np.float32)
-        behind = np.empty(TILE[1] * LANES, np.float32)
+        light = np.ones(PIXELS, np.float32)
+        behind = np.empty(PIXELS, np.float32)
         for y in range(TILE[1]):
             store(behind, y * LANES, load(rest_flat, (top + y) * width + left))
         ramp = np.empty(LANES, np.float32)
@@ -210,13 +204,13 @@ def unblend(plane, colours, listed, starts, across, wish, rest, flat):  # type: 
         for place in range(starts[k], starts[k + 1]):
             e, n = listed[place, 0], listed[place, 1]
             if not ended and (place - starts[k]) % OFTEN == OFTEN - 1:
-                ended = full(light, LANES, 0, 0)
+                ended = full(light)
             if ended:
                 for q in range(FLAT):
                     flat[e, q] = 0
                 continue
             seen = plane[n]
-            y0, y1, reach = rows_of(seen, left, top, top + TILE[1])
+            y0, y1 = rows_of(seen, top)
             dx = columns - seen[0]
             dx0 = ramp[0] - seen[0]
             square, slant = dx * dx * seen[2], dx * seen[3]
@@ -224,7 +218,7 @@ def unblend(plane, colours, listed, starts, across, wish, rest, flat):  # type: 
             v, vy, vyy, r, g, b = zero, zero, zero, zero, zero, zero
             for y in range(y0, y1):
                 dy = np.float32(y) + np.float32(0.5) - seen[1]
-                if misses(seen, dx0, dy, reach):
+                if misses(seen, dx0, dy):
                     continue
                 at, here = y * width + left, (y - top) * LANES
                 a = opacity(square + slant * dy + seen[4] * dy * dy, o)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facefolds_core.subject.params import StartParams
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, TURN
 
 if TYPE_CHECKING:
     from facefolds_core.subject.fit import State
+
+Array = NDArray[np.float32]
 
 APART, NARROW = 0.7, 0.7
 """Two halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
@@ -28,15 +31,14 @@ def thinned(state: State, params: StartParams) -> State:
 def grown(state: State, wanted: int) -> State:
     """With so many Gaussians: those that the pictures pull at most are split along their longest axes."""
     more = min(wanted - len(state.values), len(state.values))
-    pull = state.moved / np.maximum(state.met, 1)
+    pull = state.moved.copy()  # of all pictures: what many cameras see is divided first
     state.moved[:], state.met[:] = 0, 0
     if more <= 0:
         return state
     chosen = np.argpartition(-pull, more - 1)[:more]
     halves = state.values[chosen].copy()
-    longest = np.argmax(halves[:, SCALE], 1)
-    rows = np.arange(more)
-    offset = APART * np.exp(halves[rows, 3 + longest])[:, None] * _axis(halves[:, TURN], longest)
+    offset = APART * longest_axes(halves)
+    rows, longest = np.arange(more), np.argmax(halves[:, SCALE], 1)
     halves[rows, 3 + longest] += np.log(NARROW)
     opacity = FAINTER / (1 + np.exp(-halves[:, OPACITY]))
     halves[:, OPACITY] = np.log(opacity / (1 - opacity))
@@ -53,18 +55,20 @@ def grown(state: State, wanted: int) -> State:
     return state
 
 
-def _axis(turn, which):  # type: ignore[no-untyped-def]
-    """(n, 3) unit vector along axis `which` (n,) of quaternions (n, 4)."""
-    w, x, y, z = (turn / np.linalg.norm(turn, axis=1, keepdims=True)).T
+def longest_axes(values: Array) -> Array:
+    """(n, 3) along the longest axes of Gaussians (n, COLUMNS), one standard deviation long."""
+    w, x, y, z = (values[:, TURN] / np.linalg.norm(values[:, TURN], axis=1, keepdims=True)).T
     columns = [
         [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
         [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
         [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return np.array(columns).transpose(2, 0, 1)[np.arange(len(which)), which]
+    rows, longest = np.arange(len(values)), np.argmax(values[:, SCALE], 1)
+    axes = np.array(columns).transpose(2, 0, 1)[rows, longest]
+    return np.asarray(axes * np.exp(values[rows, 3 + longest])[:, None], np.float32)
 
 
-def _part(state: State, kept) -> State:  # type: ignore[no-untyped-def]
+def _part(state: State, kept: NDArray[np.bool_]) -> State:
     for name in ("values", "first", "second", "moved", "met"):
         setattr(state, name, np.ascontiguousarray(getattr(state, name)[kept]))
     return state

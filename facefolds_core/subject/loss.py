@@ -13,7 +13,7 @@ Array = NDArray[np.float32]
 
 
 def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: float) -> tuple[Array, Array]:
-    """Derivatives of (1 - structure) mean |C - I| + structure (1 - SSIM).
+    """Derivatives of (1 - structure) mean |C - I| + structure (1 - SSIM of the mean of the colours).
 
     Args:
         photo: (3, H, W) of whole tiles.
@@ -29,8 +29,8 @@ def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: f
     wish = np.sign(difference) * np.float32((1 - structure) * scale)
     if structure > 0:
         part = slice(0, height), slice(0, width)
-        for q in range(3):
-            wish[q][part] -= np.float32(structure * scale) * ssim_gradient(shown[q][part], photo[q][part])
+        grey = [np.ascontiguousarray(one.mean(0)[part]) for one in (shown, photo)]
+        wish[:, part[0], part[1]] -= np.float32(structure * scale) * ssim_gradient(*grey)
     wish[:, height:], wish[:, :, width:] = 0, 0
     return wish, np.einsum("qhw,q->hw", wish, background)
 

@@ -14,11 +14,11 @@ class StartParams:
         iterations: a picture each.
     """
 
-    count: int = 16000
-    iterations: int = 2400
+    count: int = 14000
+    iterations: int = 2000
     seeds: float = 0.4
     """Share of the count with which it begins."""
-    levels: tuple[tuple[float, float], ...] = ((0.0, 0.25), (0.2, 0.5), (0.5, 1.0))
+    levels: tuple[tuple[float, float], ...] = ((0.0, 0.25), (0.15, 0.5), (0.5, 1.0))
     """From which share of the iterations on pictures of which size."""
     rate_mean: tuple[float, float] = (1e-4, 2e-6)
     """Adam's rates, units a step, first and last; farther than 1 unit from the origin in proportion to the distance."""
@@ -34,7 +34,7 @@ class StartParams:
     fewest: float = 0.01
     """Opacity under which a Gaussian is taken away."""
     opacity_price: float = 0.0
-    dropped: float = 0.0
+    dropped: float = 0.1
     ssim: float = 0.2
-    ball: float = 0.3
+    ball: float = 0.25
     """Radius about the origin in which the subject is looked for, units."""

@@ -15,9 +15,10 @@ from numba import prange
 
 from facefolds_core.jit import compiled, kernel
 
-PLANE = 10
+PLANE = 13
 """Columns of what a picture sees of a Gaussian: mean x, y in pixels; p = A dx^2 + B dx dy + C dy^2 as A, B, C, its
-opacity being o exp(-p); o; RGB; depth along the optical axis, units."""
+opacity being o exp(-p); o; RGB; depth along the optical axis, units; the p at which it is `FAINT`; how far up and down
+it reaches, pixels; -B / 2A, the dx of a row's least p in shares of dy."""
 FLAT = 10
 """Columns of a gradient in the picture: sums over pixels of v, v dx, v dy, v dx^2, v dx dy, v dy^2, where v is opacity
 times the loss's derivative by it; of the derivative by RGB; and the length of the derivative by the mean."""
@@ -118,6 +119,7 @@ def project(values, view, centre, size, tile, plane, tiles):  # type: ignore[no-
         plane[n, 0], plane[n, 1] = px, py
         plane[n, 2], plane[n, 3], plane[n, 4] = 0.5 * yy / det, -xy / det, 0.5 * xx / det
         plane[n, 5], plane[n, 9] = o, z
+        plane[n, 10], plane[n, 11], plane[n, 12] = 0.5 * reach, high, xy / yy
         dx, dy, dz = row[0] - centre[0], row[1] - centre[1], row[2] - centre[2]
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         for q in range(3):

@@ -36,9 +36,14 @@ def seeds(
     for index, (camera, picture, depth, agree) in enumerate(
         zip(*depth_maps(cameras, pictures, ball), strict=True)
     ):
-        rows = which == index
-        x, y = _stratified(int(rows.sum()), camera, random)
+        rows = np.flatnonzero(which == index)
+        x, y = _stratified(2 * len(rows), camera, random)
         known = (cv2.blur(agree.astype(np.float32), (WINDOW, WINDOW)) >= AGREE)[y, x]
+        # Half of them of known depth, where there are so many.
+        order = np.argsort(~known, kind="stable")
+        half = min(int(known.sum()), max(len(rows) // 2, len(rows) - int((~known).sum())))
+        taken = np.concatenate([order[:half], order[::-1][: len(rows) - half]])
+        x, y, known = x[taken], y[taken], known[taken]
         behind = float(camera.w2c[2, 3]) + ball
         unknown = 1 / (1 / behind + random.random(len(x)) * (1 / max(REACH[1], 2 * behind) - 1 / behind))
         here = np.where(known, depth[y, x], unknown).astype(np.float32)
