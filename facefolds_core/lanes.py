@@ -103,9 +103,7 @@ def where_less(typing: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
 def _halves(builder: Any, values: Any, size: int) -> tuple[Any, Any]:
     """Both halves of a vector, (2 size,) -> (size,)."""
     undefined = ir.Constant(values.type, ir.Undefined)
-    masks = (
-        ir.Constant(ir.VectorType(ir.IntType(32), size), list(range(start, start + size))) for start in (0, size)
-    )
+    masks = (ir.Constant(ir.VectorType(ir.IntType(32), size), list(range(start, start + size))) for start in (0, size))
     first, second = (builder.shuffle_vector(values, undefined, mask) for mask in masks)
     return first, second
 
@@ -162,7 +160,12 @@ def _overload(symbol: Any, name: str) -> None:
         return None
 
 
-for _symbol, _name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv")):
+for _symbol, _name in (
+    (operator.add, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.truediv, "fdiv"),
+):
     _overload(_symbol, _name)
 
 

@@ -128,5 +128,3 @@ def render(splats: Splats, camera: Camera) -> tuple[Array, Array, Array]:
     depth = drawing.blended(depths).picture()[0][..., 0]
     alpha = 1 - light
     return rgb + light[..., None] * splats.background, alpha, depth / np.maximum(alpha, 1e-6)
-
-

@@ -44,7 +44,13 @@ class State:
     @classmethod
     def of(cls, values: Array) -> State:
         count = len(values)
-        return cls(values, np.zeros_like(values), np.zeros_like(values), np.zeros(count, np.float32), np.zeros(count, np.float32))
+        return cls(
+            values,
+            np.zeros_like(values),
+            np.zeros_like(values),
+            np.zeros(count, np.float32),
+            np.zeros(count, np.float32),
+        )
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,7 @@ def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -
     """(N,) whether a Gaussian is the subject's."""
     params = params or BodyParams()
     reach = scene.radius or params.reach
-    cameras = scene.views_of("train")
-    possible = (np.linalg.norm(splats.means, axis=1) < reach) & (_share_seeing(splats.means, cameras) >= params.views)
+    possible = near_enough(splats, scene, params)
     side = int(np.ceil(2 * reach / params.voxel)) + 2
     cells = np.clip(((splats.means + reach) / params.voxel).astype(np.int64) + 1, 0, side - 1)
     weight = np.zeros((side, side, side), np.float32)
@@ -59,9 +58,14 @@ def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -
     return np.asarray(possible & body[tuple(cells.T)])
 
 
-def _scatter(
-    weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, params: BodyParams
-) -> None:
+def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+    """(N,) Gaussians in the subject's ball that enough cameras have in their pictures."""
+    params = params or BodyParams()
+    inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or params.reach)
+    return np.asarray(inside & (_share_seeing(splats.means, scene.views_of("train")) >= params.views))
+
+
+def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, params: BodyParams) -> None:
     """Put Gaussians into cells: at their means, and one standard deviation to both sides along their longest axes."""
     ends = longest_axes(splats.values[chosen])
     for side in (-1, 0, 1):

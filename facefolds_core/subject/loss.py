@@ -6,10 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.scoring.metrics import SSIM_C1, SSIM_C2, WINDOW_SIGMA
 from facefolds_core.subject.drawing import Drawing
 
 Array = NDArray[np.float32]
+
+WINDOW, SIGMA = (11, 11), 1.5
+SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
+"""As in the scores."""
 
 
 def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: float) -> tuple[Array, Array]:
@@ -36,7 +39,7 @@ def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: f
 
 
 def _smooth(image: Array) -> Array:
-    return np.asarray(cv2.GaussianBlur(image, (11, 11), WINDOW_SIGMA, borderType=cv2.BORDER_REFLECT_101))
+    return np.asarray(cv2.GaussianBlur(image, WINDOW, SIGMA, borderType=cv2.BORDER_REFLECT_101))
 
 
 def ssim_gradient(x: Array, y: Array) -> Array:

@@ -33,9 +33,7 @@ def seeds(
     """
     values = np.zeros((count, COLUMNS), np.float32)
     which = np.arange(count) % len(cameras)
-    for index, (camera, picture, depth, agree) in enumerate(
-        zip(*depth_maps(cameras, pictures, ball), strict=True)
-    ):
+    for index, (camera, picture, depth, agree) in enumerate(zip(*depth_maps(cameras, pictures, ball), strict=True)):
         rows = np.flatnonzero(which == index)
         x, y = _stratified(2 * len(rows), camera, random)
         known = (cv2.blur(agree.astype(np.float32), (WINDOW, WINDOW)) >= AGREE)[y, x]
@@ -59,9 +57,7 @@ def seeds(
     return values
 
 
-def _stratified(
-    count: int, camera: Camera, random: np.random.Generator
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _stratified(count: int, camera: Camera, random: np.random.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Columns and rows of pixels, spread over the picture."""
     across = max(1, round(np.sqrt(count * camera.width / camera.height)))
     down = max(1, -(-count // across))
