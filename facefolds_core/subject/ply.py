@@ -31,14 +31,14 @@ RESTS = (0, 9, 24, 45)
 LARGEST_LOG, LARGEST_PLACE = 40.0, 1e9
 """Of |log scale|, and of |position|."""
 TYPES = {
-    **{name: "i1" for name in ("char", "int8")},
-    **{name: "u1" for name in ("uchar", "uint8")},
-    **{name: "i2" for name in ("short", "int16")},
-    **{name: "u2" for name in ("ushort", "uint16")},
-    **{name: "i4" for name in ("int", "int32")},
-    **{name: "u4" for name in ("uint", "uint32")},
-    **{name: "f4" for name in ("float", "float32")},
-    **{name: "f8" for name in ("double", "float64")},
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
 }
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
@@ -88,53 +88,38 @@ def read_ply(path: str | Path) -> Splats:
 
 
 def _header(path: Path, data: bytes) -> _Header:
+    """What stands before the numbers.
+
+    Raises:
+        UserError: if it is no PLY file, or has no element `vertex` or something before it.
+    """
     end = data.find(b"end_header", 0, 1 << 16)
-    newline = data.find(b"\n", end)
-    if not data.startswith(b"ply") or end < 0 or newline < 0:
-        raise UserError(
-            "not a PLY file", file=path, expected="`ply` ... `end_header`", found=repr(data[:12]), remedy=REMEDY
-        )
-    order, element, count, before = None, "", 0, 0
-    elements: list[str] = []
-    properties: list[tuple[str, str]] = []
+    begin = data.find(b"\n", end) + 1
+    if not data.startswith(b"ply") or end < 0 or begin == 0:
+        found = repr(data[:12])
+        raise UserError("not a PLY file", file=path, expected="`ply` ... `end_header`", found=found, remedy=REMEDY)
+    order, elements, properties = None, list[tuple[str, int]](), list[tuple[str, str]]()
     for number, line in enumerate(data[:end].decode("latin-1").split("\n"), 1):
-        words = line.split()
-        if not words or words[0] in ("ply", "comment", "obj_info"):
-            continue
+        words = line.split() or ["comment"]
         try:
-            if words[0] == "format" and words[1] in ORDERS:
+            if words[0] == "format":
                 order = ORDERS[words[1]]
-                continue
-            if words[0] == "element":
-                element, size = words[1], int(words[2])
-                elements.append(element)
-                if element == "vertex":
-                    count = size
-                elif "vertex" not in elements:
-                    before += size
-                if size < 0:
-                    raise ValueError
-                continue
-            if words[0] == "property":
-                if element == "vertex":
-                    properties.append((words[2], TYPES[words[1]]))
-                continue
-            raise ValueError
+            elif words[0] == "element":
+                elements.append((words[1], int(words[2])))
+            elif words[0] == "property" and elements[-1][0] == "vertex":
+                properties.append((words[2], TYPES[words[1]]))
+            elif words[0] not in ("ply", "comment", "obj_info", "property"):
+                raise ValueError
         except (IndexError, KeyError, ValueError):
-            raise UserError(
-                "garbled PLY header", file=path, place=f"line {number}", found=line[:80].strip(), remedy=REMEDY
-            ) from None
-    if order is None or "vertex" not in elements or before:
-        raise UserError(
-            "no Gaussians in the PLY",
-            file=path,
-            expected="a format and an element `vertex`, the first",
-            found=", ".join(elements) or "no element",
-            remedy=REMEDY,
-        )
+            place, found = f"line {number}", line[:80].strip()
+            raise UserError("garbled PLY header", file=path, place=place, found=found, remedy=REMEDY) from None
+    if order is None or not elements or elements[0][0] != "vertex" or elements[0][1] < 0:
+        names = ", ".join(name for name, _ in elements) or "no element"
+        expected = "a format, and `vertex` as the first element"
+        raise UserError("no Gaussians in the PLY", file=path, expected=expected, found=names, remedy=REMEDY)
     if len({name for name, _ in properties}) < len(properties):
         raise UserError("a property twice in the PLY", file=path, remedy=REMEDY)
-    return _Header(order, count, tuple(properties), newline + 1, elements[-1] == "vertex")
+    return _Header(order, elements[0][1], tuple(properties), begin, len(elements) == 1)
 
 
 def _table(path: Path, data: bytes, header: _Header) -> dict[str, NDArray[np.float64]]:

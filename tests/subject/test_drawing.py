@@ -7,19 +7,8 @@ import torch
 
 from facefolds_core.subject import reference
 from facefolds_core.subject.drawing import differentiate, draw, view_of
-from facefolds_core.subject.splats import COLUMNS
 from tests.scenes import look_at_origin
-
-
-def some_splats(count: int, seed: int = 0) -> np.ndarray:
-    random = np.random.default_rng(seed)
-    values = random.normal(0, 1, (count, COLUMNS)).astype(np.float32)
-    values[:, :3] *= 0.15
-    values[:, 3:6] = values[:, 3:6] * 0.4 - 3.2
-    values[:, 10] += 0.5
-    values[:, 11:14] = random.random((count, 3))
-    values[:, 14:23] *= 0.1
-    return values
+from tests.subject.splats import some_splats
 
 
 def test_picture_and_gradients_are_those_of_the_reference() -> None:
