@@ -27,14 +27,14 @@ class BodyParams:
         voxel: side of the cells in which Gaussians are connected, units.
         solid: opacity from which on a Gaussian connects.
         near: standard deviation of the neighbourhood of the origin in which the body is the heaviest, units.
-        views: share of the training cameras that must have a Gaussian in their pictures.
+        views: training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer.
     """
 
     reach: float = 0.45
     voxel: float = 0.012
     solid: float = 0.3
     near: float = 0.1
-    views: float = 0.5
+    views: int = 3
 
 
 def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
@@ -62,7 +62,8 @@ def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) 
     """(N,) Gaussians in the subject's ball that enough cameras have in their pictures."""
     params = params or BodyParams()
     inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or params.reach)
-    return np.asarray(inside & (_share_seeing(splats.means, scene.views_of("train")) >= params.views))
+    cameras = scene.views_of("train")
+    return np.asarray(inside & (_seeing(splats.means, cameras) >= min(params.views, len(cameras))))
 
 
 def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, params: BodyParams) -> None:
@@ -75,14 +76,14 @@ def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: 
         np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
 
 
-def _share_seeing(points: Array, cameras: list[Camera]) -> NDArray[np.float64]:
-    """(N,) share of the cameras in whose pictures points (N, 3) lie."""
-    seen = np.zeros(len(points))
+def _seeing(points: Array, cameras: list[Camera]) -> NDArray[np.int64]:
+    """(N,) cameras in whose pictures points (N, 3) lie."""
+    seen = np.zeros(len(points), np.int64)
     for camera in cameras:
         pixels, depth = camera.project(points.astype(np.float64))
         inside = (pixels >= 0).all(1) & (pixels[:, 0] < camera.width) & (pixels[:, 1] < camera.height)
         seen += inside & (depth > 0)
-    return seen / max(len(cameras), 1)
+    return seen
 
 
 def opacity_of(splats: Splats, subject: Bool, camera: Camera) -> Array:

@@ -29,7 +29,8 @@ class EdgeParams:
 
     Attributes:
         inside, outside: opacities of the Gaussians above and below which they are believed;
-        band: and so many pixels off from where they are neither, at a picture of 384 pixels.
+        band: and so many pixels off from where they are neither, at a picture of 384 pixels;
+        grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
         share: of the pictures that see a Gaussian and take it for the subject's, at least.
         rounds: how often pictures and Gaussians tell each other.
         soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels.
@@ -38,11 +39,12 @@ class EdgeParams:
 
     inside: float = 0.9
     outside: float = 0.1
-    band: float = 4.0
+    band: float = 2.0
+    grow: float = 4.0
     share: float = 0.75
     rounds: int = 2
     soft: float = 4.0
-    noise: float = 0.05
+    noise: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,8 @@ def find_subject(scene: Scene, splats: Splats, frame: int = 0, edge: EdgeParams 
     possible = near_enough(splats, scene)
     for _ in range(edge.rounds):
         cuts = {i: cut_out(store.image(i, frame), splats, subject, one, edge) for i, one in cameras.items()}
-        subject = possible & voted(splats, [(cameras[i], cut) for i, cut in cuts.items()], edge.share)
+        larger = [(one, grown(cuts[i].astype(np.uint8), _pixels(edge.grow, one)) > 0) for i, one in cameras.items()]
+        subject = possible & voted(splats, larger, edge.share)
     return Found(subject, cuts)
 
 
@@ -129,7 +132,8 @@ def cut_out(picture: Image, splats: Splats, subject: Bool, camera: Camera, edge:
 
 
 def softened(picture: Image, cut: Bool, splats: Splats, subject: Bool, camera: Camera, edge: EdgeParams) -> Array:
-    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): its silhouette, with hair at its outline."""
+    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the mean of what the
+    Gaussians say and of what the picture's colours say before what stands behind."""
     radius = _pixels(edge.soft, camera)
     inside = grown((~cut).astype(np.uint8), radius) == 0
     near = grown(cut.astype(np.uint8), radius) > 0
@@ -137,7 +141,8 @@ def softened(picture: Image, cut: Bool, splats: Splats, subject: Bool, camera: C
         return cut.astype(np.float32)
     behind = np.clip(background(splats, subject, camera), 0, 1)
     colours = picture.astype(np.float32) / np.float32(255)
-    return opacity_before(colours, behind, inside, near & ~inside, edge.noise, PlateParams())
+    found = opacity_before(colours, behind, inside, near & ~inside, edge.noise, PlateParams())
+    return np.where(inside, np.float32(1), np.where(near, (found + opacity_of(splats, subject, camera)) / 2, 0))
 
 
 def _pixels(width: float, camera: Camera) -> int:
