@@ -1,8 +1,8 @@
 """Eight float32 at once, in compiled kernels: what LLVM does not find by itself without fast-math.
 
 `load(array, at)` is the eight values of a flat float32 array from `at` on, `store` puts them back, `fill` repeats a
-number, `total` adds the eight up in a fixed order, `highest` is the largest. `+ - * /` work on them, `least` and `most` compare them, and
-`where_less(a, b, x, y)` takes x where a < b, else y. All is IEEE arithmetic: results are the same on each CPU.
+number, `total` adds the eight up in a fixed order, `highest` is the largest. `+ - * /` work on them, `least` and `most`
+take the smaller and the larger ones, and `where_less(a, b, x, y)` takes x where a < b, else y. All is IEEE arithmetic: results are the same on each CPU.
 """
 
 # numba has no types:
@@ -14,10 +14,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
 from facefolds_core.jit import inlined

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float32]
 
 APART, NARROW = 0.7, 0.7
-"""Two halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
+"""Halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
 FAINTER = 0.8
 """Opacity of the halves, in shares of the whole's."""
 
 
 def thinned(state: State, params: StartParams) -> State:
     """Without those that are hardly there."""
-    kept = state.values[:, OPACITY] > np.log(params.fewest / (1 - params.fewest))
+    kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
     kept &= np.isfinite(state.values).all(1)
     return _part(state, kept)
 

@@ -68,17 +68,22 @@ class Target:
 
 def fit_start(scene: Scene, frame: int = 0, params: StartParams | None = None, seed: int = 0) -> Splats:
     """Gaussians of the training pictures of one frame."""
+    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or StartParams(), seed)
+
+
+def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[Camera], list[Array]]:
+    """Those of some cameras that have a picture of the frame, and the pictures, (H, W, 3) float32 in [0, 1]."""
     store = scene.open_frames()
-    chosen = [i for i in scene.indices("train") if (i, frame) in store]
-    cameras = [scene.camera_in_head(i, frame) for i in chosen]
-    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in chosen]
-    return fit_pictures(cameras, pictures, params or StartParams(), seed)
+    there = [i for i in cameras if (i, frame) in store]
+    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in there]
+    return [scene.camera_in_head(i, frame) for i in there], pictures
 
 
 def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: StartParams, seed: int = 0) -> Splats:
     """Gaussians of some pictures (H, W, 3) float32 in [0, 1]."""
     random = np.random.default_rng(seed)
-    state = State.of(seeds(cameras, pictures, int(params.seeds * params.count), params.ball, random))
+    count = int(np.clip(sum(one.shape[0] * one.shape[1] for one in pictures) / params.pixels, params.fewest, params.most))
+    state = State.of(seeds(cameras, pictures, int(params.seeds * count), params.ball, random))
     begun = len(state.values)
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
     targets: list[Target] = []
@@ -109,8 +114,8 @@ def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: S
         correct = np.array(corrections(BETAS, step + 1), np.float32)
         adam_step(state.values, state.first, state.second, gradient, seen, _rates(params, done), correct, decay)
         if (step + 1) % params.every == 0 and done < params.grown:
-            wanted = begun + (params.count - begun) * (step + 1) / (params.grown * params.iterations)
-            state = grown(thinned(state, params), min(int(wanted), params.count))
+            wanted = begun + (count - begun) * (step + 1) / (params.grown * params.iterations)
+            state = grown(thinned(state, params), min(int(wanted), count))
     return Splats(thinned(state, params).values, background)
 
 

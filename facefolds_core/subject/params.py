@@ -10,12 +10,14 @@ class StartParams:
     """Of `fit_start`.
 
     Attributes:
-        count: Gaussians at the end.
+        pixels: of all training pictures a Gaussian; there are `fewest` to `most` of them at the end.
         iterations: a picture each.
     """
 
-    count: int = 14000
-    iterations: int = 2000
+    pixels: float = 120.0
+    fewest: int = 9000
+    most: int = 30000
+    iterations: int = 2500
     seeds: float = 0.4
     """Share of the count with which it begins."""
     levels: tuple[tuple[float, float], ...] = ((0.0, 0.25), (0.15, 0.5), (0.5, 1.0))
@@ -31,7 +33,7 @@ class StartParams:
     """Iterations between which Gaussians are taken away and split."""
     grown: float = 0.7
     """Share of the iterations after which there are no more of them."""
-    fewest: float = 0.01
+    faintest: float = 0.01
     """Opacity under which a Gaussian is taken away."""
     opacity_price: float = 0.0
     dropped: float = 0.1
