@@ -72,7 +72,8 @@ def over_plate(scene: Scene, index: int, subject: Splats) -> Array:
     else:
         hole = np.zeros((scene.height, scene.width), np.uint8)
         if masks is not None and (index, 0) in masks:
-            hole = cv2.dilate((masks.image(index, 0)[..., 0] > 2).astype(np.uint8), np.ones((3, 3), np.uint8))
+            there = (masks.image(index, 0)[..., 0] > 2).astype(np.uint8)
+            hole = np.asarray(cv2.dilate(there, np.ones((3, 3), np.uint8)), np.uint8)
         plate = np.asarray(cv2.inpaint(scene.open_frames().image(index, 0).copy(), hole, 3, cv2.INPAINT_TELEA))
     rgb, alpha, _ = render(subject, camera)
     light = 1 - alpha[..., None]

@@ -82,7 +82,8 @@ def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[
 def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: StartParams, seed: int = 0) -> Splats:
     """Gaussians of some pictures (H, W, 3) float32 in [0, 1]."""
     random = np.random.default_rng(seed)
-    count = int(np.clip(sum(one.shape[0] * one.shape[1] for one in pictures) / params.pixels, params.fewest, params.most))
+    pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
+    count = int(np.clip(pixels / params.pixels, params.fewest, params.most))
     state = State.of(seeds(cameras, pictures, int(params.seeds * count), params.ball, random))
     begun = len(state.values)
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
