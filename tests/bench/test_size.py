@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MOST = 2610
+MOST = 2745
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
-`rooms`, 118 lines, and `large`, 88 (2400 before them)."""
+`rooms`, 118 lines, `large`, 88 (2400 before them), and `start`, 134."""
 
 
 def test_the_benchmarks_stay_small(project_root: Path) -> None:
