@@ -2,7 +2,7 @@
 
 python -m bench.start FOLDER [--only "sparse; mugsy"] [--seen]
 
-FOLDER keeps the scenes and a sheet of each capture: photo, picture of all Gaussians, of the subject over what stands
+FOLDER keeps the scenes, the Gaussians and a sheet of each capture: photo, picture of all Gaussians, of the subject over what stands
 behind, matte over green, what stands behind without the subject. Of the subject alone PSNR is told over the clean plate
 or, without one, over the photo with the subject painted over from its border.
 """
@@ -31,6 +31,7 @@ from facefolds_core.subject.fit import fit_pictures, pictures_of
 from facefolds_core.subject.found import background
 from facefolds_core.subject.mattes import find_mattes, find_subject
 from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
@@ -86,6 +87,7 @@ def measure(name: str, scene: Scene, seen: bool, sheet: Path) -> str:
     begun = time.perf_counter(), time.process_time()
     splats = fit_pictures(cameras, pictures, StartParams())
     fitted = time.perf_counter() - begun[0], time.process_time() - begun[1]
+    write_ply(sheet.with_suffix(".ply"), splats)
     subject = find_subject(scene, splats).subject
     held = [i for i in scene.indices("holdout") if (i, 0) in scene.open_frames()]
     mattes, masks, rows, tiles = find_mattes(scene, splats, 0, held), scene.open_masks(), list[list[float]](), []

@@ -38,7 +38,7 @@ class EdgeParams:
     """
 
     inside: float = 0.9
-    outside: float = 0.1
+    outside: float = 0.3
     band: float = 2.0
     grow: float = 4.0
     share: float = 0.75
@@ -132,8 +132,8 @@ def cut_out(picture: Image, splats: Splats, subject: Bool, camera: Camera, edge:
 
 
 def softened(picture: Image, cut: Bool, splats: Splats, subject: Bool, camera: Camera, edge: EdgeParams) -> Array:
-    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the mean of what the
-    Gaussians say and of what the picture's colours say before what stands behind."""
+    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it."""
     radius = _pixels(edge.soft, camera)
     inside = grown((~cut).astype(np.uint8), radius) == 0
     near = grown(cut.astype(np.uint8), radius) > 0
@@ -142,7 +142,8 @@ def softened(picture: Image, cut: Bool, splats: Splats, subject: Bool, camera: C
     behind = np.clip(background(splats, subject, camera), 0, 1)
     colours = picture.astype(np.float32) / np.float32(255)
     found = opacity_before(colours, behind, inside, near & ~inside, edge.noise, PlateParams())
-    return np.where(inside, np.float32(1), np.where(near, (found + opacity_of(splats, subject, camera)) / 2, 0))
+    both = np.sqrt(found * np.clip(opacity_of(splats, subject, camera), 0, 1))
+    return np.asarray(np.where(inside, np.float32(1), np.where(near, both, np.float32(0))))
 
 
 def _pixels(width: float, camera: Camera) -> int:
