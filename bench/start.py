@@ -2,9 +2,9 @@
 
 python -m bench.start FOLDER [--only "sparse; mugsy"] [--seen]
 
-FOLDER keeps the scenes, the Gaussians and a sheet of each capture: photo, picture of all Gaussians, of the subject over what stands
-behind, matte over green, what stands behind without the subject. Of the subject alone PSNR is told over the clean plate
-or, without one, over the photo with the subject painted over from its border.
+FOLDER keeps the scenes, the Gaussians and a sheet of each capture: photo, picture of all Gaussians, of the subject over
+what stands behind, matte over green, what stands behind without the subject. Of the subject alone PSNR is told over the
+clean plate or, without one, over the photo with the subject painted over from its border.
 """
 
 from __future__ import annotations
