@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -19,8 +19,8 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
+from bench.gate import CASES
 from bench.results import ROOT
-from bench.rooms import TWO
 from bench.run import Project, own_params
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import UserError, report_user_errors
@@ -36,15 +36,7 @@ from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
 
-CAPTURES: dict[str, dict[str, Any]] = {
-    "actor": {},
-    "clutter": {"capture": {"clutter": 1.0, "plates": False}},
-    "mugsy": TWO,
-    "studio": TWO,
-    "sparse": {**TWO, "holdout": ["06", "13"]},
-    "buddha": {"source": "transforms", "front": "00036", "holdout": ["00022", "00031"]},
-    "fox": {"source": "transforms", "front": "0019", "holdout": {"every": 7}},
-}
+CAPTURES = {name: CASES[name][1] for name in ("actor", "clutter", "mugsy", "studio", "sparse", "buddha", "fox")}
 """Name -> the subject's keys; the first two are the actor of params.yaml."""
 BAND = 4
 """Pixels on both sides of an outline."""
