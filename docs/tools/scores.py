@@ -28,16 +28,8 @@ def readme_table(data: Path) -> str:
     files = sorted(data.glob("*/metrics.json"))
     if not files:
         raise UserError("no results", file=data, expected="<subject>/metrics.json", remedy="run `make repro` first")
-    head = [
-        "subject",
-        "PSNR, dB",
-        "region",
-        "model",
-        "SSIM",
-        "cameras, frames, pixels",
-        "held out (degrees from front)",
-    ]
-    head += ["triangles", "meshes + video (+ reflection)", "training"]
+    head = ["subject", "PSNR, dB", "over", "inside", "what moves", "high SSIM", "cameras, frames, pixels"]
+    head += ["held out (degrees from front)", "triangles", "meshes + video (+ reflection)", "training"]
     return markdown(head, [_readme_row(path) for path in files])
 
 
@@ -54,8 +46,9 @@ def _readme_row(path: Path) -> list[str]:
         f"`{path.parent.name}`" + ("" if preset == "fast" else f", {preset}"),
         f"**{number(metrics['asset'][key], 2)}**",
         HEADLINE_WORDS[key],
-        number(metrics["model"][key], 2),
-        number(metrics["asset"].get(key.replace("psnr", "ssim")), 3),
+        number(metrics["asset"].get("psnr_interior"), 2),
+        number(metrics["asset"].get("psnr_moving"), 2),
+        number(metrics["asset"].get("ssim_high"), 3),
         ", ".join(map(str, filmed)),
         names if len(held) < 4 else f"{len(held)} ({' to '.join(angles)})",
         spaced(cost["triangles"]),
