@@ -1,0 +1,40 @@
+"""Adam on Gaussians, compiled."""
+
+# numba has no types:
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import prange
+
+from facefolds_core.jit import kernel
+from facefolds_core.training.adam import EPSILON
+
+
+@kernel(parallel=True)
+def adam_step(values, first, second, gradient, seen, rates, correct, decay):  # type: ignore[no-untyped-def]
+    """A step of the Gaussians that were seen; the others stay as they are, moments included.
+
+    Args:
+        values, first, second: (N, COLUMNS) float32, in place.
+        gradient: (N, COLUMNS) float32.
+        seen: (N,) bool.
+        rates: (COLUMNS,) float32; those of the position are for a Gaussian within 1 unit of the origin.
+        correct, decay: of `adam.corrections` and `adam.decays`, float32.
+    """
+    for n in prange(values.shape[0]):
+        if not seen[n]:
+            continue
+        far = math.sqrt(values[n, 0] ** 2 + values[n, 1] ** 2 + values[n, 2] ** 2)
+        for k in range(values.shape[1]):
+            g = gradient[n, k]
+            one = decay[0] * first[n, k] + decay[1] * g
+            two = decay[2] * second[n, k] + decay[3] * g * g
+            first[n, k], second[n, k] = one, two
+            rate = rates[k] * max(far, np.float32(1)) if k < 3 else rates[k]
+            values[n, k] -= rate * (one * correct[0]) / (math.sqrt(two * correct[1]) + np.float32(EPSILON))
+        for k in range(11, 14):
+            values[n, k] = min(max(values[n, k], np.float32(0)), np.float32(1))

@@ -1,0 +1,99 @@
+"""Which Gaussians are the subject: the connected body at the cameras' common centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.density import longest_axes
+from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.splats import Splats
+
+Array = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class BodyParams:
+    """How the subject is told from the room.
+
+    Attributes:
+        reach: radius of the ball about the origin in which it may be, units, where the scene names none.
+        voxel: side of the cells in which Gaussians are connected, units.
+        solid: opacity from which on a Gaussian connects.
+        near: standard deviation of the neighbourhood of the origin in which the body is the heaviest, units.
+        views: training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer.
+    """
+
+    reach: float = 0.45
+    voxel: float = 0.012
+    solid: float = 0.3
+    near: float = 0.1
+    views: int = 3
+
+
+def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+    """(N,) whether a Gaussian is the subject's."""
+    params = params or BodyParams()
+    reach = scene.radius or params.reach
+    possible = near_enough(splats, scene, params)
+    side = int(np.ceil(2 * reach / params.voxel)) + 2
+    cells = np.clip(((splats.means + reach) / params.voxel).astype(np.int64) + 1, 0, side - 1)
+    weight = np.zeros((side, side, side), np.float32)
+    solid = possible & (splats.opacities > params.solid)
+    area = np.prod(np.sort(splats.sizes, 1)[:, 1:], 1) / params.voxel**2  # of the face that it shows
+    _scatter(weight, splats, solid, np.minimum(area, 4.0) * splats.opacities, reach, params)
+    labels, count = ndimage.label(weight > 0, np.ones((3, 3, 3)))
+    if count == 0:
+        return np.zeros(len(splats), bool)
+    axes = (np.arange(side) - 0.5) * params.voxel - reach
+    square = axes[:, None, None] ** 2 + axes[:, None] ** 2 + axes**2
+    mass = ndimage.sum_labels(weight * np.exp(-0.5 * square / params.near**2), labels, np.arange(1, count + 1))
+    body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=1)
+    return np.asarray(possible & body[tuple(cells.T)])
+
+
+def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+    """(N,) Gaussians in the subject's ball that enough cameras have in their pictures."""
+    params = params or BodyParams()
+    inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or params.reach)
+    cameras = scene.views_of("train")
+    return np.asarray(inside & (_seeing(splats.means, cameras) >= min(params.views, len(cameras))))
+
+
+def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, params: BodyParams) -> None:
+    """Put Gaussians into cells: at their means, and one standard deviation to both sides along their longest axes."""
+    ends = longest_axes(splats.values[chosen])
+    for side in (-1, 0, 1):
+        places = splats.means[chosen] + side * ends
+        cells = ((places + reach) / params.voxel).astype(np.int64) + 1
+        inside = ((cells >= 0) & (cells < weight.shape[0])).all(1)
+        np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
+
+
+def _seeing(points: Array, cameras: list[Camera]) -> NDArray[np.int64]:
+    """(N,) cameras in whose pictures points (N, 3) lie."""
+    seen = np.zeros(len(points), np.int64)
+    for camera in cameras:
+        pixels, depth = camera.project(points.astype(np.float64))
+        inside = (pixels >= 0).all(1) & (pixels[:, 0] < camera.width) & (pixels[:, 1] < camera.height)
+        seen += inside & (depth > 0)
+    return seen
+
+
+def opacity_of(splats: Splats, subject: Bool, camera: Camera) -> Array:
+    """(H, W) opacity of the subject as the camera sees it: what stands before it covers it."""
+    drawing = draw(splats.values, view_of(camera))
+    marks = np.repeat(subject[:, None].astype(np.float32), 3, 1)
+    return np.asarray(drawing.blended(marks).picture()[0][..., 0])
+
+
+def background(splats: Splats, subject: Bool, camera: Camera) -> Array:
+    """(H, W, 3) RGB of what stands behind: everything but the subject."""
+    rgb, light = draw(splats.part(~subject).values, view_of(camera)).picture()
+    return np.asarray(rgb + light[..., None] * splats.background)
