@@ -23,6 +23,7 @@ from facefolds_core.files import write_json
 from facefolds_core.player import find_player
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.serving import serving
 from tests.chromium import FLAGS, chromium
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
@@ -117,7 +118,7 @@ def agreement(browser: Browser, address: str, asset: Path) -> dict[str, float]:
     level, grey = read_asset(asset).full, (GREY_VALUE,) * 3
     with OpenGLRenderer(level, Glossy.of(level)) as renderer:
         found = {
-            camera.name: psnr(captured(page, camera)[..., :3], renderer.render(camera, 0, grey)[0])
+            camera.name: psnr(captured(page, camera)[..., :3], pixel_means(renderer.render(finer(camera), 0, grey)[0]))
             for camera in five_cameras(AGREEMENT_SIDE)
         }
     page.close()

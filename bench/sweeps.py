@@ -32,8 +32,8 @@ from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table,
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.export.sampling import LEAST
 from facefolds_core.files import read_json, write_json
-from facefolds_core.params import SampleParams
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.sweeps.experiments import runs_of
@@ -90,7 +90,7 @@ def changes(name: str, value: int, subject: str) -> dict[str, Any]:
     entry = params["subjects"][subject]
     found = {**SWEEPS[name].fixed, SWEEPS[name].key: value, "compress.levels": []}
     given = {**params["sample"], **entry.get("sample", {})}.get("resolution", "auto")
-    samples = SampleParams().least if given == "auto" else given
+    samples = LEAST if given == "auto" else given
     if name == "texture" and value > samples:
         found |= {"sample.resolution": value, "reconstruct.resolution": samples}
     if name in RATES:

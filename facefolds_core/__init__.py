@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from facefolds_core.params import train_params
     from facefolds_core.pipeline import ExportParams, evaluate, export_asset, train
     from facefolds_core.rendering.camera_paths import Eye, camera_of
-    from facefolds_core.rendering.reference import render_asset as render
+    from facefolds_core.rendering.pixels import render
 
 _PLACES = {
     "ExportParams": ("facefolds_core.pipeline", "ExportParams"),
@@ -43,7 +43,7 @@ _PLACES = {
     "load_asset": ("facefolds_core.asset.reader", "read_asset"),
     "load_model": ("facefolds_core.model.storage", "load_model"),
     "load_scene": ("facefolds_core.captures.scene", "read_scene"),
-    "render": ("facefolds_core.rendering.reference", "render_asset"),
+    "render": ("facefolds_core.rendering.pixels", "render"),
     "train": ("facefolds_core.pipeline", "train"),
     "train_params": ("facefolds_core.params", "train_params"),
     "validate": ("facefolds_core.asset.validation", "validate_asset"),

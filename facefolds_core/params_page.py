@@ -45,7 +45,6 @@ FIRST = {
         "video.target_psnr",
         "video.preset",
         "photos",
-        "frame_rate_factor",
         "stream.beyond",
     ),
 }
@@ -102,6 +101,8 @@ def page() -> str:
             parts.append(_words(kind.__doc__) + "\n")
             if model:
                 parts.append(_presets(model))
+            if kind is not kinds[0]:
+                parts.append(_alike(kind, kinds[0]))
             parts += _tables(kind, stage, seen)
     return "\n".join(parts)
 
@@ -110,7 +111,7 @@ def _tables(kind: type[Section], path: str, seen: dict[type[Section], str]) -> I
     """A table of a section's own keys, then one of each section in it; `seen` has the places of earlier tables."""
     stage, _, folder = path.partition(".")
     first = {key for key in FIRST.get(stage, ()) if _holder(stage, key) is kind and key.rpartition(".")[0] == folder}
-    yield _table(kind, path, {key.rpartition(".")[2] for key in first})
+    yield _table(kind, path, {key.rpartition(".")[2] for key in first} | _shared(kind))
     for name, field in kind.model_fields.items():
         inner = section_in(field.annotation)
         if inner is not None:
@@ -121,6 +122,14 @@ def _tables(kind: type[Section], path: str, seen: dict[type[Section], str]) -> I
             seen[inner] = f"{path}.{name}"
             yield _words(inner.__doc__) + "\n"
             yield from _tables(inner, f"{path}.{name}", seen)
+
+
+def _shared(kind: type[Section]) -> set[str]:
+    """Keys of a model that stand elsewhere: `model` follows from the preset, others are those of the first model."""
+    models = SECTIONS["train"]
+    if kind not in models:
+        return set()
+    return {"model"} | (set(kind.model_fields) & set(models[0].model_fields) if kind is not models[0] else set())
 
 
 def _table(kind: type[Section], path: str, hidden: set[str]) -> str:
@@ -157,6 +166,13 @@ def _presets(model: str) -> str:
             values = ", ".join(f"`{key}: {json.dumps(value)}`" for key, value in preset.values.items())
             lines.append(f"- Preset `{name}`: " + (f"the defaults but {values}." if values else "the defaults."))
     return "\n".join([*lines, ""])
+
+
+def _alike(kind: type[Section], first: type[Section]) -> str:
+    """A line on the keys that a model has in common with the first."""
+    names = [name for name in kind.model_fields if name in first.model_fields and name not in ("model", "preset")]
+    keys = ", ".join(f"`{name}` ({json.dumps(kind.model_fields[name].default)})" for name in names)
+    return f"It has these keys in common with the model above; its defaults are in brackets: {keys}.\n"
 
 
 def section_in(annotation: Any) -> type[Section] | None:

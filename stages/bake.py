@@ -16,7 +16,7 @@ def bake(folders: SubjectFolders) -> str:
     params = read_stage(BakeParams, folders.config)
     with atomic_folder(folders.textures) as temporary:
         rays = steps.bake(
-            read_scene(folders.scene).views_of("train", params.moving_views),
+            read_scene(folders.scene).views_of("train", steps.BAKED_VIEWS),
             read_grids(folders.samples / "grids.npz"),
             read_meshes(folders.meshes / "meshes.npz"),
             folders.samples / steps.TEXTURES,

@@ -32,12 +32,11 @@ def compress(folders: SubjectFolders) -> str:
     )
     manifest = package(folders.asset, export, scene, params, folders.checkpoints / "encoded")
     level = manifest.full
-    glb_frame = params.glb.frame * (level.texture.frames // scene.num_frames)
-    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, glb_frame, params.glb.draco)
+    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)
     mesh_bytes = sum(layer.bytes for layer in level.layers)
     videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
     quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
-    warning = codec_warning(level.quality.psnr_to_model if level.quality else None, params.video, params.search.noticed)
+    warning = codec_warning(level.quality.psnr_to_model if level.quality else None, params.video)
     if warning:
         sys.stderr.write(f"compress: {warning}\n")
     coarser = "".join(f"; {other.name} {other.bytes} bytes" for other in manifest.levels[:-1])

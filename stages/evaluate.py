@@ -23,7 +23,7 @@ from facefolds_core.scoring.record import write_record
 from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
-from facefolds_core.scoring.training_views import bad_views, warnings_of
+from facefolds_core.scoring.training_scores import bad_views, warnings_of
 from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
 from stages.common import run_stage
 
@@ -32,7 +32,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
     """What is not well with the capture, the training, the files and the scores."""
     video = read_stage(CompressParams, folders.config)
     quality = asset.manifest.full.quality
-    codec = codec_warning(quality.psnr_to_model if quality else None, video.video, video.search.noticed)
+    codec = codec_warning(quality.psnr_to_model if quality else None, video.video)
     limits = read_stage(EvaluateParams, folders.config).warnings
     return warnings_among(
         [

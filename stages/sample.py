@@ -7,7 +7,7 @@ from pathlib import Path
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import UserError
-from facefolds_core.export.steps import check_frames, sample_model
+from facefolds_core.export.steps import SAMPLED_VIEWS, check_frames, sample_model
 from facefolds_core.export.stores import write_grids
 from facefolds_core.facts import shorten
 from facefolds_core.files import atomic_folder, read_json
@@ -47,7 +47,7 @@ def sample(folders: SubjectFolders) -> str:
     scene = read_scene(folders.scene)
     check_frames(model, scene, folders.model)
     with atomic_folder(folders.samples) as temporary:
-        cameras = scene.views_of("train", params.auto_window.moving_views)
+        cameras = scene.views_of("train", SAMPLED_VIEWS)
         kept = folders.checkpoints / "sampled"
         keys = _key_frames(folders.model / "fit.json", scene) if params.opacity == "key_frames" else None
         grids = sample_model(model, cameras, params, temporary, kept, keys)

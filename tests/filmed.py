@@ -64,7 +64,7 @@ class Film:
 @lru_cache(maxsize=4)
 def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -> Film:
     """The actor, filmed; kept for the session (a picture of 48 x 64 takes 30 ms)."""
-    params = CaptureParams(cameras=cameras, frames=frames, width=width, height=height, fps=30.0)
+    params = CaptureParams(cameras=cameras, frames=frames, width=width, height=height)
     rig = make_rig(params).cameras
     options = ActorOptions()
     pictures = [[render(camera, float(t), options) for t in frame_times(params)] for camera in rig]
@@ -74,7 +74,7 @@ def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -
     assert not any(plate.opacity.any() for plate in plates)
     return Film(
         cameras=rig,
-        fps=params.frame_rate,
+        fps=30.0,
         images=np.array([[p.rgb for p in row] for row in pictures]),
         mattes=np.array([[np.rint(255 * p.opacity).astype(np.uint8) for p in row] for row in pictures]),
         plates=np.array([plate.rgb for plate in plates]),

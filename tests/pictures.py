@@ -12,6 +12,8 @@ from facefolds_core.asset import Asset
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.areas import AreaView
+from facefolds_core.rendering.raster import cast_layers
 from tests.scenes import look_at_origin
 
 GREY = "#7f7f7f"
@@ -32,7 +34,7 @@ def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
 def expected_pictures(
     asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], background: float = GREY_VALUE
 ) -> dict[tuple[str, int], NDArray[np.float32]]:
-    """The reference renderer's pictures over grey, by camera's name and frame: (H, W, 3) in [0, 1]."""
+    """One ray a pixel, over grey, the head at rest: by camera's name and frame (H, W, 3) in [0, 1]."""
     caster = AssetCaster(asset)
     hits = {camera.name: caster.cast(camera) for camera in cameras}
     return {
@@ -40,3 +42,25 @@ def expected_pictures(
         for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
         for name, hit in hits.items()
     }
+
+
+def expected_means(
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
+) -> dict[tuple[str, int], NDArray[np.float32]]:
+    """The same as means over pixels."""
+    views = {camera.name: _view_at_rest(asset, camera) for camera in cameras}
+    return {
+        (name, frame): view.composite(textures, (GREY_VALUE,) * 3)[0]
+        for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
+        for name, view in views.items()
+    }
+
+
+def means_of_frames(asset: Asset | AssetLevel, camera: Camera) -> list[NDArray[np.float32]]:
+    """The same of all frames, by one camera."""
+    view = _view_at_rest(asset, camera)
+    return [view.composite(textures, (GREY_VALUE,) * 3)[0] for textures in asset.frames()]
+
+
+def _view_at_rest(asset: Asset | AssetLevel, camera: Camera) -> AreaView:
+    return AreaView.of_hits(camera, lambda part: (cast_layers(part, asset.layers), None))

@@ -43,6 +43,7 @@ export interface Statistics {
   level: string;
   texture: [number, number];
   canvas: [number, number];
+  rays: number;
   video: string;
   decoder: string;
 }

@@ -16,7 +16,6 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import numpy as np
 import typer
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
@@ -33,6 +32,7 @@ from facefolds_core.player import find_player
 from facefolds_core.rendering.camera_paths import Eye, camera_of, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.pixels import SIDE, finer
 from facefolds_core.serving import serving
 from tests.chromium import FLAGS, chromium
 
@@ -73,7 +73,7 @@ def film(subject: Path, out: Path) -> None:
     pictures, rate = [], Fraction(1000, FILM["milliseconds"])
     with OpenGLRenderer(shown, Glossy.of(shown)) as renderer:
         for index, eye in enumerate(turntable(start, FILM["pictures"], (FILM["sweep"], FILM["sweep"]))):
-            camera = camera_of(eye, samples * width, samples * height, FILM["field_of_view"])
+            camera = finer(camera_of(eye, width, height, FILM["field_of_view"]), samples)
             frame = frame_due(index, rate, shown.entry.texture.rate, shown.num_frames)
             rgb = renderer.render(camera, frame, background)[0]
             pictures.append(Image.fromarray(shrink(rgb, samples)))
@@ -98,9 +98,10 @@ def limits(subject: Path, out: Path) -> None:
             truth, room = (
                 render(camera, float(scene.times[frame]), ActorOptions(away=away)).rgb for away in (0.0, 1.0)
             )
-            drawn = renderer.render(camera.transformed(scene.from_capture), frame, room / 255.0)[0]
+            behind = (room / 255.0).repeat(SIDE, 0).repeat(SIDE, 1)
+            drawn = shrink(renderer.render(finer(camera.transformed(scene.from_capture)), frame, behind)[0], SIDE)
             box = (left, top, left + wide, top + wide * panel[1] // panel[0])
-            for rgb in (truth, np.rint(np.clip(drawn, 0, 1) * 255).astype(np.uint8)):
+            for rgb in (truth, drawn):
                 shots.append(Image.fromarray(rgb).crop(box).resize(panel, Image.Resampling.LANCZOS))
     # Wider gaps between the three than within a pair.
     places = [(panel[0] + gap) * k + 3 * gap * (k // 2) for k in range(len(shots))]

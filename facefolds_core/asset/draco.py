@@ -150,9 +150,3 @@ def _check_claims(data: bytes) -> None:
                 break
         if count > MOST_CLAIMED:
             raise DracoError(f"it claims {count} faces or vertices")
-
-
-def attribute_ids(data: bytes) -> tuple[int, int]:
-    """Draco's unique ids of the positions and of the texture coordinates, as glTF refers to them."""
-    ids = {attribute["attribute_type"]: int(attribute["unique_id"]) for attribute in DracoPy.decode(data).attributes}
-    return ids[DracoPy.AttributeType.POSITION], ids[DracoPy.AttributeType.TEX_COORD]

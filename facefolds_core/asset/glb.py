@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.draco import attribute_ids
-from facefolds_core.asset.reader import AssetLevel, layer_bytes
+from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -32,7 +31,7 @@ from facefolds_core.geometry.track import Track
 
 TO_Y_UP = [-0.5, -0.5, -0.5, 0.5]
 """Quaternion (x, y, z, w) of the rotation (x, y, z) -> (y, z, x)."""
-UNLIT, DRACO = "KHR_materials_unlit", "KHR_draco_mesh_compression"
+UNLIT = "KHR_materials_unlit"
 FLOAT, UNSIGNED_INT = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 LINEAR, CLAMP_TO_EDGE = 9729, 33071
@@ -54,42 +53,34 @@ class Builder:
         self.binary += data
         return len(self.views) - 1
 
-    def accessor(self, kind: str, component: int, values: NDArray[Any], view: int | None, bounds: bool = False) -> int:
-        """Describe an array (count, ...); returns its index. Draco's data have no view."""
-        entry: dict[str, Any] = {"componentType": component, "count": len(values), "type": kind}
-        if view is not None:
-            entry["bufferView"] = view
+    def accessor(self, kind: str, component: int, values: NDArray[Any], view: int, bounds: bool = False) -> int:
+        """Describe an array (count, ...); returns its index."""
+        entry: dict[str, Any] = {"componentType": component, "count": len(values), "type": kind, "bufferView": view}
         if bounds:
             entry |= {"min": values.min(0).tolist(), "max": values.max(0).tolist()}
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
-    def primitive(self, mesh: TexturedMesh, draco: bytes | None) -> dict[str, Any]:
-        """A layer's triangles, plain or as the asset's own Draco bytes."""
+    def primitive(self, mesh: TexturedMesh) -> dict[str, Any]:
+        """A layer's triangles."""
         indices = back_to_front(mesh).astype("<u4").ravel()
         arrays = (("POSITION", "VEC3", mesh.vertices), ("TEXCOORD_0", "VEC2", mesh.st))
         attributes = {}
         for name, kind, values in arrays:
-            view = None if draco is not None else self.view(values.astype("<f4").tobytes(), ARRAY_BUFFER)
+            view = self.view(values.astype("<f4").tobytes(), ARRAY_BUFFER)
             attributes[name] = self.accessor(kind, FLOAT, values, view, bounds=name == "POSITION")
-        view = None if draco is not None else self.view(indices.tobytes(), ELEMENT_ARRAY_BUFFER)
-        entry: dict[str, Any] = {
+        view = self.view(indices.tobytes(), ELEMENT_ARRAY_BUFFER)
+        return {
             "attributes": attributes,
             "indices": self.accessor("SCALAR", UNSIGNED_INT, indices, view),
         }
-        if draco is not None:
-            position, st = attribute_ids(draco)
-            ids = {"POSITION": position, "TEXCOORD_0": st}
-            entry["extensions"] = {DRACO: {"bufferView": self.view(draco), "attributes": ids}}
-        return entry
 
 
-def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: bool = False) -> None:
+def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
     """Write a level's `frame` as a GLB.
 
     Args:
         name: of the root node.
-        draco: keep the meshes' Draco bytes (KHR_draco_mesh_compression, which then is required).
 
     Raises:
         UserError: if there is no such frame.
@@ -107,8 +98,7 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
     textures = level.frame(frame)
     for place, index in enumerate(reversed(range(level.num_layers))):
         label = f"layer_{index:02d}"
-        data = layer_bytes(level.folder, level.entry.layers[index]) if draco else None
-        primitive = builder.primitive(level.layers[index], data) | {"material": place}
+        primitive = builder.primitive(level.layers[index]) | {"material": place}
         meshes.append({"name": label, "primitives": [primitive]})
         images.append({"name": label, "mimeType": "image/png", "bufferView": builder.view(_png(textures[index]))})
         materials.append(_material(label, place))
@@ -117,11 +107,9 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0, draco: b
     if level.track is not None:
         nodes.append({"name": "head", "children": children, **_pose(level.track, frame)})
         children = [count]
-    used = [UNLIT, *([DRACO] if draco else [])]
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
-        "extensionsUsed": used,
-        **({"extensionsRequired": [DRACO]} if draco else {}),
+        "extensionsUsed": [UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [len(nodes)]}],
         "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": children}],

@@ -7,7 +7,6 @@ frames changed, only their parts are encoded. Then packets are copied into one f
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,31 +27,22 @@ from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
 from facefolds_core.files import atomic_file
 
-ENCODER_BYTES = 200
-"""A pixel that an encoder takes, about: x264's preset slow looks 50 pictures ahead, and keeps 4 bytes a pixel of each.
-Measured, 512 x 512 to 1536 x 2048; longer parts take no more."""
-PADDING = 64
-"""Pixels that x264 adds to each side of a picture, both ends together."""
 PICTURES_AHEAD = 2
 """That are made on a thread of their own while one is encoded."""
 
 
 @dataclass
 class Parts:
-    """Where encoded parts are kept, and how many encoders may run.
+    """Where encoded parts are kept, and which of them this run asked for.
 
     Attributes:
         folder: of the files, named by what they are made of.
         common: digest of the code that makes pictures.
-        memory: bytes for the encoders that run side by side; one always does.
-        most: so many run side by side; 0: as many as there are cores and memory for.
         used: names of those that this run asked for.
     """
 
     folder: Path
     common: bytes
-    memory: int
-    most: int = 1
     used: set[str] = field(default_factory=set)
 
     def path(self, digest: str, codec: Codec) -> Path:
@@ -60,11 +50,6 @@ class Parts:
         name = f"{digest}.{codec.container}"
         self.used.add(name)
         return self.folder / name
-
-    def encoders(self, size: tuple[int, int]) -> int:
-        """How many run side by side on pictures of `size`."""
-        each = ENCODER_BYTES * (size[0] + PADDING) * (size[1] + PADDING)
-        return max(1, min(self.most or os.cpu_count() or 1, self.memory // each))
 
     def tidy(self) -> None:
         """Remove the parts that this run did not ask for."""
@@ -136,8 +121,7 @@ def encode_parts(
                 encode_video(temporary, pictures, filmed.size, filmed.rate, codec, options, regions)
         return found
 
-    with ThreadPoolExecutor(parts.encoders(filmed.size)) as pool:
-        files = list(pool.map(part, [range(first, after) for first, after in pairwise(borders)]))
+    files = [part(range(first, after)) for first, after in pairwise(borders)]
     if len(files) == 1:
         shutil.copyfile(files[0], path)
     else:

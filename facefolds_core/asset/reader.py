@@ -181,6 +181,11 @@ class Asset:
         """As `AssetLevel.camera_in_head`."""
         return self.full.camera_in_head(camera, time)
 
+    @property
+    def windows(self) -> list[Window]:
+        """As `AssetLevel.windows`."""
+        return self.full.windows
+
     def reflection(self) -> ReflectionMaps | None:
         """As `AssetLevel.reflection`."""
         return self.full.reflection()

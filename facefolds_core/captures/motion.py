@@ -18,6 +18,12 @@ from facefolds_core.spill import by_rows, running_mean
 
 Array = NDArray[np.float64]
 
+MUCH_TURN = 2.0
+"""`stabilize: auto` stabilises where the head turns by more in any frame, against its mean pose, degrees."""
+
+MUCH_SHIFT = 0.02
+"""It does so, too, where the head shifts by more, as a share of the tracked mesh's largest extent."""
+
 
 @dataclass(frozen=True)
 class HeadMotion:
@@ -60,12 +66,17 @@ def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity,
     track = own_track(poses, _middles(vertices))
     size = float(np.ptp(vertices, axis=1).max(1).mean())
     found = {"degrees": float(track.degrees().max()), "shift": _shift(track, vertices) / max(size, 1e-12)}
-    much = found["degrees"] > params.motion.degrees or found["shift"] > params.motion.shift
+    much = is_much(**found)
     if params.stabilize is False or len(frames) < 2:
         return HeadMotion(None, (fact("head_turns_unheeded", **found),) if much else ())
     if params.stabilize is True or much:
         return HeadMotion(track, (fact("head_turns", **found, source=source),))
     return HeadMotion(None, ())
+
+
+def is_much(degrees: float, shift: float) -> bool:
+    """Whether a head that turns and shifts so far does not stand still."""
+    return degrees > MUCH_TURN or shift > MUCH_SHIFT
 
 
 def in_head(vertices: Array, track: Track | None, first: int = 0) -> Array:

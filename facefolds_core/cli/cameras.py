@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,9 +71,3 @@ def _from_file(path: Path) -> Camera:
     if not sound:
         raise UserError("no camera in the file", file=path, expected="K, w2c, width and height", remedy=remedy)
     return Camera(path.stem, K, w2c, width, height)
-
-
-def enlarged(camera: Camera, factor: int) -> Camera:
-    """The same view in `factor` times as many pixels a side."""
-    K = np.diag([factor, factor, 1.0]) @ camera.K
-    return replace(camera, K=K, width=factor * camera.width, height=factor * camera.height)

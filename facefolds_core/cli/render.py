@@ -23,9 +23,10 @@ from facefolds_core.asset.filmed import direction_of, swing_filmed, unfilmed_wor
 from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
-from facefolds_core.cli.cameras import enlarged, named_camera
+from facefolds_core.cli.cameras import named_camera
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_file
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VideoCodec
 from facefolds_core.rendering.camera_paths import (
     SIDEWAYS,
@@ -39,6 +40,7 @@ from facefolds_core.rendering.camera_paths import (
 )
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.pixels import SIDE, finer, pixel_means
 
 FILM_RATE = Fraction(30)
 """Pictures a second of a film whose asset has fewer than `OWN_RATE` frames a second: a camera that moves less often
@@ -137,9 +139,7 @@ def pick_level(asset: Asset, name: str | None) -> AssetLevel:
 
 def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
     """(samples H, samples W, 3) in [0, 1] -> (H, W, 3) bytes, means of samples x samples pixels."""
-    height, width = rgb.shape[0] // samples, rgb.shape[1] // samples
-    means = rgb.reshape(height, samples, width, samples, 3).mean((1, 3))
-    return np.asarray(np.rint(np.clip(means, 0, 1) * 255), np.uint8)
+    return np.asarray(np.rint(np.clip(pixel_means(rgb, samples), 0, 1) * 255), np.uint8)
 
 
 def far_enough(asset: Asset, eyes: Sequence[Eye], width: int, height: int, field_of_view: float) -> float:
@@ -215,7 +215,7 @@ def command(
         float | None,
         typer.Option(help="Degrees to each side, of a turntable. Left out: 55, or as far as was filmed."),
     ] = None,
-    samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
+    samples: Annotated[int, typer.Option(help="A pixel is the mean of samples x samples rays.", min=1, max=4)] = SIDE,
     reflection: Annotated[bool, typer.Option(help="With the reflection, where the asset has one.")] = True,
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
     camera: Annotated[
@@ -265,15 +265,16 @@ def command(
         away = far_enough(read, turns, width, height, field_of_view) if distance is None else distance
         with OpenGLRenderer(shown, Glossy.of(shown) if reflection else None) as renderer:
 
+            def shot(camera: Camera, index: int) -> NDArray[np.uint8]:
+                return shrink(renderer.render(finer(camera, samples), index, colour)[0], samples)
+
             def picture(eye: Eye, index: int) -> NDArray[np.uint8]:
                 far = replace(eye, distance=away * eye.distance)
-                camera = camera_of(far, samples * width, samples * height, field_of_view)
-                return shrink(renderer.render(camera, index, colour)[0], samples)
+                return shot(camera_of(far, width, height, field_of_view), index)
 
             with atomic_file(out) as temporary:
                 if given is not None:
-                    still = shrink(renderer.render(enlarged(given, samples), frame, colour)[0], samples)
-                    Image.fromarray(still).save(temporary)
+                    Image.fromarray(shot(given, frame)).save(temporary)
                 elif kind is Kind.STILL:
                     Image.fromarray(picture(start, frame)).save(temporary)
                 else:

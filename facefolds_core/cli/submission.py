@@ -31,6 +31,7 @@ from facefolds_core.files import atomic_file
 from facefolds_core.progress import progress
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.pixels import SIDE, finer
 
 HIDDEN = ("222200046", "222200037", "222200039")
 RATE = 73
@@ -49,7 +50,7 @@ def command(
     camera: Annotated[list[str] | None, typer.Option(help="Serial; the benchmark's three if left out.")] = None,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")] = "1100x1604",
     background: Annotated[str, typer.Option(help="Colour behind the subject, #rrggbb.")] = "#ffffff",
-    samples: Annotated[int, typer.Option(help="Anti-aliasing: samples x samples a pixel.", min=1, max=4)] = 2,
+    samples: Annotated[int, typer.Option(help="A pixel is the mean of samples x samples rays.", min=1, max=4)] = SIDE,
     level: Annotated[str | None, typer.Option(help="Level of detail by name; the full one if left out.")] = None,
 ) -> None:
     """Film an asset from cameras of its capture's calibration that have no pictures, and pack the films."""
@@ -71,7 +72,7 @@ def command(
         films = {}
         with OpenGLRenderer(shown, Glossy.of(shown)) as renderer, tempfile.TemporaryDirectory() as folder:
             for one in cameras_of(capture, camera or HIDDEN, (width, height)):
-                larger = one.transformed(to_scene).resized(samples * width, samples * height)
+                larger = finer(one.transformed(to_scene), samples)
                 bar = progress(range(shown.num_frames), desc=f"camera {one.name}", unit="picture")
                 pictures = (shrink(renderer.render(larger, k, colour)[0], samples) for k in bar)
                 film = Path(folder) / f"cam_{one.name}.mp4"

@@ -27,11 +27,14 @@ from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.hit_codes import encode
-from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.rendering.raster import cast_mesh
 
-_USUAL = BakeParams()
+DAMPING = 0.05
+"""Added to a texel's sum of weights: what is hardly seen hardly moves."""
+
+MIN_LIGHT = 0.001
+"""Layers behind less transmittance are left out of the fit."""
 
 Image = NDArray[np.uint8]
 Codes = NDArray[np.uint16]
@@ -122,13 +125,10 @@ class Baker:
         sheets: that they came from.
         rays: of the training cameras.
         size: texels a side of the shipped textures.
-        params: `damping` and `min_light` of the steps.
     """
 
-    def __init__(
-        self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int, params: BakeParams = _USUAL
-    ) -> None:
-        self.rays, self._params = rays, params
+    def __init__(self, meshes: Sequence[TexturedMesh], sheets: Sheets, rays: Rays, size: int) -> None:
+        self.rays = rays
         self._positions = [reprojection(mesh, sheets, size) for mesh in meshes]
         self._sums: Float = np.zeros((len(meshes), size, size, 6), np.float32)
 
@@ -149,8 +149,8 @@ class Baker:
         values = moved.astype(np.float32) / np.float32(255)
         shown = values.copy()
         for _ in range(iterations):
-            accumulate(self.rays.shipped, target, shown, self._sums, self._params.min_light)
-            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), self._params.damping, shown.reshape(-1, 4))
+            accumulate(self.rays.shipped, target, shown, self._sums, MIN_LIGHT)
+            update(values.reshape(-1, 4), self._sums.reshape(-1, 6), DAMPING, shown.reshape(-1, 4))
         return np.stack([_finished(image) for image in shown])
 
 

@@ -16,13 +16,39 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import ChoiceParams, MeshChoiceParams, TextureChoiceParams
 from facefolds_core.rendering import Hits, composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reflection import reflected_colours
 from facefolds_core.spacing import spread
 
 Texture = NDArray[np.uint8]
+
+CAMERAS = 4
+"""Cameras that are looked at, evenly spread: those for validation where there are any."""
+
+FRAMES = 2
+"""Frames of each camera, evenly spread."""
+
+RAYS = 20_000
+"""Pixels of each picture, at most, drawn at random."""
+
+OPAQUE = 0.9
+"""Pixels count where the finest candidate is at least so opaque."""
+
+FIDELITY = 42.5
+"""Least PSNR of a candidate's pictures to those of the finest one, dB."""
+
+MESHES = (16, 24, 32, 48, 64)
+"""R^m that are tried."""
+
+MESH_LOSS = 0.1
+"""Largest loss of PSNR against the photos of the meshes that are taken, to the best ones', dB."""
+
+TEXELS = (128, 192, 256, 384, 512)
+"""R^t that are tried, below that of the samples, which is tried, too."""
+
+TEXEL_LOSS = 0.05
+"""Largest loss of PSNR of the textures that are taken, to the best ones', dB. The codec adds a loss of its own."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +66,14 @@ class Look:
     photo: NDArray[np.float64]
 
 
-def looks_of(scene: Scene, params: ChoiceParams) -> tuple[Split, list[Look]]:
+def looks_of(scene: Scene) -> tuple[Split, list[Look]]:
     """Pictures of cameras and frames, evenly spread; those of cameras for validation, where there are any."""
     split: Split = "validate" if "validate" in scene.splits else "train"
     store = scene.open_frames()
     looks = []
-    for camera in spread(scene.indices(split), params.cameras, ends=False):
+    for camera in spread(scene.indices(split), CAMERAS, ends=False):
         seen = [k for k in range(scene.num_frames) if (camera, k) in store]
-        for k in spread(seen, params.frames, ends=False):
+        for k in spread(seen, FRAMES, ends=False):
             looks.append(Look(scene.camera_in_head(camera, k), k, store.image(camera, k) / 255.0))
     return split, looks
 
@@ -81,7 +107,7 @@ def _least(
     candidates: Sequence[int],
     pictures: Callable[[int], list[Picture]],
     photos: Sequence[NDArray[np.float64]],
-    params: ChoiceParams,
+    within: float,
 ) -> tuple[int, dict[str, Any]]:
     """From the finest down to the first that is not good enough: the one before it, and what was measured. The finest
     where no pixel counts.
@@ -89,10 +115,11 @@ def _least(
     Args:
         pictures: of a candidate, one a look.
         photos: (M, 3) of each look, at the same pixels.
+        within: largest loss of PSNR to the best candidate, dB.
     """
     finest, *coarser = sorted(candidates, reverse=True)
     best = pictures(finest)
-    seen = [alpha[0] > params.opaque for _, alpha in best]
+    seen = [alpha[0] > OPAQUE for _, alpha in best]
     if not any(at.any() for at in seen):  # nothing says that less would do
         coarser = []
 
@@ -105,7 +132,7 @@ def _least(
     for c in coarser:
         found = pictures(c)
         psnr[c], fidelity[c] = decibels(found, photos), decibels(found, [rgb[0] for rgb, _ in best])
-        if max(psnr.values()) - psnr[c] > params.within or fidelity[c] < params.fidelity:
+        if max(psnr.values()) - psnr[c] > within or fidelity[c] < FIDELITY:
             break
         chosen = c
     return chosen, {
@@ -124,21 +151,20 @@ def choose_meshes(
     ladder: Mapping[int, Sequence[TexturedMesh]],
     grids: Grids,
     textures: FrameStore,
-    params: MeshChoiceParams,
 ) -> tuple[int, Fact]:
-    """R^m: the least of `params.candidates` that is good enough, and why.
+    """R^m: the least of `MESHES` that is good enough, and why.
 
     Args:
         ladder: of each candidate the meshes of all layers.
         grids, textures: as they were sampled.
     """
-    split, looks = looks_of(scene, params)
-    rng, finest = np.random.default_rng(0), ladder[max(params.candidates)]
+    split, looks = looks_of(scene)
+    rng, finest = np.random.default_rng(0), ladder[max(MESHES)]
     images = {look.frame: _images(textures, look.frame) for look in looks}
     pixels, photos = list[NDArray[np.intp]](), list[NDArray[np.float64]]()
     for look in looks:
         hits = cast_layers(look.camera, finest)
-        pixels.append(hits.choose(rng, params.rays))
+        pixels.append(hits.choose(rng, RAYS))
         photos.append(_photo(scene, look, hits, pixels[-1], images[look.frame], grids))
 
     def pictures(candidate: int) -> list[Picture]:
@@ -147,26 +173,24 @@ def choose_meshes(
             for look, at in zip(looks, pixels, strict=True)
         ]
 
-    chosen, found = _least("decimate.resolution", params.candidates, pictures, photos, params)
+    chosen, found = _least("decimate.resolution", MESHES, pictures, photos, MESH_LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
 
 
-def choose_texels(
-    scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore, params: TextureChoiceParams
-) -> tuple[int, Fact]:
-    """R^t: the least of `params.candidates` that is good enough, and why; none is finer than the samples.
+def choose_texels(scene: Scene, meshes: Sequence[TexturedMesh], grids: Grids, textures: FrameStore) -> tuple[int, Fact]:
+    """R^t: the least of `TEXELS` that is good enough, and why; none is finer than the samples.
 
     Args:
         meshes: of all layers.
         grids, textures: as they were sampled.
     """
-    candidates = sorted({c for c in params.candidates if c < textures.height} | {textures.height})
-    split, looks = looks_of(scene, params)
+    candidates = sorted({c for c in TEXELS if c < textures.height} | {textures.height})
+    split, looks = looks_of(scene)
     rng, near, photos = np.random.default_rng(0), list[Hits](), list[NDArray[np.float64]]()
     images = {look.frame: _images(textures, look.frame) for look in looks}
     for look in looks:
         hits = cast_layers(look.camera, meshes)
-        pixels = hits.choose(rng, params.rays)
+        pixels = hits.choose(rng, RAYS)
         near.append(hits.at(pixels))
         photos.append(_photo(scene, look, hits, pixels, images[look.frame], grids))
 
@@ -174,7 +198,7 @@ def choose_texels(
         small = {k: [resample(image, candidate) for image in frame] for k, frame in images.items()}
         return [composite(hits, small[look.frame]) for hits, look in zip(near, looks, strict=True)]
 
-    chosen, found = _least("texture.resolution", candidates, pictures, photos, params)
+    chosen, found = _least("texture.resolution", candidates, pictures, photos, TEXEL_LOSS)
     return chosen, fact("resolution_chosen", **found, views=len(looks), split=split)
 
 

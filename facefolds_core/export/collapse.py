@@ -22,42 +22,49 @@ from facefolds_core.export.refit import refit_radii
 from facefolds_core.export.sheets import Array, sheet_faces, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import DecimateParams
 from facefolds_core.rendering.compositing import transmittance_before
 
-_USUAL = DecimateParams()
+MEASURED_LAYERS = 3
+"""Layers that the error is measured on."""
+
+MIN_VISIBILITY = 0.05
+"""Least share of its opacity that a place counts with, however much lies before it."""
+
+EMPTY_WEIGHT = 0.001
+"""Weight of a place without opacity."""
+
+MIN_AREA = 0.001
+"""Least area of a triangle, as a share of half a grid cell."""
+
+MARGIN = 2
+"""Triangles this near, in samples, to a place that shows are kept."""
 
 
-def decimate_sheets(sheets: Sheets, max_vertices: int, params: DecimateParams = _USUAL) -> list[TexturedMesh]:
+def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
     """Meshes of all layers, outermost first, over one triangulation.
 
     A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
     frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
     """
-    return decimated_ladder(sheets, [max_vertices], params)[max_vertices]
+    return decimated_ladder(sheets, [max_vertices])[max_vertices]
 
 
-def decimated_ladder(
-    sheets: Sheets, counts: Sequence[int], params: DecimateParams = _USUAL
-) -> dict[int, list[TexturedMesh]]:
+def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
     """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
     st, uv, faces = sheets.st.reshape(-1, 2), vertex_uv(sheets), sheet_faces(sheets)
-    by = params.collapse
-    groups = np.array_split(np.arange(sheets.num_layers), min(by.measured_layers, sheets.num_layers))
-    shows = contribution(sheets.opacity, by.min_visibility)
+    groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
+    shows = contribution(sheets.opacity, MIN_VISIBILITY)
     weights = np.stack([shows[group].sum(0).reshape(-1) for group in groups], -1)
     points = np.stack([_positions(sheets, int(group[len(group) // 2]), uv) for group in groups], 1)
-    quadrics = build_quadrics(points, faces, weights[faces].max(1) + by.empty_weight)
+    quadrics = build_quadrics(points, faces, weights[faces].max(1) + EMPTY_WEIGHT)
     cell = (st.max(0) - st.min(0)).prod() / (len(sheets.st) - 1) ** 2
     targets = sorted(set(counts), reverse=True)
     borders = _borders(len(sheets.st))
-    left = collapse(
-        st, sheets.chart.unrolled(uv), borders, points, faces, quadrics, np.array(targets), by.min_area * cell
-    )
-    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * by.margin + 1, 2 * by.margin + 1))
+    left = collapse(st, sheets.chart.unrolled(uv), borders, points, faces, quadrics, np.array(targets), MIN_AREA * cell)
+    opaque = maximum_filter(sheets.opacity > 0, (1, 2 * MARGIN + 1, 2 * MARGIN + 1))
     near = np.ascontiguousarray(opaque.transpose(1, 2, 0))
     return {
-        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], uv, params)
+        target: _meshes(sheets, shows, near, corners[corners[:, 0] >= 0], uv)
         for target, corners in zip(targets, left, strict=True)
     }
 
@@ -68,10 +75,9 @@ def _meshes(
     near: NDArray[np.bool_],
     faces: NDArray[np.int64],
     uv: Array,
-    params: DecimateParams,
 ) -> list[TexturedMesh]:
     """The layers over a triangulation, radii fitted, what holds nothing left out."""
-    fitted = refit_radii(sheets, shows, faces, uv, params.refit)
+    fitted = refit_radii(sheets, shows, faces, uv)
     kept = covers(faces, len(sheets.st), near)
     meshes = []
     for layer in range(sheets.num_layers):

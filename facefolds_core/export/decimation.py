@@ -28,7 +28,8 @@ from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_st
 from facefolds_core.params import DecimateParams
 from facefolds_core.progress import progress as progress_bar
 
-_USUAL = DecimateParams()
+AGGRESSIVENESS = (3, 5, 7)
+"""Of the simplification, tried in turn until the target is reached."""
 
 FLAT = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
@@ -71,14 +72,14 @@ def decimate_layers(
         )
     meshes = []
     for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
-        coarse = decimate(surface, resolution**2, grids.chart, params.aggressiveness)
+        coarse = decimate(surface, resolution**2, grids.chart)
         if len(coarse.faces) == 0:
             raise UserError(
                 "decimation left nothing of a layer",
                 place=f"layer {i} (0 is the outermost), R^m {resolution}",
                 expected="at least one triangle",
                 found=f"{len(surface.faces)} triangles before, none after",
-                remedy="raise this R^m where it stands: decimate.resolution, decimate.auto.candidates or a level's "
+                remedy="raise this R^m where it stands: decimate.resolution or a level's "
                 "mesh_resolution in compress.levels",
             )
         st = layer_st(coarse.vertices, grids, i, params.uv)
@@ -86,16 +87,14 @@ def decimate_layers(
     return meshes
 
 
-def decimate(
-    surface: Surface, max_vertices: int, chart: Chart, aggressiveness: Sequence[float] = _USUAL.aggressiveness
-) -> Surface:
+def decimate(surface: Surface, max_vertices: int, chart: Chart) -> Surface:
     """Collapse edges until at most `max_vertices` vertices are left; drop faces that turned over or lost their area.
 
     Layers are level sets that the chart's rays meet once, so every face looks along them.
     """
     vertices, faces = surface.vertices.astype(np.float64), surface.faces.astype(np.intp)
     # Euler: an open sheet has F = 2 V - 2 - B triangles, B its border vertices, a few times sqrt(V) after decimation.
-    for attempt in aggressiveness:
+    for attempt in AGGRESSIVENESS:
         target = min(2 * max_vertices, len(surface.faces))
         while len(vertices) > max_vertices and target > 0:
             found, index = fast_simplification.simplify(

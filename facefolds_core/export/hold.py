@@ -22,34 +22,38 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.export.bake import MIN_LIGHT
 from facefolds_core.export.hold_kernel import add_weights, hold
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.params import BakeParams
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.spacing import spread
 
-_USUAL = BakeParams()
+LOOKED_AT = 6
+"""Frames in which it is looked how much a texel shows, evenly spread; the greatest counts."""
+
+WINDOW = 96
+"""Longest run of frames that are held together. Longer takes are held in overlapping windows."""
+
+MEMORY = 32 << 20
+"""For a window's frames of one layer, bytes; larger ones go through a file."""
 
 
-def texel_weights(
-    codes: NDArray[np.uint16], textures: FrameStore, cameras: int, params: BakeParams = _USUAL
-) -> NDArray[np.float32]:
+def texel_weights(codes: NDArray[np.uint16], textures: FrameStore, cameras: int) -> NDArray[np.float32]:
     """(N, S, S, 2): W of colour and of alpha.
 
     Args:
         codes: (P, N, 2) rays of all training cameras (`bake.Rays.shipped`).
         textures: layered frame store.
         cameras: how many those are.
-        params: how many frames are looked at, evenly spread; the greatest weight counts.
     """
     layers, frames = (sorted({key[i] for key in textures.keys()}) for i in (0, 1))  # noqa: SIM118
     weights = np.zeros((len(layers), textures.height, textures.width, 2), np.float32)
-    for frame in spread(frames, params.hold_frames):
+    for frame in spread(frames, LOOKED_AT):
         sums = np.zeros_like(weights)
         images = np.stack([textures.image(n, frame) for n in layers]).astype(np.float32)
-        add_weights(codes, images, sums, params.min_light)
+        add_weights(codes, images, sums, MIN_LIGHT)
         np.maximum(weights, sums / np.float32(cameras), out=weights)
     return weights
 
@@ -72,8 +76,8 @@ def held_rows(
     weights: NDArray[np.float32],
     price: float,
     folder: Path,
-    memory: int,
-    window: int = _USUAL.hold_window,
+    memory: int = MEMORY,
+    window: int = WINDOW,
     kept: KeptFrames | None = None,
     progress: bool = True,
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:

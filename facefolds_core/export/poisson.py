@@ -27,6 +27,15 @@ from facefolds_core.geometry.sphere_uv import row_strides
 from facefolds_core.params import ReconstructParams
 from facefolds_core.progress import progress as progress_bar
 
+POINT_WEIGHT = 4.0
+"""Weight of the samples (screening)."""
+
+TRIM = 2.0
+"""Vertices farther than this many local sample spacings from the samples are removed."""
+
+TRIM_EDGES = 1.5
+"""Vertices within this many mean edges of the samples stay."""
+
 MIN_SAMPLES = 16
 """Fewer valid samples than this make no surface."""
 
@@ -155,16 +164,16 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Reco
             found=len(samples.points),
             remedy="raise sample.resolution or reconstruct.resolution, or train longer or with fewer layers",
         )
-    vertices, faces = screened_poisson(samples.points, samples.normals, params.depth, params.point_weight)
+    vertices, faces = screened_poisson(samples.points, samples.normals, params.depth)
     if len(faces):
-        vertices, faces = trim(vertices, faces, samples, params)
+        vertices, faces = trim(vertices, faces, samples)
     if len(faces) == 0:
         raise UserError(
             "Poisson reconstruction gave no surface near the samples",
             place=place,
             expected="a sheet through the samples",
             found="nothing",
-            remedy="raise reconstruct.depth or reconstruct.trim, or look at the layer's samples in samples/grids.npz",
+            remedy="raise reconstruct.depth, or look at the layer's samples in samples/grids.npz",
         )
     faces = _outward(vertices, faces, samples)
     distance, nearest = cKDTree(samples.points).query(vertices)
@@ -174,7 +183,7 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Reco
     return Reconstruction(Surface(vertices.astype(np.float32), faces.astype(np.int32)), error, boundary_loops(faces))
 
 
-def screened_poisson(points: Array, normals: Array, depth: int, point_weight: float) -> tuple[Array, NDArray[np.intp]]:
+def screened_poisson(points: Array, normals: Array, depth: int) -> tuple[Array, NDArray[np.intp]]:
     """Screened Poisson surface of oriented points (M, 3): vertices (V, 3) and faces (F, 3), not trimmed.
 
     Raises:
@@ -193,7 +202,7 @@ def screened_poisson(points: Array, normals: Array, depth: int, point_weight: fl
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=points, v_normals_matrix=normals))
     try:
         meshes.generate_surface_reconstruction_screened_poisson(
-            depth=depth, pointweight=point_weight, samplespernode=1.5, scale=1.1, threads=1, preclean=False
+            depth=depth, pointweight=POINT_WEIGHT, samplespernode=1.5, scale=1.1, threads=1, preclean=False
         )
     except pymeshlab.PyMeshLabException:
         # Samples that bound nothing (all in one point, say): the caller says what that means.
@@ -202,22 +211,19 @@ def screened_poisson(points: Array, normals: Array, depth: int, point_weight: fl
     return np.asarray(mesh.vertex_matrix(), np.float64), np.asarray(mesh.face_matrix(), np.intp)
 
 
-def trim(
-    vertices: Array, faces: NDArray[np.intp], samples: Samples, params: ReconstructParams
-) -> tuple[Array, NDArray[np.intp]]:
+def trim(vertices: Array, faces: NDArray[np.intp], samples: Samples) -> tuple[Array, NDArray[np.intp]]:
     """Keep what lies near the samples, and of that the largest component.
 
     Args:
         vertices, faces: (V, 3), (F, 3) of the closed surface.
-        params: how far from the nearest sample a vertex may stay.
 
     Returns:
         vertices and faces, the latter possibly none.
     """
     edges = vertices[faces[:, 1]] - vertices[faces[:, 0]]
-    least = params.trim_edges * float(np.linalg.norm(edges, axis=-1).mean())
+    least = TRIM_EDGES * float(np.linalg.norm(edges, axis=-1).mean())
     distance, nearest = cKDTree(samples.points).query(vertices)
-    near = distance <= np.maximum(params.trim * samples.spacing[nearest], least)
+    near = distance <= np.maximum(TRIM * samples.spacing[nearest], least)
     return compact(vertices, largest_component(faces[near[faces].all(1)], len(vertices)))
 
 

@@ -23,10 +23,18 @@ from facefolds_core.export.cover_kernel import locate
 from facefolds_core.export.sheets import Array
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.sphere_uv import st_to_uv
-from facefolds_core.params import RefitParams
+
+STAY = 0.1
+"""Pull towards the sample's own radius, as a share of what the samples around a vertex weigh."""
+
+MIN_COSINE = 0.02
+"""Least cosine that is reckoned with between a normal and the direction to c."""
+
+EMPTY_WEIGHT = 0.0001
+"""Weight of a place that never shows."""
 
 
-def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Array, params: RefitParams) -> Sheets:
+def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Array) -> Sheets:
     """The same sheets with new radii at the vertices that `faces` use, nested as before.
 
     Args:
@@ -44,12 +52,12 @@ def refit_radii(sheets: Sheets, shows: Array, faces: NDArray[np.int64], uv: Arra
     fitted = np.empty((sheets.num_layers, len(used)))
     for layer, radii in enumerate(sheets.radii.reshape(sheets.num_layers, -1).astype(np.float64)):
         cosines = radial_cosines(sheets, layer).reshape(-1)
-        weight = shows[layer].reshape(-1) + params.empty_weight
-        weights = (weight * np.maximum(cosines, params.min_cosine) ** 2)[inside]
+        weight = shows[layer].reshape(-1) + EMPTY_WEIGHT
+        weights = (weight * np.maximum(cosines, MIN_COSINE) ** 2)[inside]
         values, wanted = _linear(shares, slides, below, radii[corners], radii[inside])
         matrix = csr_matrix((values.reshape(-1), columns, rows), shape=(len(corners), len(used)))
         normal = matrix.T @ diags(weights) @ matrix
-        stay = diags(params.stay * normal.diagonal() + 1e-6)
+        stay = diags(STAY * normal.diagonal() + 1e-6)
         right = matrix.T @ (weights * wanted) + stay @ (1 / radii[used])
         fitted[layer] = 1 / spsolve((normal + stay).tocsc(), right)
     result = sheets.radii.reshape(sheets.num_layers, -1).copy()

@@ -28,17 +28,20 @@ from facefolds_core.source_code import digest_of_packages
 DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
 
+LEAST = 512
+"""Least R that `sample.resolution: auto` takes."""
+
 Array = NDArray[np.float64]
 
 
-def samples_for(model: LayeredModel, window: Window, least: int) -> int:
+def samples_for(model: LayeredModel, window: Window) -> int:
     """R of `sample.resolution: auto`: no texel of the model over the window is lost, up to 4096."""
     grid = model.texel_grid()
     if grid is None:
-        return least
+        return LEAST
     own, (rows, columns) = grid.window, grid.shape
     height, width = (window[1] - window[0]) / (own[1] - own[0]), (window[3] - window[2]) / (own[3] - own[2])
-    return max(least, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
+    return max(LEAST, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
 
 
 def sample_grids(model: LayeredModel, resolution: int, window: Window, progress: bool = True) -> Grids:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
-from facefolds_core.export.choosing import choose_meshes, choose_texels
+from facefolds_core.export.choosing import MESHES, choose_meshes, choose_texels
 from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
@@ -37,6 +37,12 @@ from facefolds_core.source_code import digest_of_packages
 
 TEXTURES = "textures.arrow"
 """Name of a frame store of textures, N layers x K frames, in its folder."""
+
+SAMPLED_VIEWS = 3
+"""Frames of each training camera that the window is looked for in, where the head turns."""
+
+BAKED_VIEWS = 2
+"""Poses that each training camera is given to fit the textures to, where the head turns."""
 
 Surfaces = Sheets | list[Surface]
 """Of all layers, outermost first: the sampled grids themselves, or triangle surfaces."""
@@ -73,8 +79,8 @@ def sample_model(
     from facefolds_core.export.window import visible_window
 
     among = keys if params.opacity == "key_frames" else None
-    window = visible_window(model, cameras, params.auto_window, among) if params.window == "auto" else model.window
-    r = samples_for(model, window, params.least) if params.resolution == "auto" else params.resolution
+    window = visible_window(model, cameras, among=among) if params.window == "auto" else model.window
+    r = samples_for(model, window) if params.resolution == "auto" else params.resolution
     grids = sample_grids(model, r, window)
     opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
@@ -114,11 +120,9 @@ def decimate_all(
         levels: R^m of the coarser levels.
     """
     given = params.resolution
-    tried = params.auto.candidates if given == "auto" else (given,)
+    tried = MESHES if given == "auto" else (given,)
     ladder = decimate(surfaces, grids, params, sorted({*tried, *levels}))
-    chosen, why = (
-        (given, None) if given != "auto" else choose_meshes(scene, ladder, grids, FrameStore(samples), params.auto)
-    )
+    chosen, why = (given, None) if given != "auto" else choose_meshes(scene, ladder, grids, FrameStore(samples))
     return Decimated(ladder[chosen], {r: ladder[min(r, chosen)] for r in levels}, why)
 
 
@@ -127,7 +131,7 @@ def texels_for(
 ) -> tuple[int, Fact | None]:
     """R^t, and how it was chosen; None where it was given. `samples`: see `decimate_all`."""
     if params.resolution == "auto":
-        return choose_texels(scene, meshes, grids, FrameStore(samples), params.auto)
+        return choose_texels(scene, meshes, grids, FrameStore(samples))
     return params.resolution, None
 
 
@@ -136,7 +140,7 @@ def decimate(
 ) -> dict[int, list[TexturedMesh]]:
     """R^m -> every layer with at most R^m x R^m vertices, and texture coordinates; `params.resolution` is not read."""
     if isinstance(surfaces, Sheets):
-        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions], params)
+        ladder = decimated_ladder(surfaces, [r**2 for r in resolutions])
         return {r: ladder[r**2] for r in resolutions}
     return {r: decimate_layers(surfaces, grids, r, params) for r in resolutions}
 
@@ -175,10 +179,9 @@ def bake(
     baked = FrameStore(path)
     if params.hold > 0 and any(frame > 0 for _, frame in baked):
         baked = FrameStore(path.rename(folder / "baked.arrow"))
-        weights = texel_weights(rays, baked, len(cameras), params)
-        memory = params.hold_megabytes << 20
+        weights = texel_weights(rays, baked, len(cameras))
         earlier = KeptFrames(None if kept is None else kept.with_name(f"{kept.name}_held"))
-        rows = held_rows(baked, weights, params.hold, folder, memory, params.hold_window, earlier)
+        rows = held_rows(baked, weights, params.hold, folder, kept=earlier)
         write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
         earlier.keep(path)
         baked.path.unlink()
@@ -200,7 +203,7 @@ def _fit(
     sheets = grid_sheets(grids, None).sheets
     _check_match(meshes, sheets, textures, samples)
     rays = gather_rays(cameras, meshes, sheets)
-    baker = Baker(meshes, sheets, rays, textures.height, params)
+    baker = Baker(meshes, sheets, rays, textures.height)
     shape = (textures.height, textures.width, 4)
     frames = sorted({frame for _, frame in textures})
     with progress(total=len(frames), desc="bake", unit="frame") as bar:
@@ -223,7 +226,7 @@ def digest_of_input(
     cameras: Sequence[Camera], grids: Grids, meshes: Sequence[TexturedMesh], params: BakeParams
 ) -> bytes:
     """Of all that every frame is fitted with, and of the code that does it."""
-    parts: dict[str, Any] = {"iterations": params.iterations, "damping": params.damping, "light": params.min_light}
+    parts: dict[str, Any] = {"iterations": params.iterations}
     parts |= {f"grids {name}": value for name, value in vars(grids).items() if isinstance(value, np.ndarray)}
     for i, mesh in enumerate(meshes):
         parts |= {f"mesh {i} {name}": value for name, value in vars(mesh).items()}

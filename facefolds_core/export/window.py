@@ -19,19 +19,27 @@ from numpy.typing import NDArray
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import AutoWindowParams
 from facefolds_core.spacing import spread
 
-_USUAL = AutoWindowParams()
+MAX_CHANGE = 1 / 255
+"""Largest change of a ray's colour by what the window leaves out: one step of an 8-bit image."""
+
+RAYS_PER_CAMERA = 2500
+"""Rays of the lattice laid over each image, at most."""
+
+FRAMES = 3
+"""Frames that are looked at, evenly spread."""
+
+MARGIN = 2.0
+"""Margin on each side, in steps of the lattice of rays on the surface."""
 
 
 def visible_window(
     model: LayeredModel,
     cameras: Sequence[Camera],
-    params: AutoWindowParams = _USUAL,
     among: Sequence[int] | None = None,
 ) -> Window:
-    """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `max_change`.
+    """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `MAX_CHANGE`.
 
     Args:
         model: looked at without its view branch, in its first, middle and last frame.
@@ -42,14 +50,14 @@ def visible_window(
         the window, cut to the model's; the model's if it is transparent everywhere.
     """
     known = range(model.num_frames) if among is None else sorted(among)
-    frames = spread(known, params.frames)
+    frames = spread(known, FRAMES)
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for camera in cameras:
-        stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / params.rays_per_camera)))
-        seen, step = _seen_uv(model, camera, stride, frames, params.max_change)
+        stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / RAYS_PER_CAMERA)))
+        seen, step = _seen_uv(model, camera, stride, frames)
         if len(seen):
             low, high = np.minimum(low, seen.min(0)), np.maximum(high, seen.max(0))
-            margin = max(margin, params.margin * step)
+            margin = max(margin, MARGIN * step)
     if not np.isfinite(low).all():
         return model.window
     least, most = np.array(model.window).reshape(2, 2).T
@@ -66,11 +74,11 @@ def removed_weight(model: LayeredModel, camera: Camera, stride: int, frame: int,
 
 
 def _seen_uv(
-    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int], max_change: float
+    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int]
 ) -> tuple[NDArray[np.float64], float]:
     """(u, v) (M, 2) of the crossings that count, and the distance of neighbouring rays on the surface, in (u, v)."""
     uv, weights, hit, points = _crossings(model, camera, stride, frames)
-    seen = hit & (weights > max_change / model.num_layers)
+    seen = hit & (weights > MAX_CHANGE / model.num_layers)
     if not seen.any():
         return np.zeros((0, 2)), 0.0
     footprint = stride / min(camera.K[0, 0], camera.K[1, 1])

@@ -63,11 +63,6 @@ class Track:
         """The frame that stands nearest to the head's own frame: the least sum of turn (radians) and shift (units)."""
         return int((np.radians(self.degrees()) + np.linalg.norm(self.translations, axis=1)).argmin())
 
-    def resampled(self, factor: int) -> Track:
-        """At `factor` times the rate; after the last frame nothing is known, it is held."""
-        poses = [self.at(k / factor) for k in range(factor * len(self))]
-        return Track.of([pose.rotation for pose in poses], [pose.translation for pose in poses])
-
     def problems(self, frames: int) -> list[str]:
         """What is wrong with a track of so many frames, in words."""
         if self.quaternions.shape != (frames, 4) or self.translations.shape != (frames, 3):

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +25,18 @@ from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture
 from facefolds_core.spacing import spread
 
+LEAST = 0.01
+"""What shows less than this share of what shows most counts as that much: someone may look from elsewhere."""
+
+CAMERAS = 24
+"""Training cameras that are looked through, evenly spread."""
+
+FRAMES = 3
+"""Frames, evenly spread; the one counts in which a place shows most."""
+
+RAYS_PER_CAMERA = 16_000
+"""Rays of each camera that hit anything, drawn once."""
+
 Weights = NDArray[np.float64]
 """(rows, columns), mean W of the texels of each macroblock of the picture."""
 
@@ -38,19 +49,18 @@ def regions_of(content: LevelContent, cameras: Sequence[Camera], params: Attenti
     """
     if params.strength == 0 or not cameras:
         return nowhere
-    lock, known = Lock(), dict[tuple[int, ...], tuple[Region, ...]]()
+    known = dict[tuple[int, ...], tuple[Region, ...]]()
     views = list[_View]()
 
     def of(frames: range) -> Sequence[Region]:
-        chosen = tuple(spread(range(content.frames), params.frames))
+        chosen = tuple(spread(range(content.frames), FRAMES))
         if params.of == "segment" and content.part_frames:
             chosen = (frames[len(frames) // 2],)
-        with lock:
-            if not views:
-                views.extend(_views(content, cameras, params))
-            if chosen not in known:
-                known[chosen] = tuple(merged(offsets(_block_weights(content, views, chosen), params)))
-            return known[chosen]
+        if not views:
+            views.extend(_views(content, cameras))
+        if chosen not in known:
+            known[chosen] = tuple(merged(offsets(_block_weights(content, views, chosen), params.strength)))
+        return known[chosen]
 
     return of
 
@@ -59,19 +69,19 @@ _View = tuple[Hits, float]
 """Where chosen rays of a camera hit the layers, and how many pixels that do stand for each."""
 
 
-def _views(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> list[_View]:
-    chosen = spread(cameras, params.cameras)
+def _views(content: LevelContent, cameras: Sequence[Camera]) -> list[_View]:
+    chosen = spread(cameras, CAMERAS)
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
         cast = cast_layers(camera, meshes)
-        pixels = cast.choose(rng, params.rays_per_camera)
+        pixels = cast.choose(rng, RAYS_PER_CAMERA)
         views.append((cast.at(pixels), int(cast.hit.any(2).sum()) / max(1, len(pixels))))
     return views
 
 
-def block_weights(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Weights:
+def block_weights(content: LevelContent, cameras: Sequence[Camera]) -> Weights:
     """W of each macroblock: the greatest over some frames, of the sum over the pixels of some cameras."""
-    return _block_weights(content, _views(content, cameras, params), spread(range(content.frames), params.frames))
+    return _block_weights(content, _views(content, cameras), spread(range(content.frames), FRAMES))
 
 
 def _block_weights(content: LevelContent, views: Sequence[_View], frames: Sequence[int]) -> Weights:
@@ -112,17 +122,17 @@ def _add_weights(
         behind = alpha[:, n, None] * rgba[:, n, :3] + (1 - alpha[:, n, None]) * behind
 
 
-def offsets(weights: Weights, params: AttentionParams) -> NDArray[np.int64]:
+def offsets(weights: Weights, strength: float) -> NDArray[np.int64]:
     """Steps of the quantiser for each macroblock, about none in the (geometric) mean of what shows.
 
-    What shows less than `least` of what shows most (the 95th percentile) is treated as if it showed as much: someone
+    What shows less than `LEAST` of what shows most (the 95th percentile) is treated as if it showed as much: someone
     may look from where no camera stood.
     """
     if not (weights > 0).any():
         return np.zeros(weights.shape, np.int64)
-    floor = params.least * float(np.quantile(weights[weights > 0], 0.95))
+    floor = LEAST * float(np.quantile(weights[weights > 0], 0.95))
     logs = np.log2(np.maximum(weights, floor))
-    steps = -params.strength * (logs - logs[weights > floor].mean())
+    steps = -strength * (logs - logs[weights > floor].mean())
     return np.asarray(np.clip(np.rint(steps), -QUANTISERS, QUANTISERS), np.int64)
 
 

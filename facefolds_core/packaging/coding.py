@@ -13,25 +13,21 @@ from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.packaging import rate
 from facefolds_core.packaging.attention import regions_of
 from facefolds_core.packaging.meshbits import resolved
-from facefolds_core.packaging.rate import search_crf
-from facefolds_core.packaging.views import ViewMeter
-from facefolds_core.params import CompressParams, CrfSearchParams, VideoCodec
+from facefolds_core.packaging.views import FRAMES, ViewMeter
+from facefolds_core.params import CompressParams, VideoCodec
 from facefolds_core.spacing import spread
 
 
-def make_meter(content: LevelContent, cameras: Sequence[Camera], params: CompressParams) -> ViewMeter | None:
+def make_meter(content: LevelContent, cameras: Sequence[Camera]) -> ViewMeter | None:
     """The yardstick of the content's own textures and meshes; None without cameras."""
     if not cameras:
         return None
-    wanted = params.meter.frames
-    frames = {
-        *spread(range(content.frames), wanted),
-        *spread(range(min(content.frames, params.search.frames)), wanted),
-    }
+    frames = {*spread(range(content.frames), FRAMES), *spread(range(min(content.frames, rate.FRAMES)), FRAMES)}
     meshes = [layer.mesh for layer in content.layers]
-    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames}, params.meter)
+    return ViewMeter(meshes, cameras, {frame: content.frame(frame) for frame in frames})
 
 
 def coded_level(
@@ -53,10 +49,8 @@ def coded_level(
     video, crfs = params.video, None
     regions = nowhere if video.lossless else regions_of(content, cameras, params.attention)
     if meter is not None and video.target_psnr is not None and not video.lossless:
-        search, target = params.search, video.target_psnr
-        crfs = {
-            codec: _crf(folder, content, regions, CODECS[codec], video, meter, target, search) for codec in video.codec
-        }
+        target = video.target_psnr
+        crfs = {codec: _crf(folder, content, regions, CODECS[codec], video, meter, target) for codec in video.codec}
     level = write_level(folder, name, content, params, crfs, shared, regions)
     if meter is None:
         return level
@@ -74,16 +68,15 @@ def _crf(
     video: VideoCodec,
     meter: ViewMeter,
     target: float,
-    search: CrfSearchParams,
 ) -> int:
     layout = content.layout
     with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
         path = Path(scratch) / f"trial.{codec.container}"
 
         def quality(crf: int) -> float:
-            content.encode(path, codec, video, crf, min(content.frames, search.frames), regions)
+            content.encode(path, codec, video, crf, min(content.frames, rate.FRAMES), regions)
             pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
             wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
             return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
 
-        return search_crf(quality, target, codec.crf(video.crf), codec.worst_crf, search).crf
+        return rate.search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf

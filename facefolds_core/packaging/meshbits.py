@@ -11,17 +11,20 @@ from facefolds_core.asset.cropping import CroppedLayer
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import MeshCodec
 
+MOST = 20
+"""Bits, at most."""
+
 
 def resolved(codec: MeshCodec, layers: Sequence[CroppedLayer], cameras: Sequence[Camera]) -> MeshCodec:
     """The codec with numbers of bits that keep `max_error_pixels`; as it is where none is asked for."""
     if codec.max_error_pixels is None or not cameras:
         return codec
-    bits = position_bits(layers, cameras, codec.max_error_pixels, codec.max_bits)
-    st_bits = texture_coordinate_bits(layers, codec.max_error_pixels, codec.max_bits)
+    bits = position_bits(layers, cameras, codec.max_error_pixels)
+    st_bits = texture_coordinate_bits(layers, codec.max_error_pixels)
     return codec.model_copy(update={"quantization_bits": bits, "texture_coordinate_bits": st_bits})
 
 
-def position_bits(layers: Sequence[CroppedLayer], cameras: Sequence[Camera], pixels: float, most: int) -> int:
+def position_bits(layers: Sequence[CroppedLayer], cameras: Sequence[Camera], pixels: float) -> int:
     """The fewest bits with which no vertex in front of a camera moves by more than `pixels` in its picture.
 
     A position moves by at most h = E / (2^b - 1) / 2 along each axis, E the longest side of the layer's box: by
@@ -41,15 +44,15 @@ def position_bits(layers: Sequence[CroppedLayer], cameras: Sequence[Camera], pix
             away = np.minimum(away, math.hypot(camera.width, camera.height))
             slopes = (focal + away) / depth[ahead]
             worst = max(worst, extent * float(slopes.max(initial=0)))
-    return _bits(math.sqrt(3) * worst / 2, pixels, most)
+    return _bits(math.sqrt(3) * worst / 2, pixels)
 
 
-def texture_coordinate_bits(layers: Sequence[CroppedLayer], texels: float, most: int) -> int:
+def texture_coordinate_bits(layers: Sequence[CroppedLayer], texels: float) -> int:
     """The fewest bits with which no texture coordinate moves by more than `texels` along s or t."""
     worst = max(float(np.ptp(layer.mesh.st, axis=0).max()) * max(layer.crop[2:]) for layer in layers)
-    return _bits(worst / 2, texels, most)
+    return _bits(worst / 2, texels)
 
 
-def _bits(range_: float, allowed: float, most: int) -> int:
-    """The least b with range_ / (2^b - 1) <= allowed, at most `most`."""
-    return min(most, max(1, math.ceil(math.log2(range_ / allowed + 1))))
+def _bits(range_: float, allowed: float) -> int:
+    """The least b with range_ / (2^b - 1) <= allowed, at most `MOST`."""
+    return min(MOST, max(1, math.ceil(math.log2(range_ / allowed + 1))))

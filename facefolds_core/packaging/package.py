@@ -32,7 +32,6 @@ from facefolds_core.asset.writer import (
 )
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.export.between import at_frame_rate
 from facefolds_core.export.stores import Grids
 from facefolds_core.files import atomic_folder, file_sha256
 from facefolds_core.frame_store import FrameStore
@@ -47,6 +46,12 @@ from facefolds_core.packaging.views import training_cameras
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.spacing import spread
+
+POSTER_SIDE = 720
+"""Longer side of the poster, pixels; no more than the capture's pictures have."""
+
+JPEG_QUALITY = 92
+"""Of poster and photos, on JPEG's scale."""
 
 
 @dataclass(frozen=True)
@@ -93,21 +98,14 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
     """
     _check_order(params.levels)
     frames = check_inputs(export.meshes, export.windows, export.textures)
-    factor = params.frame_rate_factor if frames > 1 else 1
-    track = None if scene.poses is None else scene.poses.resampled(factor)
-    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, track)
-    cameras = training_cameras(scene)
-    with (
-        atomic_folder(folder) as temporary,
-        kept_parts(kept, temporary, params) as parts,
-        at_frame_rate(export.textures, factor, temporary, params.between) as textures,
-    ):
-        rate = source.fps * factor
-        streamed = is_streamed(params.stream, frames * factor, rate)
+    source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, scene.poses)
+    cameras, textures = training_cameras(scene), export.textures
+    with atomic_folder(folder) as temporary, kept_parts(kept, temporary) as parts:
+        streamed = is_streamed(params.stream, frames, source.fps)
         unit = stream_unit(params.levels, textures.image(0, 0).shape[0]) if streamed else 1
-        layers = crop_layers(export.meshes, export.windows, textures, frames * factor, unit)
-        full = LevelContent(layers, textures, frames * factor, rate, unit, parts=parts)
-        meter = make_meter(full, cameras, params)
+        layers = crop_layers(export.meshes, export.windows, textures, frames, unit)
+        full = LevelContent(layers, textures, frames, source.fps, unit, parts=parts)
+        meter = make_meter(full, cameras)
         levels = []
         if streamed:
             *levels, level = write_rungs(temporary, full, params, meter, cameras)
@@ -121,8 +119,8 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
             picture = ReflectionPicture.of(export.reflection)
             levels = [_with_reflection(temporary, one, picture) for one in levels]
             level = _with_reflection(temporary, level, picture)
-        photos = _photos(temporary, scene, params, factor)
-        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos, params)
+        photos = _photos(temporary, scene, params)
+        manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos)
         if streamed:
             made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
             manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
@@ -130,12 +128,11 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
 
 
 @contextmanager
-def kept_parts(kept: Path | None, scratch: Path, params: CompressParams) -> Iterator[Parts]:
+def kept_parts(kept: Path | None, scratch: Path) -> Iterator[Parts]:
     """Encoded parts in `kept`, of which those that this run needs stay; or in a folder of `scratch` that goes."""
     common = digest_of_packages("asset", "packaging", "export", "spacing").encode()
     with TemporaryDirectory(dir=scratch, prefix=".parts-") if kept is None else nullcontext(kept) as folder:
-        stream = params.stream
-        parts = Parts(Path(folder), common, stream.megabytes << 20, stream.encoders)
+        parts = Parts(Path(folder), common)
         yield parts
         parts.tidy()
 
@@ -160,9 +157,7 @@ def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> 
     return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 
-def _with_extras(
-    folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo], params: CompressParams
-) -> Manifest:
+def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequence[Photo]) -> Manifest:
     """Add sound, a poster, photos and the range that was filmed."""
     update: dict[str, object] = {"photos": tuple(photos)}
     if scene.audio is not None:
@@ -174,8 +169,8 @@ def _with_extras(
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
         update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
     path, first = folder / "poster.jpg", scene.cameras[0]
-    side = min(params.poster_side, max(first.width, first.height))
-    camera = write_poster(path, manifest, side, params.jpeg_quality)
+    side = min(POSTER_SIDE, max(first.width, first.height))
+    camera = write_poster(path, manifest, side, JPEG_QUALITY)
     update["poster"] = Poster(
         **_stored(path),
         width=camera.width,
@@ -187,19 +182,15 @@ def _with_extras(
     return manifest.model_copy(update=update)
 
 
-def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> list[Photo]:
-    """Photos of held-out cameras, each with its own frame, spread over the sequence.
-
-    Args:
-        factor: frames of the asset a frame of the scene.
-    """
+def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
+    """Photos of held-out cameras, each with its own frame, spread over the sequence."""
     if params.photos == 0:
         return []
     store, found = scene.open_frames(), []
     keys = [key for key in store if key[0] in scene.indices("holdout")]
     for index, key in enumerate(spread(keys, params.photos)):
         path = folder / f"photo_{index:02d}.jpg"
-        Image.fromarray(store.image(*key)).save(path, quality=params.jpeg_quality)
+        Image.fromarray(store.image(*key)).save(path, quality=JPEG_QUALITY)
         camera = scene.cameras[key[0]]
         found.append(
             Photo(
@@ -207,7 +198,7 @@ def _photos(folder: Path, scene: Scene, params: CompressParams, factor: int) -> 
                 width=camera.width,
                 height=camera.height,
                 camera=camera.name,
-                frame=key[1] * factor,
+                frame=key[1],
                 K=_rows(camera.K),
                 w2c=_rows(camera.w2c),
             )

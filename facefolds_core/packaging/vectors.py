@@ -1,9 +1,9 @@
 """Conformance vectors: tiny assets, cameras and the pictures that a player must show; and how near somebody's come.
 
 Made, not kept: the same on every machine, but for what float32 rounds. They have what players get wrong: sheets that
-fold before the eye (only the nearest crossing counts), half-transparent layers, texels unlike their neighbours,
-rectangles anywhere in the picture, two levels, a head that moves, a frame rate that is no whole number, and the same
-take once more as a stream in segments.
+fold before the eye (only the nearest crossing counts), half-transparent layers, texels unlike their neighbours, pixels
+that hold several texels, rectangles anywhere in the picture, two levels, a head that moves, a frame rate that is no
+whole number, and the same take once more as a stream in segments.
 """
 
 from __future__ import annotations
@@ -34,10 +34,14 @@ from facefolds_core.packaging.levels import Resampled
 from facefolds_core.packaging.rungs import write_rungs
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
 from facefolds_core.pictures import open_picture
+from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset
 
 ASSETS = ("short", "stream")
-VIEWS, REFERENCE = "views.json", "reference"
+VIEWS = "views.json"
+REFERENCE, POINTS = "reference", "reference_points"
+"""Folders of what must be shown: means over pixels; and what one ray through each pixel's centre sees."""
+RENDERERS = {REFERENCE: render, POINTS: render_asset}
 CENTRE = (-0.25, 0.0, 0.0)
 WINDOW: Window = (-0.5, 0.5, -0.45, 0.45)
 LAYERS, FRAMES, TEXELS, SIDE = 3, 6, 64, 128
@@ -46,7 +50,7 @@ BACKGROUND = (64 / 255, 128 / 255, 192 / 255)
 
 
 class Waves:
-    """Textures of the vectors: (TEXELS, TEXELS, 4), waves that move, with single texels that stand out."""
+    """Textures of the vectors: (TEXELS, TEXELS, 4), waves that move, with lines and single texels that stand out."""
 
     def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
         s, t = np.meshgrid(*[(np.arange(TEXELS) + 0.5) / TEXELS] * 2)
@@ -54,9 +58,10 @@ class Waves:
         red = 0.55 + 0.35 * np.sin(11 * s + 5 * t + phase)
         green = 0.5 + 0.3 * np.sin(9 * t - 2 * phase)
         blue = 0.45 + 0.3 * np.cos(10 * (s - t) + phase)
-        alpha = np.clip(1.5 - 3.1 * np.hypot(s - 0.5, t - 0.5), 0, 1) * (0.9, 0.5, 1.0)[layer]
+        alpha = np.clip(2.95 - 6 * np.hypot(s - 0.5, t - 0.5), 0, 1) * (0.9, 0.5, 1.0)[layer]
         rgba = np.stack([red, green, blue, alpha], -1)
         rgba[8::16, 8::16, :3] = 1 - rgba[8::16, 8::16, :3]
+        rgba[np.arange(TEXELS) // 2 % 4 == 1, :, :3] *= 0.35
         return np.asarray(np.rint(255 * np.clip(rgba, 0, 1)), np.uint8)
 
 
@@ -82,15 +87,17 @@ def source() -> AssetSource:
 
 
 def cameras() -> list[Camera]:
-    """From before, from the sides, from above and near, and one whose pixels are not square and whose centre is off."""
+    """From before, from the sides, from above and near; "odd" has pixels that are not square and its centre aside; of
+    "coarse" a pixel holds several texels, which one ray misses."""
     found = []
-    for name, azimuth, elevation, distance in (
-        ("front", 0, 0, 1.2),
-        ("left", 60, 5, 1.1),
-        ("right", -75, -10, 1.1),
-        ("above", 15, 45, 1.0),
-        ("near", -20, 0, 0.5),
-        ("odd", 30, 15, 1.3),
+    for name, azimuth, elevation, distance, side in (
+        ("front", 0, 0, 1.2, SIDE),
+        ("left", 60, 5, 1.1, SIDE),
+        ("right", -75, -10, 1.1, SIDE),
+        ("above", 15, 45, 1.0, SIDE),
+        ("near", -20, 0, 0.5, SIDE),
+        ("odd", 30, 15, 1.3, SIDE),
+        ("coarse", -40, 5, 1.2, SIDE // 4),
     ):
         a, e = np.radians([azimuth, elevation])
         outward = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -98,22 +105,23 @@ def cameras() -> list[Camera]:
         right /= np.linalg.norm(right)
         R = np.stack([right, np.cross(-outward, right), -outward])
         w2c = np.concatenate([R, -R @ (distance * outward)[:, None]], 1)
-        f = 1.3 * SIDE
-        K = np.array([[f, 0, SIDE / 2], [0, f, SIDE / 2], [0, 0, 1.0]])
+        f = 1.3 * side
+        K = np.array([[f, 0, side / 2], [0, f, side / 2], [0, 0, 1.0]])
         if name == "odd":
-            K[0, 0], K[0, 2], K[1, 2] = 1.2 * f, 0.4 * SIDE, 0.55 * SIDE
-        found.append(Camera(name, K, w2c, SIDE, SIDE))
+            K[0, 0], K[0, 2], K[1, 2] = 1.2 * f, 0.4 * side, 0.55 * side
+        found.append(Camera(name, K, w2c, side, side))
     return found
 
 
 def write_vectors(folder: Path) -> int:
-    """Write the assets, `views.json` and the pictures of `reference/`, whole or not at all; returns their number."""
+    """Write the assets, `views.json` and the pictures of both filters, whole or not at all; returns how many views."""
     if folder.exists() and any(folder.iterdir()) and not (folder / VIEWS).is_file():
         raise UserError("the folder is not empty, and holds no vectors", file=folder, remedy="name another folder")
     with atomic_folder(folder) as out:
         _write_short(out / "short")
         _write_stream(out / "stream")
-        (out / REFERENCE).mkdir()
+        for filtered in RENDERERS:
+            (out / filtered).mkdir()
         views = [
             view
             for name in ASSETS
@@ -121,7 +129,9 @@ def write_vectors(folder: Path) -> int:
             for view in _views(name, level.entry.name)
         ]
         for view in views:
-            Image.fromarray(_picture(read_asset(out / view["asset"]), view)).save(out / REFERENCE / view["file"])
+            for filtered in RENDERERS:
+                picture = _picture(read_asset(out / view["asset"]), view, filtered)
+                Image.fromarray(picture).save(out / filtered / view["file"])
         write_json(out / VIEWS, {"background": "#4080c0", "views": views})
     return len(views)
 
@@ -163,7 +173,7 @@ def _write_stream(folder: Path) -> None:
 def _views(asset: str, level: str) -> Iterator[dict[str, Any]]:
     """Of `short` all cameras in the first frame and some in others, of `stream` a few: what differs is in its files."""
     for index, camera in enumerate(cameras()):
-        if (asset, level) != ("short", FULL) and camera.name not in ("left", "odd"):
+        if (asset, level) != ("short", FULL) and camera.name not in ("left", "odd", "coarse"):
             continue
         for frame in (0,) if index % 2 else (0, 2, FRAMES - 1):
             pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": camera.width, "height": camera.height}
@@ -171,10 +181,10 @@ def _views(asset: str, level: str) -> Iterator[dict[str, Any]]:
             yield {"file": file, "asset": asset, "level": level, "frame": frame, "camera": camera.name, **pose}
 
 
-def _picture(asset: Asset, view: dict[str, Any]) -> NDArray[np.uint8]:
+def _picture(asset: Asset, view: dict[str, Any], filtered: str) -> NDArray[np.uint8]:
     level = next(level for level in asset.levels if level.entry.name == view["level"])
     camera = Camera(view["camera"], np.array(view["K"]), np.array(view["w2c"]), view["width"], view["height"])
-    rgb, _ = render_asset(level, camera, view["frame"], BACKGROUND)
+    rgb, _ = RENDERERS[filtered](level, camera, view["frame"], BACKGROUND)
     return np.asarray(np.rint(255 * np.clip(rgb, 0, 1)), np.uint8)
 
 
@@ -185,10 +195,16 @@ class Agreement:
     Attributes:
         file: its name.
         psnr: dB; None where there is no such picture, or it is of another size.
+        points: dB to what one ray through each pixel's centre sees.
     """
 
     file: str
     psnr: float | None
+    points: float | None
+
+    def reaches(self, least: float, points: bool = False) -> bool:
+        """Whether it comes as near as that (dB); with `points`, to either."""
+        return max(self.psnr or 0, (self.points or 0) if points else 0) >= least and self.psnr is not None
 
 
 def compare(folder: Path, pictures: Path) -> list[Agreement]:
@@ -199,11 +215,13 @@ def compare(folder: Path, pictures: Path) -> list[Agreement]:
     """
     try:
         views = json.loads((folder / VIEWS).read_text())["views"]
-    except (OSError, ValueError, KeyError):
+        next((folder / POINTS).iterdir())  # vectors made before there were two filters have none
+    except (OSError, ValueError, KeyError, StopIteration):
         remedy = "make them: `facefolds vectors FOLDER`"
         raise UserError("no conformance vectors", file=folder / VIEWS, remedy=remedy) from None
     return [
-        Agreement(view["file"], _psnr(folder / REFERENCE / view["file"], pictures / view["file"])) for view in views
+        Agreement(file, *(_psnr(folder / filtered / file, pictures / file) for filtered in (REFERENCE, POINTS)))
+        for file in (view["file"] for view in views)
     ]
 
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.params import MeterParams
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Hits, Texture, composite
 from facefolds_core.spacing import spread
@@ -24,7 +23,14 @@ Image = NDArray[np.float32]
 MAX_PSNR = 100.0
 """Of equal pictures, dB."""
 
-_USUAL = MeterParams()
+CAMERAS = 6
+"""Training cameras, evenly spread."""
+
+FRAMES = 3
+"""Frames, evenly spread."""
+
+RAYS_PER_CAMERA = 16_000
+"""Rays of each camera that hit anything, drawn once."""
 
 
 def training_cameras(scene: Scene) -> list[Camera]:
@@ -39,7 +45,6 @@ class ViewMeter:
         meshes: of the reference, outermost first.
         cameras: of which some, evenly spaced, are used.
         references: frame -> N textures of the reference.
-        params: how many cameras and rays.
         seed: of the choice of rays among those that hit anything.
     """
 
@@ -48,16 +53,15 @@ class ViewMeter:
         meshes: Sequence[TexturedMesh],
         cameras: Sequence[Camera],
         references: Mapping[int, Sequence[Texture]],
-        params: MeterParams = _USUAL,
         seed: int = 0,
     ) -> None:
-        self._cameras = spread(cameras, params.cameras)
+        self._cameras = spread(cameras, CAMERAS)
         rng = np.random.default_rng(seed)
         self._pixels: list[NDArray[np.intp]] = []
         hits = []
         for camera in self._cameras:
             cast = cast_layers(camera, meshes)
-            self._pixels.append(cast.choose(rng, params.rays_per_camera))
+            self._pixels.append(cast.choose(rng, RAYS_PER_CAMERA))
             hits.append(cast.at(self._pixels[-1]))
         self._hits = Hits.joined(hits)
         self.frames = sorted(references)

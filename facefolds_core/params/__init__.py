@@ -1,22 +1,18 @@
 """The sections of params.yaml and their keys: the only place that knows them, their units and their defaults.
 
-`params_file.load_params` reads the file. Nothing below `stages/` reads a raw dictionary of parameters, and no function
-below takes a number that somebody might tune from anywhere but a section (tests/core/test_constants.py).
+`params_file.load_params` reads the file. Nothing below `stages/` reads a raw dictionary of parameters. What nobody
+needs to change is a constant beside the code that uses it, with its reason.
 """
 
 from facefolds_core.params.base import Section, merged, nested, value_at
-from facefolds_core.params.capture import CaptureParams, MotionParams, NormalizeParams, RegistrationParams
-from facefolds_core.params.choice import ChoiceParams, MeshChoiceParams, TextureChoiceParams
+from facefolds_core.params.capture import CaptureParams, NormalizeParams
 from facefolds_core.params.compress import (
     AttentionParams,
-    BetweenParams,
     CodecName,
     CompressParams,
-    CrfSearchParams,
     GlbParams,
     LevelParams,
     MeshCodec,
-    MeterParams,
     StreamParams,
     VideoCodec,
 )
@@ -31,18 +27,15 @@ from facefolds_core.params.explicit import (
     MovingParams,
 )
 from facefolds_core.params.export import (
-    AutoWindowParams,
     BakeParams,
-    CollapseParams,
     DecimateParams,
     ReconstructParams,
-    RefitParams,
     SampleParams,
     TextureParams,
 )
 from facefolds_core.params.few_cameras import FewCameraParams
 from facefolds_core.params.matte import CutOutParams, MatteParams, OutlineParams, PlateParams, VoteParams
-from facefolds_core.params.mlp import MlpParams, MlpStartParams
+from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
@@ -66,17 +59,12 @@ __all__ = [
     "SECTIONS",
     "STAGE_SECTIONS",
     "AttentionParams",
-    "AutoWindowParams",
     "BackgroundParams",
     "BakeParams",
-    "BetweenParams",
     "CameraParams",
     "CaptureParams",
-    "ChoiceParams",
     "CodecName",
-    "CollapseParams",
     "CompressParams",
-    "CrfSearchParams",
     "CutOutParams",
     "DecimateParams",
     "DivergenceParams",
@@ -93,13 +81,9 @@ __all__ = [
     "LevelParams",
     "LossParams",
     "MatteParams",
-    "MeshChoiceParams",
     "MeshCodec",
     "MeshParams",
-    "MeterParams",
     "MlpParams",
-    "MlpStartParams",
-    "MotionParams",
     "MovingParams",
     "NormalizeParams",
     "OutlineParams",
@@ -108,9 +92,7 @@ __all__ = [
     "Preset",
     "PruningParams",
     "ReconstructParams",
-    "RefitParams",
     "ReflectionParams",
-    "RegistrationParams",
     "RoomParams",
     "SampleParams",
     "ScoreWarningParams",
@@ -120,7 +102,6 @@ __all__ = [
     "StreamParams",
     "Subject",
     "SubjectParams",
-    "TextureChoiceParams",
     "TextureParams",
     "TrainParams",
     "TrainSection",

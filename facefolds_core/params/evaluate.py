@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Natural, Pixels, Section, Share
+from facefolds_core.params.base import Count, Natural, Section, Share
 
 
 class ScoreWarningParams(Section):
@@ -31,20 +31,20 @@ class EvaluateParams(Section):
     sheet_frames: Count = 3
     """Frames of each held-out camera in the contact sheet, evenly spaced."""
 
-    band: Pixels = 4.0
+    band: ClassVar[float] = 4.0
     """Pixels to both sides of the outline that are scored apart."""
 
     films: bool = True
     """Film the held-out cameras, truth and asset side by side, for the report."""
 
-    film_crf: Annotated[int, Field(ge=0, le=51)] = 18
+    film_crf: ClassVar[int] = 18
     """Constant rate factor of the report's films, of libx264: smaller is finer."""
 
-    cvvdp_frames: Count = 60
+    cvvdp_frames: ClassVar[int] = 60
     """Frames of each camera that CVVDP judges, where it is installed, at most."""
 
     fresh_views: Natural = 0
     """New views of the embedded actor that are filmed and scored by their angle; 0 films none."""
 
-    warnings: ScoreWarningParams = ScoreWarningParams()
+    warnings: ClassVar[ScoreWarningParams] = ScoreWarningParams()
     """When scores are said not to be well."""

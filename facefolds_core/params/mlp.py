@@ -13,30 +13,9 @@ Depth = Annotated[int, Field(ge=1, le=1000)]
 Octaves = Annotated[int, Field(ge=0, le=24)]
 
 
-class MlpStartParams(Section):
-    """Where the manifolds start."""
-
-    iterations: Count = 600
-    """Steps of the regression onto the tracked mesh (`manifold_start: surface`)."""
-
-    points: Annotated[int, Field(ge=8, le=10_000_000)] = 4096
-    """Points in each of its steps."""
-
-    learning_rate: Rate = 5e-3
-    """Learning rate of the regression onto the tracked mesh."""
-
-    final_learning_rate: Rate = 1e-4
-    """Rate to which it falls along a cosine."""
-
-    margin: Annotated[float, Field(gt=0, le=10)] = 0.05
-    """The search ball reaches this far beyond the outermost level, units."""
-
-    fill: Annotated[float, Field(gt=0, le=1)] = 0.8
-    """Without a tracked mesh, share of the narrower half field of view that the subject fills."""
-
-
 class MlpParams(Section):
-    """Model `mlp`: level sets and textures by perceptrons. Its defaults are the paper's, the preset `paper`."""
+    """Model `mlp`: level sets and textures by perceptrons. Its defaults are the paper's, the preset `paper`. With
+    `device: auto` it takes CUDA where there is one."""
 
     preset: str = "paper"
     """Its values fill the keys that are not given: `paper` or `quick` for this model."""
@@ -62,23 +41,11 @@ class MlpParams(Section):
     manifold_start: Literal["sphere", "surface"] = "sphere"
     """ "sphere" (the paper's), or "surface": a short fit to the tracked mesh, where there is one."""
 
-    start: MlpStartParams = MlpStartParams()
-    """Where the manifolds start."""
-
-    manifold_layers: Depth = 3
-    """Hidden layers of the manifold predictor."""
-
     manifold_width: Width = 128
     """Neurons of each layer of the manifold predictor."""
 
     output_scale: Factor = 0.36
     """Factor on its output: how far a step moves the surfaces. Ours; a step then moves them as far as the paper's."""
-
-    input_scale: Factor = 6.0
-    """Factor on its input (x - c). Ours: larger values follow a face more closely."""
-
-    initial_alpha_logit: Annotated[float, Field(ge=-20, le=20)] = -1.5
-    """Bias of the opacity at the start, before the sigmoid. Ours: all layers are seen."""
 
     texture_layers: Depth = 8
     """Hidden layers of the texture predictor."""
@@ -86,17 +53,8 @@ class MlpParams(Section):
     texture_width: Width = 256
     """Neurons of each layer of the texture predictor."""
 
-    latent_dim: Width = 32
-    """Numbers in a frame's latent."""
-
     uv_frequencies: Octaves = 10
     """Octaves of the positional encoding of u and v."""
-
-    level_frequencies: Octaves = 4
-    """Octaves of the encoding of the level."""
-
-    view_frequencies: Octaves = 4
-    """Octaves of the encoding of the viewing direction."""
 
     search_samples: Annotated[int, Field(ge=8, le=65_536)] = 256
     """Samples a ray for the first crossings, M."""
@@ -110,17 +68,8 @@ class MlpParams(Section):
     lr_texture: Rate = 1e-3
     """Initial learning rate of the textures."""
 
-    decay_manifold: Annotated[float, Field(gt=0, le=1)] = 0.05
-    """Factor by which the manifolds' rate falls each `decay_interval` iterations."""
-
-    decay_texture: Annotated[float, Field(gt=0, le=1)] = 0.20
-    """Factor by which the textures' rate falls each `decay_interval` iterations."""
-
     decay_interval: Count = 200_000
-    """Iterations over which rates fall by these factors."""
-
-    lambda_view: Weight = 1.0
-    """Weight of the mean |view term|^2."""
+    """Iterations over which rates fall to 0.05 (manifolds) and 0.2 (textures) of themselves."""
 
     lambda_reg: Weight = 1e-4
     """Weight of the sum of |manifold weights|^2."""

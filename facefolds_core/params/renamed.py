@@ -1,15 +1,100 @@
-"""Keys of params.yaml that have another name now: section -> old key -> new key."""
+"""Keys of params.yaml that are no more, and what took their place: the remedy of the message that refuses them."""
 
 from __future__ import annotations
 
-EXPLICIT: dict[str, str] = {
-    "level_halfwidth": "geometry.halfwidth",
-    "lr_texture": "textures.learning_rate",
-    "lr_volume": "volume.learning_rate",
-    "lambda_veil": "losses.opacity",
-    "lambda_solid": "losses.binarisation",
+RENAMED: dict[str, str] = {
+    "train.level_halfwidth": "train.geometry.halfwidth",
+    "train.lr_texture": "train.textures.learning_rate",
+    "train.lr_volume": "train.volume.learning_rate",
+    "train.lambda_veil": "train.losses.opacity",
+    "train.lambda_solid": "train.losses.binarisation",
+    "train.mattes": "matte",
 }
-"""Of `train`, model `explicit`; until 0.1."""
+"""Old key -> new key or section; until 0.1 the names of the model `explicit`."""
 
-MOVED: dict[str, str] = {"mattes": "matte"}
-"""Key of `train`, model `explicit` -> the section that has become of it."""
+FIXED: dict[str, str] = {
+    "capture.seed": "captures/actor/render.py",
+    "normalize.motion": "captures/motion.py",
+    "normalize.registration": "training/registration.py",
+    "train.manifold_layers": "training/loop.py",
+    "train.input_scale": "training/loop.py",
+    "train.initial_alpha_logit": "training/loop.py",
+    "train.latent_dim": "training/loop.py",
+    "train.level_frequencies": "training/loop.py",
+    "train.view_frequencies": "training/loop.py",
+    "train.decay_manifold": "training/loop.py",
+    "train.decay_texture": "training/loop.py",
+    "train.lambda_view": "training/loop.py",
+    "train.segments.texel_bytes": "training/segments/forecast.py",
+    "train.segments.floor_megabytes": "training/segments/forecast.py",
+    "train.segments.texels_per_pixel": "training/segments/forecast.py",
+    "train.segments.process_seconds": "training/segments/forecast.py",
+    "train.segments.ray_nanoseconds": "training/segments/forecast.py",
+    "train.segments.free_share": "training/segments/forecast.py",
+    "train.segments.cameras": "training/segments/keys.py",
+    "train.segments.thumbnail": "training/segments/keys.py",
+    "train.segments.vertices": "training/segments/keys.py",
+    "train.segments.neighbours": "training/segments/keys.py",
+    "train.segments.blend": "training/segments/keys.py",
+    "train.segments.checkpoint_share": "params/segments.py",
+    "sample.least": "export/sampling.py",
+    "sample.auto_window": "export/window.py",
+    "reconstruct.point_weight": "export/poisson.py",
+    "reconstruct.trim": "export/poisson.py",
+    "reconstruct.trim_edges": "export/poisson.py",
+    "decimate.auto": "export/choosing.py",
+    "decimate.collapse": "export/collapse.py",
+    "decimate.refit": "export/refit.py",
+    "decimate.aggressiveness": "export/decimation.py",
+    "texture.auto": "export/choosing.py",
+    "bake.hold_window": "export/hold.py",
+    "bake.hold_megabytes": "export/hold.py",
+    "bake.hold_frames": "export/hold.py",
+    "bake.moving_views": "export/steps.py",
+    "bake.damping": "export/bake.py",
+    "bake.min_light": "export/bake.py",
+    "compress.mesh.max_bits": "packaging/meshbits.py",
+    "compress.poster_side": "packaging/package.py",
+    "compress.jpeg_quality": "packaging/package.py",
+    "compress.search": "packaging/rate.py",
+    "compress.meter": "packaging/views.py",
+    "compress.attention.least": "packaging/attention.py",
+    "compress.attention.cameras": "packaging/attention.py",
+    "compress.attention.frames": "packaging/attention.py",
+    "compress.attention.rays_per_camera": "packaging/attention.py",
+    "evaluate.band": "params/evaluate.py",
+    "evaluate.film_crf": "params/evaluate.py",
+    "evaluate.cvvdp_frames": "params/evaluate.py",
+    "evaluate.warnings": "params/evaluate.py",
+}
+"""Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
+
+GONE: dict[str, str] = {
+    "capture.fps": "she plays as fast as she was filmed; `subjects.NAME.fps` sets another rate",
+    "train.segments.rate": "frames are fitted at the base's rate",
+    "compress.frame_rate_factor": "an asset has the capture's frames",
+    "compress.between": "an asset has the capture's frames",
+    "compress.stream.encoders": "segments are encoded one after another, as each encoder uses all cores",
+    "compress.stream.megabytes": "segments are encoded one after another",
+    "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
+}
+"""Old key -> why nothing took its place."""
+
+
+def remedy_for(path: str) -> str | None:
+    """What to do about a key that is no more: "train.lr_texture"; None if there never was one."""
+    if path in RENAMED:
+        new = RENAMED[path]
+        section, _, inner = new.partition(".")
+        if section != path.partition(".")[0]:
+            return f"it is a section of its own now: write `{new}: {{...}}` beside `{path.partition('.')[0]}`"
+        return f"it is called `{inner}` now: write `{_yaml(inner)}`"
+    if path in FIXED:
+        return f"remove it: its value is fixed now, in facefolds_core/{FIXED[path]}"
+    return f"remove it: {GONE[path]}" if path in GONE else None
+
+
+def _yaml(path: str) -> str:
+    """ "losses.opacity" -> "losses: {opacity: ...}"."""
+    *folders, key = path.split(".")
+    return "".join(f"{folder}: {{" for folder in folders) + f"{key}: ..." + "}" * len(folders)

@@ -16,7 +16,7 @@ from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
 from facefolds_core.params.matte import MatteParams
-from facefolds_core.params.renamed import EXPLICIT, MOVED
+from facefolds_core.params.renamed import RENAMED, remedy_for
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 from facefolds_core.parsing import brief
 
@@ -84,14 +84,15 @@ def user_error(
     remedy = f"mend it; {REFERENCE} describes all keys"
     expected, found = first["msg"].removeprefix("Value error, "), brief(first["input"])
     if first["type"] == "extra_forbidden":
-        expected, remedy = _unknown_key(kind, names, remedy)
+        expected, mending = _unknown_key(kind, names)
+        remedy = mending or remedy
         found = brief(names[-1]) if len(names[-1]) > 100 else names[-1]
     where = ".".join([place, *names])
     return UserError("a parameter is wrong", file=file, place=where, expected=expected, found=found, remedy=remedy)
 
 
-def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[str, str]:
-    """What is expected instead of an unknown key, and what to do."""
+def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | None]:
+    """What is expected instead of an unknown key, and what to do about one that is no more, or of another model."""
     *folders, key = names
     holder = kind
     for name in folders:
@@ -100,23 +101,19 @@ def _unknown_key(kind: type[BaseModel], names: list[str], remedy: str) -> tuple[
     model = kind.model_fields["model"].default if "model" in kind.model_fields else None
     owner = f" of the model `{model}`" if model else ""
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
-    if kind is ExplicitParams and not folders and key in EXPLICIT:
-        return expected, f"it is called `{EXPLICIT[key]}` now: write `{_yaml(EXPLICIT[key])}`"
-    if kind is ExplicitParams and not folders and key in MOVED:
-        return expected, f"it is a section of its own now: write `{MOVED[key]}: {{...}}` beside `train`"
+    stage = next((stage for stage, kinds in SECTIONS.items() if kind in kinds), "")
+    path = ".".join([stage, *names])
+    if path not in RENAMED or kind is ExplicitParams:
+        mending = remedy_for(path)
+        if mending is not None:
+            return expected, mending
     for other in SECTIONS["train"] if model and not folders else ():
-        if key in {**other.model_fields, **(EXPLICIT if other is ExplicitParams else {})}:
+        if key in other.model_fields or (other is ExplicitParams and path in RENAMED):
             name = other.model_fields["model"].default
             presets = [preset for preset, one in PRESETS.items() if one.model == name]
             whose = f"preset{'s' * (len(presets) > 1)} {', '.join(presets)}"
             return expected, f"`{key}` is a key of the model `{name}` ({whose}): remove it; {_SHARED}"
-    return expected, remedy
-
-
-def _yaml(path: str) -> str:
-    """ "losses.opacity" -> "losses: {opacity: ...}"."""
-    *folders, key = path.split(".")
-    return "".join(f"{folder}: {{" for folder in folders) + f"{key}: ..." + "}" * len(folders)
+    return expected, None
 
 
 def _inner(kind: type[BaseModel], name: str) -> type[BaseModel] | None:

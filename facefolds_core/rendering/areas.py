@@ -1,5 +1,5 @@
 """Pictures as a camera takes them: each pixel the mean of its area, by SIDE x SIDE rays. Compiled; slow and plain is
-`reference.composite` of the camera `finer` has, followed by `pixel_means`, which tests hold this against.
+`pixels.render`, which tests hold this against.
 
 A photo's pixel is the mean of what falls on its square. One ray through the pixel's centre is not: the true surface of
 `mugsy` drawn so scores 36 and 33 dB against the photos, by 16 rays 44 and 42.
@@ -17,28 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.jit import compiled, kernel
+from facefolds_core.rendering.pixels import SIDE, Image, Lit, finer, lit_hits, pixel_means, strips_of
 from facefolds_core.rendering.raster import cast_layers
-from facefolds_core.rendering.reference import BLACK, Hits, Layered, room_from, seen_from
-from facefolds_core.rendering.reflection import reflected_colours
-
-Image = NDArray[np.float32]
-
-SIDE = 2
-"""Rays along each side of a pixel: see `docs/reference/metrics.md`, "areas", for how it was chosen."""
-
-ROWS_AT_ONCE = 64
-"""Rows of pixels that are cast together: bounds the memory."""
-
-
-def finer(camera: Camera, side: int = SIDE) -> Camera:
-    """The camera of a picture `side` times as large: its rays through pixel centres are those of the areas."""
-    return camera.resized(side * camera.width, side * camera.height)
-
-
-def pixel_means(image: Image, side: int = SIDE) -> Image:
-    """(side H, side W, ...) -> (H, W, ...): the mean of each pixel's rays."""
-    height, width = image.shape[0] // side, image.shape[1] // side
-    return np.asarray(image.reshape(height, side, width, side, *image.shape[2:]).mean((1, 3)), np.float32)
+from facefolds_core.rendering.reference import BLACK, Hits, Layered, seen_from
 
 
 @dataclass(frozen=True)
@@ -72,16 +53,15 @@ class AreaView:
         self.size, self.layers, self.side = size, layers, side
 
     @classmethod
-    def of_hits(cls, camera: Camera, hits: Callable[[Camera], tuple[Hits, Sequence[Image] | None]]) -> AreaView:
+    def of_hits(cls, camera: Camera, hits: Callable[[Camera], Lit]) -> AreaView:
         """Of a camera, and a function of cameras that finds hits and what is added to each layer's colours there."""
-        fine = finer(camera)
+        width = finer(camera).width
         parts: list[list[LayerHits]] = []
-        for top in range(0, fine.height, ROWS_AT_ONCE * SIDE):
-            rows = min(ROWS_AT_ONCE * SIDE, fine.height - top)
-            found, added = hits(window_of(fine, top, rows))
+        for top, strip in strips_of(camera):
+            found, added = hits(strip)
             parts.append(
                 [
-                    _layer(found, i, NOTHING if added is None else added[i], top * fine.width)
+                    _layer(found, i, NOTHING if added is None else added[i], top * width)
                     for i in range(found.hit.shape[2])
                 ]
             )
@@ -117,25 +97,9 @@ class AreaView:
         return seen + through[..., None] * np.asarray(background, np.float32), 1 - through
 
 
-def window_of(camera: Camera, top: int, rows: int) -> Camera:
-    """Some rows of a camera's picture as a camera of its own."""
-    shifted = camera.K.copy()
-    shifted[1] -= top * camera.K[2]
-    return Camera(camera.name, shifted, camera.w2c, camera.width, rows)
-
-
 def view_of(asset: Layered, camera: Camera, frame: float = 0) -> AreaView:
     """What a camera of the world sees of an asset's full level in `frame`, with its track and its reflection."""
-    reflection: Any = getattr(asset, "reflection", None)
-    maps = None if reflection is None else reflection()
-    windows: Any = getattr(asset, "windows", None)
-
-    def hits(part: Camera) -> tuple[Hits, Sequence[Image] | None]:
-        found = cast_layers(part, asset.layers)
-        if maps is None:
-            return found, None
-        return found, reflected_colours(found, part, windows, maps, room_from(asset, frame))
-
+    hits = lit_hits(asset, frame, lambda part: cast_layers(part, asset.layers))
     return AreaView.of_hits(seen_from(asset, camera, frame), hits)
 
 

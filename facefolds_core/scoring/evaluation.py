@@ -35,7 +35,8 @@ from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.posed import PosedView
 from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
-from facefolds_core.scoring.training_views import TrainingView, training_views
+from facefolds_core.scoring.training_scores import TrainingView
+from facefolds_core.scoring.training_views import training_views
 from facefolds_core.scoring.truths import MatteKind, Truth, Truths
 from facefolds_core.spacing import spread
 

@@ -15,7 +15,8 @@ from facefolds_core.model import RadianceManifolds
 from facefolds_core.model.compositing import compositing_weights
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.intersection import Crossings
-from facefolds_core.rendering.areas import AreaView, finer, pixel_means
+from facefolds_core.rendering.areas import AreaView
+from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.rendering.reference import Hits
 
 Image = NDArray[np.float32]
@@ -28,7 +29,7 @@ CROSSINGS_AT_ONCE = 65_536
 
 class ModelView:
     """The surfaces stand still, so the crossings of a camera's rays are found once and serve all frames. Each pixel is
-    the mean of its area (`rendering.areas`).
+    the mean of its area (`rendering.pixels`).
 
     `render` shows what `RadianceManifolds.render` shows, both of its variants from one evaluation of the textures.
 

@@ -22,7 +22,7 @@ from facefolds_core.scoring.films import FilmFile
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import HEADLINES, Panel
 from facefolds_core.scoring.patches import WorstPatch
-from facefolds_core.scoring.training_views import TrainingView
+from facefolds_core.scoring.training_scores import TrainingView
 
 VERSION = 1
 NAME = "analysis.json"

@@ -20,7 +20,7 @@ from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, ImageScore
 from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.temporal import Change
-from facefolds_core.scoring.training_views import TrainingView, bad_views, compared_by
+from facefolds_core.scoring.training_scores import TrainingView, bad_views, compared_by
 from facefolds_core.scoring.truths import MatteKind
 
 METRICS_VERSION = 2

@@ -12,10 +12,27 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import turn_of
-from facefolds_core.params import RegistrationParams
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
+
+STEPS = 12
+"""Gauss-Newton steps a scale, at most."""
+
+ENOUGH = 2e-5
+"""A scale ends with a smaller step than this, radians and units."""
+
+DAMPING = 0.001
+"""Added to the normal equations, as a share of their diagonal."""
+
+OUTLIER = 2.0
+"""Residual, in medians, at which a point counts half."""
+
+MIN_COSINE = 0.3
+"""Least cosine between a point's normal and the direction to the camera."""
+
+MIN_POINTS = 200
+"""A frame with fewer points gets no pose."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +72,6 @@ def refined(
     points: Sequence[Points],
     shown: Sequence[Picture],
     seen: Sequence[Array],
-    params: RegistrationParams,
 ) -> tuple[Similarity, float]:
     """Gauss-Newton steps at one scale; the pose and the correlation there.
 
@@ -64,17 +80,17 @@ def refined(
         seen: of each camera (P,), features of its points in the reference frame.
     """
     likeness = 0.0
-    for _ in range(params.steps):
-        equations = Equations.of(pose, cameras, points, shown, seen, params)
-        if len(equations.residual) < params.min_points:
+    for _ in range(STEPS):
+        equations = Equations.of(pose, cameras, points, shown, seen)
+        if len(equations.residual) < MIN_POINTS:
             return pose, 0.0
         pull = equations.slopes.T @ (equations.weight * equations.residual)
-        move: Array = -np.linalg.solve(equations.normal(params), pull).astype(np.float64)
+        move: Array = -np.linalg.solve(equations.normal(), pull).astype(np.float64)
         turned = Similarity(1.0, turn_of(move[:3]), np.zeros(3))
         shift = equations.middle + move[3:] - turned.apply(equations.middle)
         pose = Similarity(1.0, turned.rotation, shift).after(pose)
         likeness = float(np.corrcoef(equations.value, equations.value - equations.residual)[0, 1])
-        if np.abs(move).max() < params.enough:
+        if np.abs(move).max() < ENOUGH:
             break
     return pose, likeness
 
@@ -105,25 +121,24 @@ class Equations:
         points: Sequence[Points],
         shown: Sequence[Picture],
         seen: Sequence[Array],
-        params: RegistrationParams,
     ) -> Equations:
         middle = pose.apply(np.concatenate([one.positions for one in points]).mean(0))
-        rows = [_rows(pose, middle, *one, params) for one in zip(cameras, points, shown, seen, strict=True)]
+        rows = [_rows(pose, middle, *one) for one in zip(cameras, points, shown, seen, strict=True)]
         slopes, depth, residual, value = (np.concatenate(parts) for parts in zip(*rows, strict=True))
         typical = float(np.median(np.abs(residual))) if len(residual) else 0.0
-        weight = 1 / (1 + (residual / (params.outlier * typical + 1e-9)) ** 2)
+        weight = 1 / (1 + (residual / (OUTLIER * typical + 1e-9)) ** 2)
         return cls(middle, slopes, depth, residual, value, weight)
 
-    def normal(self, params: RegistrationParams) -> Array:
+    def normal(self) -> Array:
         """(6, 6)."""
         normal = self.slopes.T @ (self.weight[:, None] * self.slopes)
-        return np.asarray(normal + np.diag(params.damping * np.diag(normal) + 1e-9))
+        return np.asarray(normal + np.diag(DAMPING * np.diag(normal) + 1e-9))
 
-    def along_rays(self, params: RegistrationParams) -> tuple[float, float]:
+    def along_rays(self) -> tuple[float, float]:
         """Curvature and slope of the squared error in a move along the rays, with the pose following (Schur)."""
         weighted = self.weight * self.depth
         cross = self.slopes.T @ weighted
-        follows = np.linalg.solve(self.normal(params), cross)
+        follows = np.linalg.solve(self.normal(), cross)
         pull = self.slopes.T @ (self.weight * self.residual)
         return float(weighted @ self.depth - cross @ follows), float(weighted @ self.residual - follows @ pull)
 
@@ -135,10 +150,9 @@ def _rows(
     points: Points,
     shown: Picture,
     seen: Array,
-    params: RegistrationParams,
 ) -> tuple[Array, Array, Array, Array]:
     """Slopes (P, 6), depth, residual and value (P,) of the points that this camera sees."""
-    use, pixels, there = _visible(pose, camera, points, params)
+    use, pixels, there = _visible(pose, camera, points)
     depth = camera.project(there)[1]
     values = look_up(shown, pixels)
     fx, fy = camera.K[0, 0], camera.K[1, 1]
@@ -155,9 +169,7 @@ def unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 
-def _visible(
-    pose: Similarity, camera: Camera, points: Points, params: RegistrationParams
-) -> tuple[NDArray[np.intp], Array, Array]:
+def _visible(pose: Similarity, camera: Camera, points: Points) -> tuple[NDArray[np.intp], Array, Array]:
     """Which of the moved points a camera sees; their pixels (P, 2) and places (P, 3)."""
     there = pose.apply(points.positions)
     normals = points.normals @ pose.rotation.T
@@ -165,5 +177,5 @@ def _visible(
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     pixels, depth = camera.project(there)
     inside = ((pixels >= 1) & (pixels <= [camera.width - 1, camera.height - 1])).all(1) & (depth > 0)
-    use = np.flatnonzero(inside & ((normals * towards).sum(1) > params.min_cosine))
+    use = np.flatnonzero(inside & ((normals * towards).sum(1) > MIN_COSINE))
     return use, pixels[use], there[use]

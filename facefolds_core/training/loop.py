@@ -9,6 +9,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -38,13 +39,32 @@ from facefolds_core.training.trained import Trained
 LOG_POINTS = 500
 """Lines in the log of a whole training, at least; never more than 100 iterations apart."""
 
+DECAY_MANIFOLD, DECAY_TEXTURE = 0.05, 0.20
+"""Factors by which the rates fall each `decay_interval` iterations: the paper's."""
+
+LAMBDA_VIEW = 1.0
+"""Weight of the mean |view term|^2: the paper's."""
+
+INITIAL_ALPHA_LOGIT = -1.5
+"""Bias of the opacity at the start, before the sigmoid. Ours: all layers are seen."""
+
+SHAPE: dict[str, Any] = {
+    "manifold_layers": 3,
+    "latent_dim": 32,
+    "level_frequencies": 4,
+    "view_frequencies": 4,
+    "input_scale": 6.0,
+}
+"""Of every model that is trained: the paper's, but for `input_scale`, the factor on x - c. Larger values follow a face
+more closely."""
+
 
 def learning_rates(params: MlpParams, iteration: int) -> dict[str, float]:
     """lr_0 decay^(iteration / interval): the paper's decay "of 0.05 and 0.20 per 200 000 iterations" as factors."""
     time_constant = iteration / params.decay_interval
     return {
-        "manifold": params.lr_manifold * params.decay_manifold**time_constant,
-        "texture": params.lr_texture * params.decay_texture**time_constant,
+        "manifold": params.lr_manifold * DECAY_MANIFOLD**time_constant,
+        "texture": params.lr_texture * DECAY_TEXTURE**time_constant,
     }
 
 
@@ -56,6 +76,7 @@ def model_spec(params: MlpParams, start: Start, num_frames: int, fingerprint: st
         radius=start.radius,
         num_frames=num_frames,
         fingerprint=fingerprint,
+        **SHAPE,
         **params.model_dump(include=shared),
     )
 
@@ -66,7 +87,7 @@ def new_state(params: MlpParams, spec: ModelSpec, device: torch.device) -> Train
         torch.manual_seed(params.seed)
         model = build_model(spec).to(device)
     if isinstance(model.textures, MlpTextures):
-        model.textures.start_alpha(params.initial_alpha_logit)
+        model.textures.start_alpha(INITIAL_ALPHA_LOGIT)
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
@@ -85,9 +106,7 @@ def train_step(state: TrainingState, sampler: RaySampler, params: MlpParams) -> 
     rates = learning_rates(params, state.iteration)
     for group in state.optimiser.param_groups:
         group["lr"] = rates[group["name"]]
-    losses = batch_losses(
-        state.model, sampler.draw(params.rays, state.generator), params.lambda_view, params.lambda_reg
-    )
+    losses = batch_losses(state.model, sampler.draw(params.rays, state.generator), LAMBDA_VIEW, params.lambda_reg)
     state.optimiser.zero_grad()
     losses.total.backward()
     # A parameter that this batch did not reach takes a step with gradient zero, so that Adam's state is always whole.
@@ -247,7 +266,7 @@ def _move_to_mesh(state: TrainingState, params: MlpParams, start: Start) -> None
     manifolds = state.model.manifolds
     if params.manifold_start == "surface" and start.outline is not None and isinstance(manifolds, MlpManifolds):
         began = time.perf_counter()
-        error = fit_outline(manifolds, start.outline, params.start, state.generator)
+        error = fit_outline(manifolds, start.outline, state.generator)
         state.seconds += time.perf_counter() - began
         print(f"train: manifolds start at the tracked mesh, mean error {error:.4f} units")
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from facefolds_core.captures.motion import in_head
+from facefolds_core.captures.motion import in_head, is_much
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
@@ -26,14 +26,36 @@ from facefolds_core.files import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
-from facefolds_core.params import ExplicitParams, NormalizeParams, RegistrationParams
+from facefolds_core.params import ExplicitParams, NormalizeParams
 from facefolds_core.progress import progress
 from facefolds_core.spill import by_rows
-from facefolds_core.training.alignment import Equations, Picture, Points, features, look_up, refined, unit
+from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
 from facefolds_core.training.volume.fit import Volume, iterations
 from facefolds_core.training.volume.search import find_subject
 
 Array = NDArray[np.float64]
+
+STRIDE = 3
+"""Every n-th pixel of the reference frame's pictures that shows the subject is a point."""
+
+SCALES = (0.032, 0.016, 0.008, 0.004)
+"""Blurs from coarse to fine, standard deviations as shares of the picture's shorter side."""
+
+ROUNDS = 3
+"""How often the depth of the points is corrected and all frames are aligned anew."""
+
+MAX_DEEPER = 0.01
+"""Largest correction of depth, units."""
+
+MIN_OPACITY = 0.9
+"""Least opacity of the volume on a ray that gives a point."""
+
+MIN_LIKENESS = 0.6
+"""A frame is refused, and its pose bridged, if it correlates with the reference less than this share of the median
+frame."""
+
+MAX_LEAP = 8.0
+"""A frame is refused if its pose lies more degrees than this from the middle of its neighbours'."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +74,7 @@ class Found:
     facts: tuple[Fact, ...]
 
 
-def find_track(scene: Scene, params: RegistrationParams) -> Found:
+def find_track(scene: Scene) -> Found:
     """Poses of all frames of a scene in which the head is taken to stand still.
 
     Raises:
@@ -62,13 +84,13 @@ def find_track(scene: Scene, params: RegistrationParams) -> Found:
     with progress(total=iterations(training.volume), desc="volume", unit="it") as bar:
         volume, _ = find_subject(scene, training, bar)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
-    points = [surface_points(volume, camera, params) for camera in cameras]
+    points = [surface_points(volume, camera) for camera in cameras]
     frames = scene.num_frames
-    with progress(total=frames * (1 + params.rounds) - 1, desc="poses", unit="frame") as bar:
-        poses, likeness = _all_frames(scene, cameras, points, volume.frame, params, bar)
-        for _ in range(params.rounds):
-            points, poses, likeness = _deepened(scene, cameras, points, poses, volume.frame, params, bar)
-    refused = _refused(poses, likeness, volume.frame, params)
+    with progress(total=frames * (1 + ROUNDS) - 1, desc="poses", unit="frame") as bar:
+        poses, likeness = _all_frames(scene, cameras, points, volume.frame, bar)
+        for _ in range(ROUNDS):
+            points, poses, likeness = _deepened(scene, cameras, points, poses, volume.frame, bar)
+    refused = _refused(poses, likeness, volume.frame)
     poses = _bridged(poses, refused)
     cloud = np.concatenate([one.positions for one in points])
     middle = cloud.mean(0)
@@ -79,10 +101,10 @@ def find_track(scene: Scene, params: RegistrationParams) -> Found:
     return Found(track, float(track.degrees().max()), shift, likeness, facts)
 
 
-def surface_points(volume: Volume, camera: Camera, params: RegistrationParams) -> Points:
+def surface_points(volume: Volume, camera: Camera) -> Points:
     """Where a camera's rays meet the volume, with normals; what is thin, torn or seen from aside is left out."""
-    x = np.arange(params.stride // 2, camera.width, params.stride) + 0.5
-    y = np.arange(params.stride // 2, camera.height, params.stride) + 0.5
+    x = np.arange(STRIDE // 2, camera.width, STRIDE) + 0.5
+    y = np.arange(STRIDE // 2, camera.height, STRIDE) + 0.5
     pixels = np.stack(np.meshgrid(x, y), -1)
     origins, directions = camera.rays(pixels)
     flat = [np.broadcast_to(a, directions.shape).reshape(-1, 3).astype(np.float32) for a in (origins, directions)]
@@ -93,9 +115,9 @@ def surface_points(volume: Volume, camera: Camera, params: RegistrationParams) -
     normals = np.cross(across, down)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
     normals *= -np.sign((normals * directions).sum(-1, keepdims=True))
-    solid = (alpha > params.min_opacity) & (depth > 0)
+    solid = (alpha > MIN_OPACITY) & (depth > 0)
     solid = cv2.erode(solid.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=0) > 0
-    kept = solid & (-(normals * directions).sum(-1) > params.min_cosine)
+    kept = solid & (-(normals * directions).sum(-1) > MIN_COSINE)
     return Points(there[kept], normals[kept], pixels[kept])
 
 
@@ -115,13 +137,12 @@ def _all_frames(
     cameras: Sequence[Camera],
     points: Sequence[Points],
     reference: int,
-    params: RegistrationParams,
     bar: tqdm,
 ) -> tuple[list[Similarity], Array]:
     """Poses of all frames against the reference, from it outwards; and their likeness to it."""
     store, indices = scene.open_frames(), scene.indices("train")
     scales = []
-    for share in params.scales:
+    for share in SCALES:
         sigma = share * min(scene.width, scene.height)
         first = [features(store.image(i, reference), sigma) for i in indices]
         scales.append(_Scale(sigma, [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]))
@@ -134,7 +155,7 @@ def _all_frames(
             images = [store.image(i, k) for i in indices]
             for scale in scales:
                 shown = [features(image, scale.sigma) for image in images]
-                pose, likeness[k] = refined(pose, cameras, points, shown, scale.seen, params)
+                pose, likeness[k] = refined(pose, cameras, points, shown, scale.seen)
             poses[k], before, last = pose, last, pose
             bar.update()
     return poses, likeness
@@ -146,7 +167,6 @@ def _deepened(
     points: Sequence[Points],
     poses: Sequence[Similarity],
     reference: int,
-    params: RegistrationParams,
     bar: tqdm,
 ) -> tuple[list[Points], list[Similarity], Array]:
     """Points moved along their rays by one number for all, as fits all frames best; and the poses with them.
@@ -154,7 +174,7 @@ def _deepened(
     Half of a volume's opacity is reached before or behind the surface: a head taken to be smaller turns farther.
     """
     store, indices = scene.open_frames(), scene.indices("train")
-    sigma = params.scales[-1] * min(scene.width, scene.height)
+    sigma = SCALES[-1] * min(scene.width, scene.height)
     first = [features(store.image(i, reference), sigma) for i in indices]
     seen = [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
     found, likeness = list(poses), np.ones(len(poses))
@@ -164,22 +184,22 @@ def _deepened(
 
     curvature, slope = 1e-9, 0.0
     for k, pose in enumerate(poses):
-        equations = Equations.of(pose, cameras, points, shown(k), seen, params)
-        gain, pull = equations.along_rays(params)
+        equations = Equations.of(pose, cameras, points, shown(k), seen)
+        gain, pull = equations.along_rays()
         curvature, slope = curvature + gain, slope + pull
-    deeper = float(np.clip(-slope / curvature, -params.max_deeper, params.max_deeper))
+    deeper = float(np.clip(-slope / curvature, -MAX_DEEPER, MAX_DEEPER))
     moved = [
         replace(one, positions=one.positions + deeper * unit(one.positions - camera.centre))
         for camera, one in zip(cameras, points, strict=True)
     ]
     for k in range(len(poses)):
         if k != reference:
-            found[k], likeness[k] = refined(found[k], cameras, moved, shown(k), seen, params)
+            found[k], likeness[k] = refined(found[k], cameras, moved, shown(k), seen)
         bar.update()
     return moved, found, likeness
 
 
-def _refused(poses: Sequence[Similarity], likeness: Array, reference: int, params: RegistrationParams) -> list[int]:
+def _refused(poses: Sequence[Similarity], likeness: Array, reference: int) -> list[int]:
     """Frames whose pictures are too unlike the reference's at the pose found, or that leap out of the motion."""
     typical = float(np.median(likeness))
     refused = []
@@ -190,8 +210,8 @@ def _refused(poses: Sequence[Similarity], likeness: Array, reference: int, param
                 [poses[k - 1].rotation, poses[k + 1].rotation], [poses[k - 1].translation, poses[k + 1].translation]
             ).at(0.5)
             off = Track.of([between.inverse().after(pose).rotation], [np.zeros(3)])
-            leaps = float(off.degrees()[0]) > params.max_leap
-        if k != reference and (likeness[k] < params.min_likeness * typical or leaps):
+            leaps = float(off.degrees()[0]) > MAX_LEAP
+        if k != reference and (likeness[k] < MIN_LIKENESS * typical or leaps):
             refused.append(k)
     return refused
 
@@ -220,12 +240,12 @@ def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
     if surface is not None and not asked:
         return scene
     try:
-        found = find_track(scene, params.registration)
+        found = find_track(scene)
     except UserError:
         if asked:
             raise
         return scene  # `train` will say what is wrong with the pictures
-    much = found.degrees > params.motion.degrees or found.shift > params.motion.shift
+    much = is_much(found.degrees, found.shift)
     if not (asked or much):
         return scene
     turns = fact("head_turns", degrees=found.degrees, shift=found.shift, source="found in the pictures")

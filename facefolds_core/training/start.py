@@ -14,9 +14,24 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.model.manifolds import MlpManifolds
-from facefolds_core.params import MlpParams, MlpStartParams
+from facefolds_core.params import MlpParams
 
 Array = NDArray[np.float64]
+
+MARGIN = 0.05
+"""The search ball reaches this far beyond the outermost level, units."""
+
+FILL = 0.8
+"""Without a tracked mesh, share of the narrower half field of view that the subject fills."""
+
+ITERATIONS = 600
+"""Steps of the regression onto the tracked mesh (`manifold_start: surface`)."""
+
+POINTS = 4096
+"""Points in each of its steps."""
+
+LEARNING_RATE, FINAL_LEARNING_RATE = 5e-3, 1e-4
+"""Of that regression: the second is what the first falls to along a cosine."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +67,7 @@ def find_start(scene: Scene, params: MlpParams) -> Start:
 
     With a tracked mesh, r0 is the median distance from c of its outermost vertices in front of the scene's centre
     (x > 0: the face, not the sides of the head), and the ball encloses all outermost vertices. Without, see
-    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `start.margin`
+    `fitted_radius`. Either way the levels are evenly spaced in r0 +- halfwidth, and the ball reaches `MARGIN`
     beyond the outermost layer if that lay halfwidth outside the surface's farthest point.
     """
     layers, halfwidth = params.layers, params.level_halfwidth
@@ -63,9 +78,9 @@ def find_start(scene: Scene, params: MlpParams) -> Start:
         face = SPHERE_CENTRE[0] + outline.radii * outline.directions[:, 0] > 0
         r0, farthest = float(np.median(outline.radii[face if face.any() else slice(None)])), float(outline.radii.max())
     else:
-        r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")], params.start.fill)
+        r0, farthest = fitted_radius([scene.cameras[i] for i in scene.indices("train")], FILL)
     offsets = np.linspace(halfwidth, -halfwidth, layers) if layers > 1 else np.zeros(1)
-    return Start(tuple((r0 + offsets).tolist()), farthest + halfwidth + params.start.margin, outline)
+    return Start(tuple((r0 + offsets).tolist()), farthest + halfwidth + MARGIN, outline)
 
 
 def find_outline(vertices: Array) -> Outline:
@@ -100,7 +115,7 @@ def fitted_radius(cameras: list[Camera], fill: float) -> tuple[float, float]:
     return math.sqrt(rho**2 + b**2 + b * rho), rho + b
 
 
-def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParams, generator: torch.Generator) -> float:
+def fit_outline(manifolds: MlpManifolds, outline: Outline, generator: torch.Generator) -> float:
     """Regress G(x) = |x - c| + r0 - rho(n), rho the outline's radius in direction n: the middle level on the surface.
 
     Three quarters of the points lie in directions of the outline's vertices; the others at random over the hemisphere
@@ -111,24 +126,23 @@ def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParam
     Returns:
         the mean absolute error of the last tenth of the iterations, units.
     """
-    iterations, points = params.iterations, params.points
     device = manifolds.centre.device
     tree = cKDTree(outline.directions)
     nearest_count = min(3, len(outline.radii))
     middle = 0.5 * float(manifolds.levels[0] + manifolds.levels[-1])
-    on_mesh = points * 3 // 4
-    optimiser = torch.optim.Adam(manifolds.parameters(), lr=params.learning_rate)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, iterations, eta_min=params.final_learning_rate)
+    on_mesh = POINTS * 3 // 4
+    optimiser = torch.optim.Adam(manifolds.parameters(), lr=LEARNING_RATE)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, ITERATIONS, eta_min=FINAL_LEARNING_RATE)
     errors = []
-    for _ in range(iterations):
-        anywhere = uv_to_directions(torch.rand(points - on_mesh, 2, generator=generator) * 2 - 1).double().numpy()
+    for _ in range(ITERATIONS):
+        anywhere = uv_to_directions(torch.rand(POINTS - on_mesh, 2, generator=generator) * 2 - 1).double().numpy()
         distance, nearest = (a.reshape(len(anywhere), -1) for a in tree.query(anywhere, k=nearest_count))
         weights = 1 / (distance + 1e-4)
         interpolated = (outline.radii[nearest] * weights).sum(1) / weights.sum(1)
         vertex = torch.randint(len(outline.radii), (on_mesh,), generator=generator).numpy()
         directions = np.concatenate([anywhere, outline.directions[vertex]]).astype(np.float32)
         rho = torch.from_numpy(np.concatenate([interpolated, outline.radii[vertex]]).astype(np.float32)).to(device)
-        radius = rho + 0.1 * (torch.rand(points, generator=generator) * 2 - 1).to(device)
+        radius = rho + 0.1 * (torch.rand(POINTS, generator=generator) * 2 - 1).to(device)
         x = manifolds.centre + radius[:, None] * torch.from_numpy(directions).to(device)
         loss = (manifolds.value(x) - (radius + middle - rho)).abs().mean()
         optimiser.zero_grad()
@@ -136,4 +150,4 @@ def fit_outline(manifolds: MlpManifolds, outline: Outline, params: MlpStartParam
         optimiser.step()
         schedule.step()
         errors.append(float(loss.detach()))
-    return float(np.mean(errors[-max(1, iterations // 10) :]))
+    return float(np.mean(errors[-max(1, ITERATIONS // 10) :]))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
 
@@ -149,44 +148,6 @@ def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     camera = read_scene(folders.scene).cameras[1]
     np.testing.assert_array_equal(manifest.photos[0].w2c, camera.w2c)
     np.testing.assert_array_equal(manifest.photos[0].K, camera.K)
-
-
-def sound_of(path: Path) -> float:
-    """Seconds of a file's audio stream."""
-    with av.open(str(path)) as file:
-        stream = file.streams.audio[0]
-        return float(stream.duration * stream.time_base)
-
-
-def test_twice_the_frame_rate(folders: SubjectFolders) -> None:
-    glbs, sounds = [], []
-    for factor in (1, 2):
-        rig(folders, photos=3, frame_rate_factor=factor, glb={"frame": 1}, video={"lossless": True})
-        with wave.open(str(folders.scene / "audio.wav"), "wb") as file:
-            file.setparams((1, 2, 16_000, 0, "NONE", ""))
-            file.writeframes(bytes(16_000))
-        compress(folders)
-        assert validate_asset(folders.asset) == []
-        asset = read_asset(folders.asset)
-        texture = asset.manifest.full.texture
-        assert (texture.frames, texture.fps) == (2 * factor, 25.0 * factor)
-        assert [photo.frame for photo in asset.manifest.photos] == [0, factor]
-        assert not list(folders.asset.glob(".between-*"))
-        glbs.append(folders.glb.read_bytes())
-        sounds.append(sound_of(folders.asset / "audio.m4a"))
-    assert glbs[0] == glbs[1]
-    assert sounds[0] == sounds[1]
-    frames = [np.concatenate([layer.ravel() for layer in frame]).astype(int) for frame in asset.frames()]
-    assert [bool((abs(frame - frames[0]) > 3).any()) for frame in frames] == [False, True, True, True]
-    np.testing.assert_array_equal(frames[2], frames[3])
-
-
-def test_a_single_frame_stays_one(folders: SubjectFolders) -> None:
-    write_store(folders.textures / "textures.arrow", cap_textures(3, 0, 64)[None])
-    write_scene(replace(read_scene(folders.scene), frame_ids=("a",), times=np.zeros(1), fps=0.0), folders.scene)
-    write_text(folders.config / "compress.json", CompressParams(frame_rate_factor=3).model_dump_json())
-    compress(folders)
-    assert read_asset(folders.asset).num_frames == 1
 
 
 def test_to_capture_undoes_the_normalisation(folders: SubjectFolders) -> None:

@@ -15,8 +15,7 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.asset.draco import decode_mesh
-from facefolds_core.asset.glb import DRACO, write_glb
+from facefolds_core.asset.glb import write_glb
 from facefolds_core.errors import UserError
 from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import make_asset
@@ -51,20 +50,15 @@ def part(document: dict[str, Any], binary: bytes, view: int) -> bytes:
     return binary[entry["byteOffset"] : entry["byteOffset"] + entry["byteLength"]]
 
 
-@pytest.mark.parametrize("draco", [False, True])
-def test_layers_come_back_innermost_first(asset: Asset, tmp_path: Path, draco: bool) -> None:
-    write_glb(tmp_path / "a.glb", asset.full, "caps", frame=2, draco=draco)
+def test_layers_come_back_innermost_first(asset: Asset, tmp_path: Path) -> None:
+    write_glb(tmp_path / "a.glb", asset.full, "caps", frame=2)
     document, binary = opened(tmp_path / "a.glb")
     textures = asset.frame(2)
     for place, index in enumerate((2, 1, 0)):
         (primitive,) = document["meshes"][document["nodes"][place]["mesh"]]["primitives"]
         layer = asset.layers[index]
-        if draco:
-            found = decode_mesh(part(document, binary, primitive["extensions"][DRACO]["bufferView"]))
-            assert found.vertices.tobytes() == layer.vertices.tobytes()
-        else:
-            accessor = document["accessors"][primitive["attributes"]["POSITION"]]
-            assert part(document, binary, accessor["bufferView"]) == layer.vertices.tobytes()
+        accessor = document["accessors"][primitive["attributes"]["POSITION"]]
+        assert part(document, binary, accessor["bufferView"]) == layer.vertices.tobytes()
         image = document["images"][document["textures"][place]["source"]]
         pixels = np.asarray(Image.open(io.BytesIO(part(document, binary, image["bufferView"]))))
         np.testing.assert_array_equal(pixels, textures[index])
@@ -96,11 +90,10 @@ def test_backs_are_left_out_and_triangles_come_from_the_back_to_the_front(asset:
         assert sorted(map(tuple, faces)) == sorted(map(tuple, layer.faces))
 
 
-@pytest.mark.parametrize("draco", [False, True])
-def test_khronos_validator(asset: Asset, tmp_path: Path, draco: bool) -> None:
+def test_khronos_validator(asset: Asset, tmp_path: Path) -> None:
     if shutil.which("node") is None or not (ROOT / "node_modules" / "gltf-validator").is_dir():
         pytest.skip("no gltf-validator: install Node.js and run `npm install --no-save gltf-validator`")
-    write_glb(tmp_path / "a.glb", asset.full, "caps", draco=draco)
+    write_glb(tmp_path / "a.glb", asset.full, "caps")
     command = ["node", "-e", VALIDATE, str(tmp_path / "a.glb")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     report = json.loads(done.stdout)

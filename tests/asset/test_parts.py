@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
-from threading import Lock
 
 import numpy as np
 import pytest
@@ -41,7 +39,7 @@ class Encoded:
         filmed = Filmed(lambda k: pack_frame(shown[k], LAYOUT), lambda k: shown[k], SIZE, RATE, "numbers")
         chosen = CODECS[codec]
         options = chosen.options(VideoCodec(codec=codec, preset="medium", keyframe_interval=10), chosen.crf(crf))
-        self.parts = Parts(self.folder / kept, b"code", 1 << 30)
+        self.parts = Parts(self.folder / kept, b"code")
         path = self.folder / f"{name}.{chosen.container}"
         encode_parts(path, filmed, BORDERS, chosen, options, self.parts)
         return path
@@ -97,40 +95,9 @@ def test_parts_that_nobody_asked_for_are_removed(encoded: Encoded) -> None:
     assert encoded.count == 0
 
 
-def test_encoders_share_the_memory() -> None:
-    parts = Parts(Path(), b"", 2 << 30, most=3)
-    assert parts.encoders((8192, 8192)) == 1  # 13 GB each
-    assert parts.encoders((2048, 1984)) == 2  # 0.9 GB each
-    assert parts.encoders((64, 64)) == 3
-    assert Parts(Path(), b"", 2 << 30, most=0).encoders((64, 64)) == (os.cpu_count() or 1)
-
-
 def filmed(make: Callable[[int], Picture]) -> Filmed:
     """Pictures of which the digest is their number's."""
     return Filmed(make, lambda k: [np.array([k])], SIZE, RATE, "")
-
-
-def test_a_long_take_needs_the_memory_of_one_encoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    running, most, lock = 0, 0, Lock()
-
-    def slow(*arguments: object) -> int:
-        nonlocal running, most
-        with lock:
-            running += 1
-            most = max(most, running)
-        time.sleep(0.01)
-        with lock:
-            running -= 1
-        return encode_video(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(module, "encode_video", slow)
-    codec = CODECS["h264"]
-    options = codec.options(VideoCodec(preset="ultrafast", keyframe_interval=10), 30)
-    picture = pack_frame(numbered(1), LAYOUT)
-    encode_parts(
-        tmp_path / "a.mp4", filmed(lambda k: picture), BORDERS, codec, options, Parts(tmp_path / "b", b"", 1 << 40)
-    )
-    assert most == 1
 
 
 def test_few_pictures_are_made_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,6 +117,6 @@ def test_few_pictures_are_made_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(module, "encode_video", looking)
     codec = CODECS["h264"]
-    encode_parts(tmp_path / "a.mp4", filmed(make), [0, 30], codec, {}, Parts(tmp_path / "b", b"", 1 << 30))
+    encode_parts(tmp_path / "a.mp4", filmed(make), [0, 30], codec, {}, Parts(tmp_path / "b", b""))
     assert made == list(range(30))
     assert max(ahead) == module.PICTURES_AHEAD

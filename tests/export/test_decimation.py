@@ -117,4 +117,4 @@ def test_where_nothing_is_left_of_a_layer_its_resolution_is_named(grids: Grids, 
     inwards = [Surface(one.vertices, np.ascontiguousarray(one.faces[:, ::-1])) for one in surfaces]
     with pytest.raises(UserError, match="left nothing") as caught:
         decimate_layers(inwards, grids, 16, DecimateParams(), progress=False)
-    assert "R^m 16" in str(caught.value) and "decimate.auto.candidates" in str(caught.value)
+    assert "R^m 16" in str(caught.value) and "decimate.resolution" in str(caught.value)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.errors import UserError
+from facefolds_core.export import sampling
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.sampling import grid_normals, sample_grids, samples_for, texture_rows, write_textures
 from facefolds_core.frame_store import FrameStore
@@ -162,11 +163,12 @@ class Fine(Ellipsoids):
         return TexelGrid((-0.5, 0.5, -0.4, 0.4), (700, 300))
 
 
-def test_samples_are_no_coarser_than_the_models_texels() -> None:
+def test_samples_are_no_coarser_than_the_models_texels(monkeypatch: pytest.MonkeyPatch) -> None:
     whole, upper, narrow = (-0.5, 0.5, -0.4, 0.4), (0.0, 0.5, -0.4, 0.4), (-0.32, 0.32, -0.1, 0.1)
-    assert [samples_for(Fine(), window, 256) for window in (whole, upper, narrow)] == [704, 384, 448]
-    assert samples_for(Fine(), whole, 1024) == 1024
-    assert samples_for(Ellipsoids(), whole, 512) == 512
+    monkeypatch.setattr(sampling, "LEAST", 256)
+    assert [samples_for(Fine(), window) for window in (whole, upper, narrow)] == [704, 384, 448]
+    monkeypatch.setattr(sampling, "LEAST", 1024)
+    assert samples_for(Fine(), whole) == samples_for(Ellipsoids(), whole) == 1024
 
 
 def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

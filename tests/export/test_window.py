@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from torch import Tensor
 
-from facefolds_core.export.window import removed_weight, visible_window
+from facefolds_core.export.window import MAX_CHANGE, removed_weight, visible_window
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW
-from facefolds_core.params import AutoWindowParams
 from tests.ellipsoids import Composited, Ellipsoids
 from tests.scenes import look_at_origin
 
@@ -15,11 +14,12 @@ RIG = [look_at_origin(f"cam{i}", azimuth, 10 * (-1) ** i, 120) for i, azimuth in
 
 
 @pytest.mark.parametrize("patch", [0.3, 0.6])
-def test_no_ray_loses_more_than_the_bound(patch: float) -> None:
+def test_no_ray_loses_more_than_the_bound(patch: float, monkeypatch: pytest.MonkeyPatch) -> None:
     model = Ellipsoids(patch=patch)
-    window = visible_window(model, RIG, AutoWindowParams(rays_per_camera=900))
+    monkeypatch.setattr("facefolds_core.export.window.RAYS_PER_CAMERA", 900)
+    window = visible_window(model, RIG)
     # Every pixel, not only the lattice that the window was made from.
-    assert max(removed_weight(model, camera, 1, 1, window).max() for camera in RIG) <= AutoWindowParams().max_change
+    assert max(removed_weight(model, camera, 1, 1, window).max() for camera in RIG) <= MAX_CHANGE
 
 
 def test_the_window_fits_the_scene() -> None:

@@ -44,14 +44,6 @@ def test_times_beyond_the_ends_are_held() -> None:
     assert np.array_equal(track.at(-1).translation, track.at(0).translation)
 
 
-def test_twice_the_rate_has_every_frame_at_its_place() -> None:
-    track = Track.of(TURNS, SHIFTS)
-    double = track.resampled(2)
-    assert len(double) == 6
-    for k in range(3):
-        assert np.abs(double.at(2 * k).rotation - track.at(k).rotation).max() < 1e-9
-
-
 def test_a_camera_sees_a_point_of_the_head_where_it_is_in_the_world() -> None:
     track, camera = Track.of(TURNS, SHIFTS), look_at_origin("a", 20, 5, 64)
     point = np.array([[0.1, 0.02, 0.05]])

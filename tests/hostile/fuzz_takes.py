@@ -30,7 +30,7 @@ PARAMS: dict[str, Any] = {
         "textures": {"steps_per_frame": 8},
         "segments": {
             **{"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60, "processes": 2},
-            **{"checkpoint_seconds": 0.2, "checkpoint_share": 0.5},
+            "checkpoint_seconds": 0.2,
         },
     },
     **{stage: {} for stage in ("sample", "reconstruct", "decimate", "texture", "bake", "compress", "evaluate")},

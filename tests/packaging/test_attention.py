@@ -20,7 +20,7 @@ from facefolds_core.packaging.vectors import FRAMES, LAYERS, RATE, WINDOW, Waves
 from facefolds_core.params import AttentionParams, VideoCodec
 from facefolds_core.rendering import AssetCaster, composite
 
-USUAL = AttentionParams(strength=2.0, least=0.01)
+USUAL = AttentionParams(strength=2.0)
 
 
 class Changed(Waves):
@@ -54,7 +54,7 @@ class Shown:
 
 @pytest.mark.parametrize("layer", range(LAYERS))
 @pytest.mark.parametrize("alpha", [False, True])
-def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool) -> None:
+def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Against pictures by the reference renderer of textures with one square of 16 x 16 texels changed."""
     full, camera = content(Waves()), cameras()[0]
     hits = AssetCaster(Shown(full)).cast(camera)
@@ -65,22 +65,23 @@ def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool) ->
     layout, crop = full.layout, full.layers[layer].crop
     x, y = layout.rects[layer][0] + 28 - crop[0], layout.rects[layer][1] + 28 - crop[1]
     y += layout.alpha_rect[1] if alpha else 0
-    params = AttentionParams(cameras=1, frames=1, rays_per_camera=10**6)
-    weights = np.kron(block_weights(full, [camera], params), np.ones((MACROBLOCK, MACROBLOCK)))
+    monkeypatch.setattr("facefolds_core.packaging.attention.RAYS_PER_CAMERA", 10**6)
+    weights = np.kron(block_weights(full, [camera]), np.ones((MACROBLOCK, MACROBLOCK)))
     # Blocks lie across the square's border, and the reference shares a pixel among four texels. Seen: 1.02 to 1.05.
     assert weights[y : y + 16, x : x + 16].sum() == pytest.approx(squares, rel=0.15)
 
 
-def test_a_fourth_of_the_weight_is_four_steps_and_the_least_counts() -> None:
+def test_a_fourth_of_the_weight_is_four_steps_and_the_least_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("facefolds_core.packaging.attention.LEAST", 1 / 64)
     weights = np.array([[1.0, 1.0, 0.25, 0.25, 1e-9, 0.0]])
-    found = offsets(weights, AttentionParams(strength=2.0, least=1 / 64))[0]
+    found = offsets(weights, 2.0)[0]
     assert found[2] - found[0] == 4
     assert found[4] == found[5] == found[0] + 12
     assert found[:4].mean() == 0  # about none where something shows
 
 
 def test_where_nothing_shows_nothing_is_marked() -> None:
-    assert (offsets(np.zeros((3, 4)), USUAL) == 0).all()
+    assert (offsets(np.zeros((3, 4)), 2.0) == 0).all()
 
 
 def test_no_cameras_or_no_strength_is_no_region() -> None:

@@ -6,10 +6,7 @@ import math
 
 import pytest
 
-from facefolds_core.packaging.rate import search_crf
-from facefolds_core.params import CrfSearchParams
-
-PARAMS = CrfSearchParams()
+from facefolds_core.packaging.rate import MAX_ENCODES, SPARED, TOLERANCE, search_crf
 
 CURVES = {
     "line": lambda crf: 52 - 0.5 * crf,
@@ -25,10 +22,10 @@ CURVES = {
 def test_target_is_reached_and_no_factor_far_better_is_missed(curve: object, target: float, start: int) -> None:
     assert callable(curve)
     found = search_crf(curve, target, start, 51)
-    assert found.encodes <= PARAMS.max_encodes
+    assert found.encodes <= MAX_ENCODES
     assert found.psnr == curve(found.crf) >= target
     best = max(crf for crf in range(1, 52) if curve(crf) >= target)
-    assert found.psnr - target < PARAMS.tolerance or best - found.crf <= 6
+    assert found.psnr - target < TOLERANCE or best - found.crf <= 6
 
 
 def test_a_target_out_of_reach_gives_the_best_that_was_tried() -> None:
@@ -44,8 +41,8 @@ def test_a_target_out_of_reach_does_not_buy_what_changes_nothing(start: int) -> 
 
     found = search_crf(curve, 41, start, 51)
     assert found.crf >= 6
-    assert curve(1) - PARAMS.spared <= found.psnr == curve(found.crf)
-    assert found.encodes <= 2 * PARAMS.max_encodes
+    assert curve(1) - SPARED <= found.psnr == curve(found.crf)
+    assert found.encodes <= 2 * MAX_ENCODES
 
 
 def test_a_target_that_everything_reaches_gives_the_coarsest() -> None:

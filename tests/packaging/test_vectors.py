@@ -21,7 +21,8 @@ from tests.asset.independent_reader import Player
 @pytest.fixture(scope="module")
 def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made") / "vectors"
-    assert write_vectors(folder) == len(list((folder / "reference").iterdir()))
+    count = write_vectors(folder)
+    assert count == len(list((folder / "reference").iterdir())) == len(list((folder / "reference_points").iterdir()))
     return folder
 
 
@@ -45,25 +46,35 @@ def test_a_player_written_from_the_document_agrees(vectors: Path) -> None:
     views = json.loads((vectors / "views.json").read_text())["views"]
     for view in (view for view in views if view["asset"] == "short" and view["frame"] in (0, 2)):
         player = Player(vectors / "short", 0 if view["level"] == "small" else -1)
-        poses = np.fromfile(vectors / "short" / "track.bin", "<f4").reshape(-1, 7)
-        w, x, y, z, *translation = poses[view["frame"]].astype(float)
-        R = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
+        side = view["width"]
+        pixels = np.stack(np.meshgrid(*[np.arange(side // 4, 3 * side // 4, max(1, side // 42))] * 2), -1).reshape(
+            -1, 2
         )
-        w2c = np.array(view["w2c"])
-        seen = np.concatenate([w2c[:, :3] @ R, (w2c[:, :3] @ translation + w2c[:, 3])[:, None]], 1)
-        rows, columns = np.mgrid[40:90:3, 30:100:3]
-        pixels = np.stack([columns.ravel() + 0.5, rows.ravel() + 0.5], -1)
-        look = player.look(np.array(view["K"]), seen, pixels)
-        picture = player.pictures()[view["frame"]]
-        shown = player.render(picture, look) + _through(player, picture, look)[:, None] * np.array(BACKGROUND)
-        truth = np.asarray(Image.open(vectors / "reference" / view["file"]), float) / 255
-        error = shown - truth[rows.ravel(), columns.ravel()]
-        assert 10 * np.log10(1 / (error**2).mean()) > 50, view["file"]
+        quarters = [
+            _shown(player, vectors, view, pixels + np.array((dx, dy))) for dx in (0.25, 0.75) for dy in (0.25, 0.75)
+        ]
+        points = _shown(player, vectors, view, pixels + 0.5)
+        for folder, found in (("reference", np.mean(quarters, 0)), ("reference_points", points)):
+            truth = np.asarray(Image.open(vectors / folder / view["file"]), float) / 255
+            error = found - truth[pixels[:, 1], pixels[:, 0]]
+            assert 10 * np.log10(1 / (error**2).mean()) > 50, (folder, view["file"])
+
+
+def _shown(player: Player, vectors: Path, view: dict, pixels: np.ndarray) -> np.ndarray:
+    """What the rays through these places of the picture (M, 2) see: (M, 3)."""
+    poses = np.fromfile(vectors / "short" / "track.bin", "<f4").reshape(-1, 7)
+    w, x, y, z, *translation = poses[view["frame"]].astype(float)
+    R = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    w2c = np.array(view["w2c"])
+    seen = np.concatenate([w2c[:, :3] @ R, (w2c[:, :3] @ translation + w2c[:, 3])[:, None]], 1)
+    look, picture = player.look(np.array(view["K"]), seen, pixels), player.pictures()[view["frame"]]
+    return player.render(picture, look) + _through(player, picture, look)[:, None] * np.array(BACKGROUND)
 
 
 def _through(player: Player, picture: np.ndarray, look: tuple) -> np.ndarray:
@@ -78,7 +89,8 @@ def test_pictures_are_compared_one_by_one(vectors: Path, tmp_path: Path) -> None
     names = sorted(path.name for path in mine.iterdir())
     (mine / names[0]).unlink()
     Image.new("RGB", (4, 4)).save(mine / names[1])
-    noisy = np.asarray(Image.open(mine / names[2]), int) + np.random.default_rng(0).integers(-9, 10, (128, 128, 3))
+    noisy = np.asarray(Image.open(mine / names[2]), int)
+    noisy = noisy + np.random.default_rng(0).integers(-9, 10, noisy.shape)
     Image.fromarray(np.clip(noisy, 0, 255).astype(np.uint8)).save(mine / names[2])
     found = {one.file: one.psnr for one in compare(vectors, mine)}
     assert found[names[0]] is None and found[names[1]] is None
@@ -86,6 +98,32 @@ def test_pictures_are_compared_one_by_one(vectors: Path, tmp_path: Path) -> None
     assert {found[name] for name in names[3:]} == {99.0}
     done = CliRunner().invoke(app, ["vectors", str(vectors), "--check", str(mine)])
     assert done.exit_code == 1 and f"{len(names) - 3} of {len(names)} reach 40 dB" in done.output
+
+
+def test_pictures_by_one_ray_a_pixel_are_known_as_such(vectors: Path, tmp_path: Path) -> None:
+    mine = Path(shutil.copytree(vectors / "reference", tmp_path / "mine"))
+    names = sorted(path.name for path in mine.iterdir())
+    for name in names[1:]:
+        shutil.copy(vectors / "reference_points" / name, mine / name)
+    found = {one.file: one for one in compare(vectors, mine)}
+    coarse = [one for one in found.values() if "coarse" in one.file]
+    # Seen: 31.5 to 36.1 dB where a pixel holds several texels. 4 x 4 rays instead of 2 x 2: 44.4 and more.
+    assert len(coarse) == 12 and not any(one.reaches(38) for one in coarse)
+    assert all(one.reaches(90, points=True) for one in found.values())
+    done = CliRunner().invoke(app, ["vectors", str(vectors), "--check", str(mine)])
+    assert done.exit_code == 1 and "; to one ray a pixel 99.0 dB" in done.output
+    assert f"{len(names) - 12} of {len(names)} reach 40 dB, 12 more with one ray a pixel" in done.output
+    assert CliRunner().invoke(app, ["vectors", str(vectors), "--check", str(mine), "--points"]).exit_code == 0
+    (mine / names[-1]).unlink()
+    assert CliRunner().invoke(app, ["vectors", str(vectors), "--check", str(mine), "--points"]).exit_code == 1
+
+
+def test_vectors_of_one_filter_are_made_again(vectors: Path, tmp_path: Path) -> None:
+    older = Path(shutil.copytree(vectors, tmp_path / "older"))
+    shutil.rmtree(older / "reference_points")
+    done = CliRunner().invoke(app, ["vectors", str(older), "--check", str(older / "reference")])
+    assert done.exit_code == 1 and "no conformance vectors" in done.output
+    assert CliRunner().invoke(app, ["vectors", str(older)]).exit_code == 0
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -60,20 +60,6 @@ def test_an_override_reruns_the_same_three(project: TinyProject) -> None:
     assert stages_restored(output) == EXPORT_OF_TEXTURES
 
 
-def test_twice_the_frame_rate_reruns_the_last_two(project: TinyProject) -> None:
-    before = project.params
-    project.write_params(before.replace("compress:\n", "compress:\n  frame_rate_factor: 2\n"))
-    status, output = project.repro("evaluate@actor")
-    assert status == 0, output
-    assert stages_run(output) == ["configure", "compress@actor", "evaluate@actor"]
-    assert "2 of the asset's 4 frames have photos" in output
-    texture = json.loads((project.root / "data/actor/asset/manifest.json").read_text())["levels"][-1]["texture"]
-    assert (texture["frames"], texture["frame_rate"]) == (4, [8, 3])  # 2 frames of 1.5 s, doubled
-    project.write_params(before)
-    status, output = project.repro("evaluate@actor")
-    assert status == 0, output
-
-
 def test_a_killed_training_resumes(project: TinyProject) -> None:
     status, output = project.repro("normalize@stabilised")
     assert status == 0, output

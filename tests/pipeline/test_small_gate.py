@@ -16,7 +16,7 @@ from scipy.ndimage import binary_erosion
 from bench.gate import TOLERANCES, Found, falls, scores_of
 from facefolds_core import pipeline
 from facefolds_core.asset import Asset
-from facefolds_core.captures.actor import write_capture
+from facefolds_core.captures.actor import ActorOptions, write_capture
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
@@ -51,6 +51,8 @@ KEPT = {
 SLACK = 2.0
 """Times the gate's tolerances: processors round differently, and a small film trains its way from there."""
 
+GLOSS = 3.0
+"""Times the actor's own, so that a missing reflection shows on small pictures."""
 FILM = CaptureParams(cameras=14, frames=4, height=96, width=64, plates=True)
 TRAIN = {
     "preset": "fast",
@@ -67,7 +69,7 @@ EXPORT = pipeline.ExportParams(
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
     folder = tmp_path_factory.mktemp("film")
-    write_capture(folder / "raw", FILM)
+    write_capture(folder / "raw", FILM, options=ActorOptions(gloss=GLOSS))
     subject = Subject(source="actor", path="", holdout=("A004", "A009"))
     capture = read_multiface(folder / "raw", subject, FILM.frame_rate)
     write_plan(plan_scene(capture, "actor", subject, NormalizeParams(), folder / "scene"), NormalizeParams())

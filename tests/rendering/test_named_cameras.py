@@ -11,7 +11,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import Scene
-from facefolds_core.cli.cameras import enlarged, named_camera
+from facefolds_core.cli.cameras import named_camera
 from facefolds_core.errors import UserError
 from tests.asset.filmed import HELD_OUT, filmed, packaged
 
@@ -62,10 +62,6 @@ def test_a_camera_from_a_file(made: tuple[Path, Scene], tmp_path: Path) -> None:
     path.write_text(json.dumps(VIEW | {"more": "is passed over"}))
     camera = named_camera(read_asset(made[0]), str(path))
     assert (camera.width, camera.height) == (40, 30)
-    twice = enlarged(camera, 2)
-    assert (twice.width, twice.height) == (80, 60)
-    point = np.array([[0.1, -0.2, 0.3]])
-    np.testing.assert_allclose(twice.project(point)[0], 2 * camera.project(point)[0])
 
 
 @pytest.mark.parametrize(

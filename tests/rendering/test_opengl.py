@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -23,11 +24,12 @@ from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit, fly_through, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
+from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reflection import reflected_colours
 from tests.assets import SOURCE, make_asset
 from tests.engines.tracks import with_track
 from tests.scenes import look_at_origin
-from tests.viewer.fixtures import change_manifest, random_reflection
+from tests.viewer.fixtures import add_reflection, change_manifest, random_reflection
 
 
 @pytest.fixture(scope="module")
@@ -226,6 +228,22 @@ def test_a_still(caps: Asset, tmp_path: Path, project_root: Path) -> None:
     camera = camera_of(Eye(azimuth=20), 80, 60, 30)
     expected, _ = composite(AssetCaster(caps).cast(camera), caps.frame(1), (0.2, 0.4, 0.6))
     assert psnr(np.asarray(Image.open(out)) / 255, expected) > 42
+
+
+def test_by_default_a_still_shows_means_over_pixels(caps: Asset, tmp_path: Path, project_root: Path) -> None:
+    """With the reflection, as the library's own `render`."""
+    folder = tmp_path / "asset"
+    shutil.copytree(caps.folder, folder)
+    add_reflection(folder)
+    camera = look_at_origin("camera", 35, 10, 64)
+    pose = {"K": camera.K.tolist(), "w2c": camera.w2c.tolist(), "width": 64, "height": 64}
+    (tmp_path / "camera.json").write_text(json.dumps(pose))
+    look = ["--camera", str(tmp_path / "camera.json"), "--frame", "1", "--background", "#336699"]
+    done = run(project_root, str(folder), "--out", str(tmp_path / "still.png"), *look)
+    assert done.returncode == 0, done.stderr
+    shown = np.asarray(Image.open(tmp_path / "still.png")) / 255
+    expected = render(read_asset(folder), camera, 1, (0.2, 0.4, 0.6))[0]
+    assert psnr(shown, expected) > 55  # seen: 62.7
 
 
 def test_a_film(caps: Asset, tmp_path: Path, project_root: Path) -> None:

@@ -15,7 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import EvaluateParams
-from facefolds_core.rendering.areas import finer, pixel_means
+from facefolds_core.rendering.pixels import finer, pixel_means
 from facefolds_core.scoring.evaluation import Evaluation, evaluate
 from facefolds_core.scoring.images import MASK_MARGIN, score_images, subject_box
 from facefolds_core.scoring.metrics import MAX_PSNR

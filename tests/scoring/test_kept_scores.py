@@ -60,7 +60,7 @@ def test_a_changed_frame_alone_is_measured(counted: Counted) -> None:
 
 def test_with_other_settings_all_are_measured(counted: Counted) -> None:
     counted.run()
-    counted.run(band=3.0)
+    counted.run(background=(0.5, 0.5, 0.5))
     assert counted.measured == FRAMES
 
 

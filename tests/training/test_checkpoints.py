@@ -34,7 +34,8 @@ class Killed(BaseException):
 def test_an_interrupted_run_ends_at_the_same_result(
     scene: Scene, tmp_path: Path, log_lost: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    settings = params(manifold_start="surface", checkpoint_seconds=1e-9, start={"iterations": 5})
+    settings = params(manifold_start="surface", checkpoint_seconds=1e-9)
+    monkeypatch.setattr("facefolds_core.training.start.ITERATIONS", 5)
     whole = run(scene, settings, tmp_path / "whole")
     step = loop.train_step
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.params import SegmentParams
+from facefolds_core.training.segments import keys as keys_module
 from facefolds_core.training.segments.keys import comparable, farthest_first, likenesses, mixture
 from tests.scenes import make_scene
 
@@ -23,25 +23,26 @@ def test_the_middle_comes_first_then_always_the_farthest() -> None:
 
 
 @pytest.mark.parametrize("blend", [0.0, 0.5])
-def test_shares_change_without_a_leap(blend: float) -> None:
+def test_shares_change_without_a_leap(blend: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Along a line past six key frames, three of which make up a frame."""
     keys = np.arange(6, dtype=np.float32)[:, None] * np.float32(1.3)
-    params = SegmentParams(blend=blend)
-    path = [mixture(np.array([x], np.float32), keys, params) for x in np.linspace(0, 6, 3001)]
+    monkeypatch.setattr(keys_module, "BLEND", blend)
+    path = [mixture(np.array([x], np.float32), keys) for x in np.linspace(0, 6, 3001)]
     assert np.allclose([shares.sum() for shares in path], 1)
     assert max(np.count_nonzero(shares) for shares in path) <= 3
     assert np.abs(np.diff(path, axis=0)).max() < 0.02
 
 
-def test_a_key_frame_is_itself_or_blended_with_its_neighbours() -> None:
+def test_a_key_frame_is_itself_or_blended_with_its_neighbours(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = LINE[:4]
-    assert mixture(rows[1], rows, SegmentParams(blend=0.0)).tolist() == [0, 1, 0, 0]
-    blended = mixture(rows[1], rows, SegmentParams(blend=0.5))
+    blended = mixture(rows[1], rows)
     assert blended.argmax() == 1 and 0.4 < blended[1] < 0.95
+    monkeypatch.setattr(keys_module, "BLEND", 0.0)
+    assert mixture(rows[1], rows).tolist() == [0, 1, 0, 0]
 
 
 def test_frames_that_look_alike_are_near_one_another(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", size=32, frames=4)
-    rows = comparable(likenesses(scene, SegmentParams()))
+    rows = comparable(likenesses(scene))
     distance = [float(np.square(rows[k] - rows[0]).sum()) for k in range(4)]
     assert distance == sorted(distance) and distance[3] > 2 * distance[1] > 0

@@ -13,7 +13,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, turn_of
-from facefolds_core.params import NormalizeParams, RegistrationParams
+from facefolds_core.params import NormalizeParams
 from facefolds_core.training import registration
 from facefolds_core.training.alignment import Points, features, look_up, refined
 from facefolds_core.training.registration import Found, with_found_poses
@@ -21,7 +21,6 @@ from tests.geometry.test_track import about
 from tests.memory import peak_of
 from tests.scenes import CENTRE, OPAQUE, first_hit, look_at_origin, make_scene, render
 
-PARAMS = RegistrationParams(stride=2)
 SIZE = 96
 TRACK = Track.of([np.eye(3), about((0, 0.3, 1), 5)], [[0, 0, 0], [0.01, -0.02, 0.01]])
 
@@ -46,7 +45,7 @@ def test_a_turn_and_a_shift_are_found() -> None:
         moved = [TRACK.camera(c, 1) for c in cameras]
         shown = [features(np.round(255 * render(c, OPAQUE, 0)[0]).astype(np.uint8), sigma) for c in moved]
         seen = [look_up(a, p.pixels)[:, 0] for a, p in zip(first, points, strict=True)]
-        pose, likeness = refined(pose, cameras, points, shown, seen, PARAMS)
+        pose, likeness = refined(pose, cameras, points, shown, seen)
     off = TRACK.at(1).inverse().after(pose)
     assert likeness > 0.95
     assert Track.of([off.rotation], [off.translation]).degrees()[0] < 0.5  # of 5; seen 0.34
@@ -56,8 +55,8 @@ def test_a_turn_and_a_shift_are_found() -> None:
 def test_a_frame_that_leaps_is_refused_and_bridged() -> None:
     poses = [Similarity(1.0, turn_of(np.array([0, 0, 0.02 * k])), np.array([0.01 * k, 0, 0])) for k in range(5)]
     leaping = [*poses[:2], Similarity(1.0, turn_of(np.array([0.6, 0, 0])), np.zeros(3)), *poses[3:]]
-    assert registration._refused(poses, np.ones(5), 0, PARAMS) == []
-    refused = registration._refused(leaping, np.ones(5), 0, PARAMS)
+    assert registration._refused(poses, np.ones(5), 0) == []
+    refused = registration._refused(leaping, np.ones(5), 0)
     assert 2 in refused
     bridged = registration._bridged(leaping, [2])
     assert np.abs(bridged[2].rotation - poses[2].rotation).max() < 1e-6
@@ -66,7 +65,7 @@ def test_a_frame_that_leaps_is_refused_and_bridged() -> None:
 
 def test_a_frame_that_looks_like_nothing_is_refused() -> None:
     poses = [Similarity.identity()] * 4
-    assert registration._refused(poses, np.array([1, 0.8, 0.2, 0.9]), 0, PARAMS) == [2]
+    assert registration._refused(poses, np.array([1, 0.8, 0.2, 0.9]), 0) == [2]
 
 
 @pytest.fixture

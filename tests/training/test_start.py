@@ -10,8 +10,9 @@ import torch
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.model.manifolds import MlpManifolds
-from facefolds_core.params import MlpParams, MlpStartParams
-from facefolds_core.training.start import Outline, find_outline, find_start, fit_outline, fitted_radius
+from facefolds_core.params import MlpParams
+from facefolds_core.training import start as start_module
+from facefolds_core.training.start import FILL, MARGIN, Outline, find_outline, find_start, fit_outline, fitted_radius
 from tests.scenes import look_at_origin, make_scene
 
 CENTRE = np.array(SPHERE_CENTRE)
@@ -20,7 +21,7 @@ CENTRE = np.array(SPHERE_CENTRE)
 def test_levels_straddle_the_tracked_mesh_outermost_first(tmp_path: Path) -> None:
     start = find_start(make_scene(tmp_path, size=8, surface_radius=0.33), MlpParams(layers=7))
     assert start.levels == pytest.approx(np.linspace(0.36, 0.30, 7), abs=1e-6)
-    assert start.radius == pytest.approx(0.33 + 0.03 + MlpStartParams().margin, abs=1e-6)
+    assert start.radius == pytest.approx(0.33 + 0.03 + MARGIN, abs=1e-6)
 
 
 def test_a_single_layer_lies_on_the_surface(tmp_path: Path) -> None:
@@ -35,11 +36,11 @@ def test_without_a_mesh_a_ball_is_fitted_to_the_field_of_view(tmp_path: Path) ->
     r0 = math.sqrt(rho**2 + 0.25**2 + 0.25 * rho)
     assert start.outline is None
     assert start.levels == pytest.approx([r0 + 0.03, r0, r0 - 0.03])
-    assert start.radius == pytest.approx(rho + 0.25 + 0.03 + MlpStartParams().margin)
+    assert start.radius == pytest.approx(rho + 0.25 + 0.03 + MARGIN)
 
 
 def test_fitted_radius_is_the_median_over_the_front_of_the_ball() -> None:
-    r0, farthest = fitted_radius([look_at_origin("a", 0, 0, 8)], MlpStartParams().fill)
+    r0, farthest = fitted_radius([look_at_origin("a", 0, 0, 8)], FILL)
     rho = farthest - 0.25
     n = np.random.default_rng(0).normal(size=(200_000, 3))
     points = rho * n / np.linalg.norm(n, axis=1, keepdims=True)
@@ -56,15 +57,16 @@ def test_outline_leaves_out_what_is_behind_other_surface() -> None:
     assert outline.radii == pytest.approx(np.full(len(uv), 0.33))
 
 
-def test_fit_brings_the_middle_level_onto_the_outline() -> None:
+def test_fit_brings_the_middle_level_onto_the_outline(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = np.linspace(-0.9, 0.9, 25)
     uv = np.stack(np.meshgrid(grid, grid), -1).reshape(-1, 2)
     directions = uv_to_directions(uv)
     outline = Outline(directions, 0.32 + 0.03 * directions[:, 1])
     torch.manual_seed(0)
     manifolds = MlpManifolds(SPHERE_CENTRE, (0.35, 0.32, 0.29), 0.45, 3, 32, 64)
-    params = MlpStartParams(iterations=150, points=1024)
-    error = fit_outline(manifolds, outline, params, torch.Generator().manual_seed(0))
+    monkeypatch.setattr(start_module, "ITERATIONS", 150)
+    monkeypatch.setattr(start_module, "POINTS", 1024)
+    error = fit_outline(manifolds, outline, torch.Generator().manual_seed(0))
     n = torch.from_numpy(directions).float()
     found = manifolds.crossings(manifolds.centre + 0.45 * n, -n)
     radii = (found.points[:, 1] - manifolds.centre).norm(dim=-1).detach().numpy()

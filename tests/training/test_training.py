@@ -23,11 +23,9 @@ TINY = {
     "preset": "quick",
     "layers": 3,
     "manifold_start": "sphere",
-    "manifold_layers": 2,
     "manifold_width": 16,
     "texture_layers": 2,
     "texture_width": 16,
-    "latent_dim": 4,
     "uv_frequencies": 3,
     "search_samples": 32,
     "rays": 128,
@@ -110,13 +108,16 @@ def test_learning_rates_decay_exponentially() -> None:
 
 
 @pytest.mark.slow
-def test_a_known_radius_is_recovered(tmp_path: Path) -> None:
+def test_a_known_radius_is_recovered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # One textured opaque sphere of radius 0.33; the single layer starts 0.02 too far out and must move in.
     scene = make_scene(tmp_path, OPAQUE, size=48, frames=1)
     settings = params(
         layers=1, rays=512, iterations=250, decay_interval=250, lr_manifold=1e-3, lr_texture=1e-2, texture_width=48,
-        uv_frequencies=4, lambda_view=10.0, lambda_reg=0.0,
+        uv_frequencies=4, lambda_reg=0.0,
     )  # fmt: skip
+    monkeypatch.setattr(loop, "LAMBDA_VIEW", 10.0)
+    monkeypatch.setitem(loop.SHAPE, "manifold_layers", 2)
+    monkeypatch.setitem(loop.SHAPE, "latent_dim", 4)
     state, sampler = state_for(scene, settings, Start((0.35,), 0.42, None))
     with on_one_thread():  # with three the last bits differ, and these steps lose the surface
         while state.iteration < settings.iterations:

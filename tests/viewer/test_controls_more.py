@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import read_asset
-from facefolds_core.rendering import AssetCaster, composite
+from facefolds_core.rendering.pixels import render
 from tests.pictures import five_cameras, psnr
 from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
@@ -27,7 +27,7 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
 
 def test_opacity_depth_and_texture_coordinates(player: Player, rich: Path) -> None:
     asset, camera = read_asset(rich), five_cameras(160)[0]
-    _, alpha = composite(AssetCaster(asset).cast(camera), asset.frame(0))
+    _, alpha = render(asset, camera, 0)
     player.button("Settings")
     show = player.page.get_by_label("Show")
     show.select_option("Opacity")

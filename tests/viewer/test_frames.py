@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from facefolds_core.rendering import AssetCaster, composite
 from tests.assets import make_asset
-from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
+from tests.pictures import GREY, five_cameras, means_of_frames, psnr
 from tests.viewer.conftest import NewPlayer, Player
 from tests.viewer.fixtures import change_manifest
 
@@ -22,9 +21,7 @@ NO_WEBCODECS = "delete globalThis.VideoDecoder"
 @pytest.fixture(scope="module")
 def pictures(rich: Path) -> list[np.ndarray]:
     """What each frame looks like."""
-    asset = read_asset(rich)
-    hits = AssetCaster(asset).cast(CAMERA)
-    return [composite(hits, textures, (GREY_VALUE,) * 3)[0] for textures in asset.frames()]
+    return means_of_frames(read_asset(rich), CAMERA)
 
 
 def opened(player: Player) -> Player:

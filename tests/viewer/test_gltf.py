@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import os
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -33,19 +32,15 @@ def page_folder(tmp_path_factory: pytest.TempPathFactory, project_root: Path, pl
     esbuild = [str(modules / ".bin" / "esbuild"), str(Path(__file__).parent / "gltf" / "page.js")]
     command = [*esbuild, "--bundle", "--format=esm", f"--outfile={folder / 'page.js'}", "--log-level=error"]
     subprocess.run(command, check=True, env={**os.environ, "NODE_PATH": str(modules)})
-    shutil.copytree(player_folder / "draco", folder / "draco")
     script = '<script type="module" src="page.js"></script>'
     (folder / "index.html").write_text(f'<!doctype html><link rel="icon" href="data:,">{script}')
     return folder
 
 
-@pytest.mark.parametrize("draco", [False, True])
-def test_five_cameras_agree_with_the_reference(
-    browser: Browser, page_folder: Path, tmp_path: Path, draco: bool
-) -> None:
+def test_five_cameras_agree_with_the_reference(browser: Browser, page_folder: Path, tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96)
     asset, cameras = read_asset(tmp_path / "asset"), five_cameras(SIZE)
-    write_glb(page_folder / "a.glb", asset.full, "caps", frame=FRAME, draco=draco)
+    write_glb(page_folder / "a.glb", asset.full, "caps", frame=FRAME)
     given = [{"K": c.K.tolist(), "w2c": c.w2c.tolist(), "width": c.width, "height": c.height} for c in cameras]
     with serving(page_folder, {}) as address:
         page = browser.new_page()

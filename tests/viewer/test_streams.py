@@ -13,8 +13,7 @@ import pytest
 from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
-from facefolds_core.rendering import AssetCaster, composite
-from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
+from tests.pictures import GREY, five_cameras, means_of_frames, psnr
 from tests.streamed import streamed_asset
 from tests.viewer.conftest import NewPlayer, Player
 
@@ -49,11 +48,7 @@ def ten_minutes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def pictures(take: Path) -> dict[str, list[np.ndarray]]:
     """What each frame of each level looks like."""
-    found = {}
-    for level in read_asset(take).levels:
-        hits = AssetCaster(level).cast(CAMERA)
-        found[level.entry.name] = [composite(hits, frame, (GREY_VALUE,) * 3)[0] for frame in level.frames()]
-    return found
+    return {level.entry.name: means_of_frames(level, CAMERA) for level in read_asset(take).levels}
 
 
 def shows(picture: np.ndarray, pictures: list[np.ndarray], frame: int) -> bool:

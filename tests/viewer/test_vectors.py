@@ -52,9 +52,10 @@ def test_facefolds_render_shows_what_it_must(vectors: Path, tmp_path: Path) -> N
     for view in (view for asset in ("short", "stream") for view in views(vectors, asset)[::3]):
         camera = tmp_path / "camera.json"
         camera.write_text(json.dumps(view))
-        options = ["--camera", str(camera), "--level", view["level"], "--frame", str(view["frame"]), "--samples", "1"]
+        options = ["--camera", str(camera), "--level", view["level"], "--frame", str(view["frame"])]
         out = ["--background", "#4080c0", "--out", str(tmp_path / view["file"])]
         done = CliRunner().invoke(app, ["render", str(vectors / view["asset"]), *options, *out])
         assert done.exit_code == 0, done.output
     found = [one for one in compare(vectors, tmp_path) if one.psnr is not None]
-    assert len(found) >= 6 and min(one.psnr or 0 for one in found) > 40, found
+    # Seen: 63.6 dB and more, 56.0 from near. What one ray a pixel sees is 31.5 to 49.3 dB from these.
+    assert len(found) >= 6 and min(one.psnr or 0 for one in found) > 52, found

@@ -23,6 +23,12 @@ export class Adaptation {
     this.shares = [];
   }
 
+  /** What is too much is left, and not tried again soon. */
+  leave() {
+    this.wait *= 2;
+    this.restart();
+  }
+
   /**
    * @param {number} seconds since the last picture
    * @param {number} work seconds that decoding and drawing kept the page busy, or that the picture was late
@@ -37,8 +43,7 @@ export class Adaptation {
     const middle = [...this.shares].sort((a, b) => a - b)[WATCHED >> 1];
     this.shares = [];
     if (middle > LATE) {
-      this.wait *= 2; // a level that is too much is not tried again soon
-      this.restart();
+      this.leave();
       return -1;
     }
     this.easy = middle < EASY ? this.easy || this.seconds : 0;

@@ -181,6 +181,7 @@ export class LevelChoice {
     // Where nothing is late the display's own pace says nothing about how easy it was: what was busy does.
     const late = there ? seconds : seconds + budget;
     const move = this.adaptation.note(seconds, late > 1.3 * budget ? late : player.busy, budget);
+    if (move < 0 && player.hurry()) return;
     const at = this.choices.indexOf(player.level.info.name);
     const next = this.choices.filter(
       (name, i) => !this.broken.has(name) && (move < 0 ? i < at : i > at && this.#affordable(name)),

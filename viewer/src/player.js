@@ -3,6 +3,7 @@
  *
  * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "change" (any setting), "error".
  */
+import { Adaptation } from "./adapt.js";
 import { startDecoder, weight } from "./draco/decoder.js";
 import { PlayerError } from "./errors.js";
 import { LevelChoice } from "./levelchoice.js";
@@ -15,6 +16,7 @@ import { matrixOf, readPoses } from "./track.js";
 import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
+const SMOOTH = 1 / 30; // s that a picture may take while anything moves
 const RATE_OVER = 1000; // ms that the frames a second are counted over
 const SETTERS = {
   spread: "setSpread",
@@ -47,6 +49,9 @@ export class Player extends EventTarget {
     this.visible = [];
     this.drawn = []; // times of the last pictures
     this.size = [0, 0];
+    this.haste = new Adaptation();
+    this.late = false; // pictures came late: what moves is drawn with one ray a pixel
+    this.drew = false; // in the last animation frame
     this.busy = 0; // s that the last picture took of the page's thread
     this.request = 0; // of an animation frame; 0: none, nothing moves
     this.#watchContext();
@@ -223,15 +228,19 @@ export class Player extends EventTarget {
   get statistics() {
     const info = this.level?.info;
     const [width, height] = this.size;
+    const { side, graphics } = this.renderer;
+    const { width: across, height: tall } = graphics.finer || { width: 0, height: 0 };
     return {
       fps: this.drawn.length > 1 ? ((this.drawn.length - 1) * 1000) / (this.drawn.at(-1) - this.drawn[0]) : 0,
       layers: info?.layers.length ?? 0,
       triangles: info?.layers.reduce((sum, layer, i) => sum + (this.visible[i] ? layer.triangles : 0), 0) ?? 0,
       bytesLoaded: (this.files?.loaded ?? 0) + weight.loaded,
-      gpuBytes: this.level ? gpuBytes(this.level) + 12 * width * height : 0, // canvases: two of colour, one of depth
+      // Canvases: two of colour, one of depth. The finer picture, which all players share, has colour and depth.
+      gpuBytes: this.level ? gpuBytes(this.level) + 12 * width * height + 8 * across * tall : 0,
       level: info?.name ?? "",
       texture: info ? [info.texture.width, info.texture.height] : [0, 0],
       canvas: [width, height],
+      rays: side * side,
       video: this.level?.video.codec ?? "",
       decoder: this.level?.source.kind ?? "",
     };
@@ -268,13 +277,29 @@ export class Player extends EventTarget {
     const began = performance.now();
     const seconds = this.before ? Math.min(LONGEST_STEP, (now - this.before) / 1000) : 1 / 60;
     this.moveOn(seconds);
+    if (this.before && this.drew) this.#judge(seconds);
     const moving = this.view.update(seconds);
-    if (this.stale || moving || this.view.swaying) this.draw();
+    this.drew = this.stale || moving || this.view.swaying > 0;
+    if (this.drew) this.draw(this.playing || moving || this.view.swaying > 0);
     while (this.drawn.length && now - this.drawn[0] > RATE_OVER) this.drawn.shift();
     this.stale ||= moving;
     this.busy = (performance.now() - began) / 1000;
     this.wake();
     this.before = this.request ? now : 0;
+  }
+
+  /** @param {number} seconds that a picture took to come, until the next one could be drawn */
+  #judge(seconds) {
+    const move = this.haste.note(seconds, seconds > 1.3 * SMOOTH ? seconds : this.busy, SMOOTH);
+    if (move) this.late = move < 0;
+  }
+
+  /** Fewer rays a pixel while anything moves. @returns {boolean} false: there are none to spare */
+  hurry() {
+    if (this.late) return false;
+    this.late = true;
+    this.haste.leave();
+    return true;
   }
 
   /** Lets time pass: shows the frame that is due. */
@@ -332,10 +357,11 @@ export class Player extends EventTarget {
     this.say("frame");
   }
 
-  draw() {
+  /** @param {boolean} [moves] another picture follows soon */
+  draw(moves = this.playing) {
     if (this.lost || !this.size[0]) return;
     const { projection, view } = this.view.matrices(...this.size, this.renderer.bounds());
-    this.renderer.draw(projection, view, this.view.strength);
+    this.renderer.draw(projection, view, this.view.strength, this.late && moves);
     this.stale = false;
     this.drawn.push(performance.now());
     this.say("draw");

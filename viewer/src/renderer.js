@@ -4,8 +4,10 @@
  * Each layer has its own slice of the depth range, nearer than those of the layers inside it. So it never hides or is
  * hidden by another layer, and its own folds count once: a pass to depth alone, then colour where the depth is equal.
  * Stored values are blended as they are: no colour management, no tone mapping, no sRGB textures.
+ * A pixel is the mean of SIDE x SIDE rays: the picture is drawn SIDE times as large, and averaged.
  */
-import { Graphics } from "./gl/graphics.js";
+import { Graphics, SIDE } from "./gl/graphics.js";
+import { Target } from "./gl/target.js";
 import { Upload } from "./gl/upload.js";
 import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
@@ -28,6 +30,7 @@ export class LayerRenderer {
     this.spread = 0;
     this.kind = "colour";
     this.background = [0, 0, 0, 1];
+    this.side = 1; // rays along each side of a pixel of the last picture
   }
 
   get maxTextureSize() {
@@ -104,11 +107,12 @@ export class LayerRenderer {
    * @param {import("./matrices.js").Matrix} projection
    * @param {import("./matrices.js").Matrix} view world to camera, OpenGL's axes
    * @param {number} [strength] below 1 the picture fades into the background
+   * @param {boolean} [quick] one ray a pixel
    */
-  draw(projection, view, strength = 1) {
+  draw(projection, view, strength = 1, quick = false) {
     const { width, height } = this.canvas;
-    this.render(projection, view, [0, 0, width, height], null);
     const { context, graphics } = this;
+    this.#filtered(projection, view, quick ? null : graphics.fine, width, height, null);
     context.globalCompositeOperation = "copy";
     context.globalAlpha = 1;
     if (strength < 1) {
@@ -119,6 +123,14 @@ export class LayerRenderer {
     }
     const top = graphics.canvas.height - height; // WebGL counts rows from below
     context.drawImage(graphics.canvas, 0, top, width, height, 0, 0, width, height);
+  }
+
+  /** Draws through a finer picture, if there is one. @param {WebGLFramebuffer | null} target null: the graphics' canvas */
+  #filtered(projection, view, fine, width, height, target) {
+    this.side = fine ? SIDE : 1;
+    const rect = [0, 0, this.side * width, this.side * height];
+    this.render(projection, view, rect, fine ? fine.framebuffer : target);
+    if (fine) this.graphics.average(fine, target, width, height);
   }
 
   /** Opacity is shown white on black. */
@@ -194,7 +206,7 @@ export class LayerRenderer {
     };
     const toLines = (index, layer) => {
       begin(wire, index);
-      gl.uniform4f(wire.at.wire, ...wireColour(index, level.geometries.length));
+      gl.uniform4f(wire.at.wire, ...wireColour(index, level.geometries.length, this.side));
       gl.disable(gl.DEPTH_TEST);
       upload.drawLines(layer);
     };
@@ -246,30 +258,24 @@ export class LayerRenderer {
   }
 
   /**
-   * Draws into a picture of its own instead of the canvas, by the same passes.
+   * Draws into a picture of its own instead of the canvas, by the same passes and with the same filter.
    * @returns {ImageData} top row first; premultiplied where the background is transparent
    */
   capture(projection, view, width, height) {
-    const { gl } = this.graphics;
-    const target = gl.createFramebuffer();
-    const [colour, depth] = [gl.createRenderbuffer(), gl.createRenderbuffer()];
+    const { graphics, side } = this;
+    const { gl } = graphics;
     const data = new Uint8ClampedArray(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
-    for (const [buffer, format, place] of [
-      [colour, gl.RGBA8, gl.COLOR_ATTACHMENT0],
-      [depth, gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
-    ]) {
-      gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
-      gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);
-      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, buffer);
-    }
+    const target = new Target(gl, width, height);
+    const fine = graphics.allows(width, height) ? new Target(gl, SIDE * width, SIDE * height) : null;
     try {
-      this.render(projection, view, [0, 0, width, height], target);
+      this.#filtered(projection, view, fine?.whole ? fine : null, width, height, target.framebuffer);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     } finally {
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.deleteFramebuffer(target);
-      for (const buffer of [colour, depth]) gl.deleteRenderbuffer(buffer);
+      target.dispose();
+      fine?.dispose();
+      this.side = side;
     }
     const row = 4 * width;
     const upright = new Uint8ClampedArray(data.length);
@@ -310,12 +316,12 @@ function toWindow([u0, u1, v0, v1], [wu0, wu1, wv0, wv1]) {
   return [(v1 - v0) / width, (u1 - u0) / height, (v0 - wv0) / width, (wu1 - u1) / height];
 }
 
-/** From warm (outermost) to cold (innermost). @returns {number[]} RGBA */
-function wireColour(index, count) {
+/** From warm (outermost) to cold (innermost). Lines are one pixel wide, in a finer picture less. @returns {number[]} RGBA */
+function wireColour(index, count, side) {
   const hue = 0.08 + (0.5 * index) / Math.max(1, count - 1);
   const channel = (n) => {
     const k = (n + 12 * hue) % 12;
     return 0.62 - 0.85 * 0.38 * Math.max(-1, Math.min(k - 3, 9 - k, 1)); // HSL: saturation 0.85, lightness 0.62
   };
-  return [channel(0), channel(8), channel(4), 0.35];
+  return [channel(0), channel(8), channel(4), 0.35 * side];
 }

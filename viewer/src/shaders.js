@@ -82,6 +82,22 @@ void main() {
   result = vec4(colour, alpha);
 }`;
 
+/** One triangle over the whole picture. */
+export const MEANS_VERTEX = `#version 300 es
+void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`;
+
+/** Means of stored, premultiplied values over 2 x 2 pixels. */
+export const MEANS_FRAGMENT = `#version 300 es
+precision highp float;
+precision highp sampler2D;
+uniform sampler2D fine;
+out vec4 result;
+vec4 at(ivec2 corner, int x, int y) { return texelFetch(fine, corner + ivec2(x, y), 0); }
+void main() {
+  ivec2 corner = 2 * ivec2(gl_FragCoord.xy);
+  result = 0.25 * (at(corner, 0, 0) + at(corner, 1, 0) + at(corner, 0, 1) + at(corner, 1, 1));
+}`;
+
 export const WIRE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec4 wire;

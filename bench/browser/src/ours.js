@@ -16,10 +16,11 @@ element.addEventListener("level", () => {
   const draw = (degrees) => {
     show(degrees);
     const { projection, view } = player.view.matrices(...player.size, player.renderer.bounds());
-    player.renderer.draw(projection, view);
+    player.renderer.draw(projection, view, 1, true);
   };
   const play = async (degrees, k) => {
     show(degrees);
+    player.renderer.graphics.finer = false; // one ray a pixel, as on the other pages
     player.stale = false; // what is drawn is drawn by `seek`, once
     await player.seek(k % player.playback.frames); // decodes, uploads and draws
   };

@@ -102,13 +102,13 @@ def write_capture(
         (temporary / "frame_list.txt").write_text(listing, encoding="utf-8")
         if params.plates:
             for camera in rig.cameras:
-                plate = render(camera, 0.0, replace(options, away=1.0), params.seed)
+                plate = render(camera, 0.0, replace(options, away=1.0))
                 _write_png(temporary / "plates" / f"{camera.name}.png", plate.rgb[..., ::-1])
         for name, time in frames:
             rotation, translation = head_pose(time, options.head_motion)
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)
             _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time, options.nose), head_to_world)
             for camera in rig.cameras:
-                _write_picture(temporary, camera.name, name, render(camera, time, options, params.seed), params.mattes)
+                _write_picture(temporary, camera.name, name, render(camera, time, options), params.mattes)
                 if progress:
                     progress()

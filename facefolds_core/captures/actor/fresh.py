@@ -42,6 +42,6 @@ def film_fresh_views(scene: Scene, params: CaptureParams, count: int) -> Iterato
     for i, (azimuth, elevation) in enumerate(new_views(count)):
         frame = i % scene.num_frames
         camera = camera_at(f"fresh{i:03d}", azimuth, elevation, scene.width, scene.height)
-        picture = render(camera, times[scene.frame_ids[frame]], options_of(params), params.seed)
+        picture = render(camera, times[scene.frame_ids[frame]], options_of(params))
         moved = camera.transformed(scene.from_capture)
         yield FreshView(moved, azimuth, elevation, frame, picture.rgb, picture.opacity.astype(np.float64))

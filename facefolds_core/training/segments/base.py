@@ -87,8 +87,7 @@ def digest_of_training(params: ExplicitParams) -> bytes:
 
 def digest_of_fitting(params: ExplicitParams) -> bytes:
     """Of the parameters by which frames are fitted to a base."""
-    names = {"cameras", "thumbnail", "vertices", "neighbours", "blend", "steps", "rate"}
-    values = params.segments.model_dump(mode="json", include=names)
+    values = params.segments.model_dump(mode="json", include={"steps"})
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).digest()
 
 

@@ -15,6 +15,24 @@ from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.patience import check_space
 
+TEXEL_BYTES = 300.0
+"""A texel of one frame takes so many in a training at once."""
+
+FLOOR_BYTES = 700e6
+"""Memory that every training takes beside textures and rays."""
+
+TEXELS_PER_PIXEL = 3.8
+"""Texels that are reckoned with for a pixel of one picture, before they are known."""
+
+RAY_SECONDS = 1500e-9
+"""Of one core for a ray and step, by which the time is forecast."""
+
+PROCESS_SECONDS = 20.0
+"""Of work on one core that are worth a process."""
+
+FREE_SHARE = 0.9
+"""Of the machine's memory that may be asked for; more is refused."""
+
 
 @dataclass(frozen=True)
 class Forecast:
@@ -45,14 +63,14 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
     """
     segments = params.segments
     side = for_scene(params, scene)[0].textures.pixels_per_texel
-    texels = round(segments.texels_per_pixel * scene.width * scene.height / side**2)
-    most = int(segments.memory_megabytes * 1e6 / (segments.texel_bytes * texels))
+    texels = round(TEXELS_PER_PIXEL * scene.width * scene.height / side**2)
+    most = int(segments.memory_megabytes * 1e6 / (TEXEL_BYTES * texels))
     frames = scene.num_frames
     at_once = frames <= min(segments.joint_frames, most) and left is None
     keys = frames if at_once else min(max(1, most), frames, len(segments.named) or segments.key_frames)
     trained = keys if left is None else 1
     rays = len(scene.indices("train")) * scene.width * scene.height
-    memory = round(trained * texels * segments.texel_bytes + rays * _ray_bytes(params) + segments.floor_megabytes * 1e6)
+    memory = round(trained * texels * TEXEL_BYTES + rays * _ray_bytes(params) + FLOOR_BYTES)
     steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
     if not at_once:
         steps += segments.steps * (frames if left is None else left)
@@ -72,10 +90,10 @@ def processes_for(scene: Scene, params: ExplicitParams, texels: int, segments: i
     asked = params.segments.processes
     if asked:
         return min(asked, segments)
-    available = params.segments.free_share * psutil.virtual_memory().available
+    available = FREE_SHARE * psutil.virtual_memory().available
     room = int(available / process_bytes(scene, params, texels))
     work = _seconds(params, frames * params.segments.steps, texels)
-    return max(1, min(numba.get_num_threads(), segments, room, int(work / params.segments.process_seconds)))
+    return max(1, min(numba.get_num_threads(), segments, room, int(work / PROCESS_SECONDS)))
 
 
 def process_bytes(scene: Scene, params: ExplicitParams, texels: int) -> float:
@@ -83,7 +101,7 @@ def process_bytes(scene: Scene, params: ExplicitParams, texels: int) -> float:
     rays = len(scene.indices("train")) * scene.width * scene.height
     moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
     background_and_pictures = rays * (12 + 6)
-    own = params.segments.floor_megabytes * 1e6
+    own = FLOOR_BYTES
     return texels * _frame_bytes(params) + background_and_pictures + moving + own
 
 
@@ -96,7 +114,7 @@ def _frame_bytes(params: ExplicitParams) -> int:
 def _seconds(params: ExplicitParams, steps: int, texels: int) -> float:
     """Of one core."""
     rays = steps * texels * params.textures.rays_per_texel
-    return rays * params.segments.ray_nanoseconds * 1e-9 * params.layers / 12
+    return rays * RAY_SECONDS * params.layers / 12
 
 
 def _ray_bytes(params: ExplicitParams) -> int:
@@ -115,11 +133,11 @@ def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) 
         UserError: if memory or disk would not do.
     """
     total = psutil.virtual_memory().total
-    if found.memory > params.segments.free_share * total:
+    if found.memory > FREE_SHARE * total:
         raise UserError(
             "this training does not fit into the memory of this machine",
             expected=f"{found.memory / 1e9:.1f} GB for it",
-            found=f"{total / 1e9:.1f} GB, of which train.segments.free_share may be used",
+            found=f"{total / 1e9:.1f} GB, of which {FREE_SHARE:.0%} may be used",
             remedy="lower train.segments.memory_megabytes (fewer key frames) or normalize.long_side (smaller pictures)",
         )
     if place is not None:

@@ -158,7 +158,7 @@ class FrameFitter:
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         to = self.params.textures
-        rate = self.base.surroundings.rate * self.params.segments.rate * (1 - (1 - to.final_rate) * progress)
+        rate = self.base.surroundings.rate * (1 - (1 - to.final_rate) * progress)
         return np.array([0, 0, 0, rate * to.frame_rate, rate * to.frame_rate * to.alpha_rate], np.float32)
 
 
@@ -173,5 +173,5 @@ def _diverged(scene: Scene, frame: int) -> UserError:
         "training diverged",
         place=f"frame {scene.frame_ids[frame]}",
         expected="a finite error",
-        remedy="lower train.segments.rate; if that does not help, look at the frame's pictures",
+        remedy="look at the frame's pictures",
     )

@@ -21,7 +21,7 @@ def trained_at_once(scene: Scene, params: ExplicitParams) -> tuple[Scene, list[i
     count = forecast(scene, params).key_frames
     if count is None:
         return scene, list(range(scene.num_frames))
-    keys = chosen_key_frames(scene, likenesses(scene, params.segments), params, count)
+    keys = chosen_key_frames(scene, likenesses(scene), params, count)
     return part_of(scene, keys), keys
 
 

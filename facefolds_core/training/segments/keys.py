@@ -10,19 +10,34 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.params import SegmentParams
 from facefolds_core.progress import progress
 from facefolds_core.spacing import spread
 
 Float = NDArray[np.float32]
 
+CAMERAS = 4
+"""Training cameras whose pictures tell frames apart."""
 
-def likenesses(scene: Scene, params: SegmentParams) -> list[Float]:
+THUMBNAIL = 32
+"""Rows of the small grey pictures that are compared."""
+
+VERTICES = 512
+"""Vertices of a tracked mesh that are compared, at most."""
+
+NEIGHBOURS = 3
+"""A frame starts from the mean of so many key frames, weighted by likeness."""
+
+BLEND = 0.5
+"""How much key frames are made like the others, in mean distances between key frames. With 0 they start from themselves
+alone."""
+
+
+def likenesses(scene: Scene) -> list[Float]:
     """By what frames are told apart, each (K, D): small grey pictures of a few training cameras and, where the scene
     has them, the tracked meshes in the head's own frame."""
     train = scene.indices("train")
-    cameras = spread(train, params.cameras)
-    rows = min(params.thumbnail, scene.height)
+    cameras = spread(train, CAMERAS)
+    rows = min(THUMBNAIL, scene.height)
     size = (max(1, round(scene.width * rows / scene.height)), rows)
     store = scene.open_frames()
     found = np.empty((scene.num_frames, len(cameras), size[1], size[0]), np.float32)
@@ -33,7 +48,7 @@ def likenesses(scene: Scene, params: SegmentParams) -> list[Float]:
     surface = scene.load_surface()
     meshes = []
     if surface is not None:
-        step = -(-surface[0].shape[1] // params.vertices)
+        step = -(-surface[0].shape[1] // VERTICES)
         meshes = [np.ascontiguousarray(surface[0][:, ::step]).reshape(len(found), -1)]
     return [found.reshape(len(found), -1), *meshes]
 
@@ -90,18 +105,18 @@ def _apart(keys: Float) -> float:
     return float(np.mean([np.sqrt(np.partition(_squares(keys, key), 1)[1]) for key in keys]))
 
 
-def mixture(row: Float, keys: Float, params: SegmentParams) -> NDArray[np.float64]:
-    """(n,) shares of key frames (n, D) that make up a frame (D,), their sum 1; 0 but for the `neighbours` nearest.
+def mixture(row: Float, keys: Float) -> NDArray[np.float64]:
+    """(n,) shares of key frames (n, D) that make up a frame (D,), their sum 1; 0 but for the `NEIGHBOURS` nearest.
 
     ((d_far - d_i) / (d_far d_i))^2 with d_far the distance of the next one (modified Shepard weights; Franke and
     Nielson 1980): they change without a leap when another key frame becomes one of the nearest.
     Distances are those of places beside the key frames, so that these, too, are made of their neighbours.
     """
-    distance = np.sqrt(_squares(keys, row) + (params.blend * _apart(keys)) ** 2)
+    distance = np.sqrt(_squares(keys, row) + (BLEND * _apart(keys)) ** 2)
     if distance.min() == 0:
         shares = (distance == 0).astype(np.float64)
         return np.asarray(shares / shares.sum())
-    beyond = np.sort(distance)[min(params.neighbours, len(distance) - 1)] if len(distance) > 1 else 2 * distance[0]
+    beyond = np.sort(distance)[min(NEIGHBOURS, len(distance) - 1)] if len(distance) > 1 else 2 * distance[0]
     shares = np.square(np.maximum(beyond - distance, 0) / (beyond * distance))
     if shares.sum() == 0:  # all equally far
         shares = np.ones(len(distance))

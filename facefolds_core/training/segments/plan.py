@@ -60,13 +60,13 @@ def plan_take(scene: Scene, params: ExplicitParams, key_frames: int) -> TakePlan
         UserError: if a key frame is named that is not there.
     """
     digests = digests_of_frames(scene, progress(range(scene.num_frames), desc="fingerprints", unit="frame"))
-    parts, segments = likenesses(scene, params.segments), params.segments
+    parts, segments = likenesses(scene), params.segments
     keys = chosen_key_frames(scene, parts, params, key_frames)
     base = fingerprint_of_base(scene, digest_of_training(params), keys, digests)
     common = base.encode() + digest_of_fitting(params)
     names = [hashlib.sha256(common + digest).hexdigest()[:16] for digest in digests]
     rows = comparable(parts, keys)
-    shares = [tuple(mixture(row, rows[keys], segments).tolist()) for row in rows]
+    shares = [tuple(mixture(row, rows[keys]).tolist()) for row in rows]
     found = []
     for number, first in enumerate(range(0, len(names), segments.frames)):
         part = slice(first, first + segments.frames)

@@ -1,6 +1,5 @@
 // Opens a GLB as three.js' own examples do: the loader's materials, colours and order are left as they are.
 import * as THREE from "three";
-import { DRACOLoader } from "three/addons/loaders/DRACOLoader.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { projectionOf, viewOf } from "../../../viewer/src/camera.js";
 
@@ -8,7 +7,7 @@ const TO_Y_UP = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0
 
 /** Pictures (PNG, base64) of the GLB from cameras of the asset (docs/reference/conventions.md), all of one size. */
 window.show = async (file, cameras, background) => {
-  const loader = new GLTFLoader().setDRACOLoader(new DRACOLoader().setDecoderPath("draco/"));
+  const loader = new GLTFLoader();
   const { scene } = await loader.loadAsync(file);
   const renderer = new THREE.WebGLRenderer({ antialias: false });
   renderer.setSize(cameras[0].width, cameras[0].height, false);

@@ -3,8 +3,14 @@
  * canvas that nobody sees, from which each player copies its part. It is given back when the last player goes.
  */
 import { PlayerError } from "../errors.js";
+import { MEANS_FRAGMENT, MEANS_VERTEX } from "../shaders.js";
+import { Target } from "./target.js";
 
 const ATTRIBUTES = { alpha: true, premultipliedAlpha: true, antialias: false, depth: true, stencil: false };
+
+/** Rays along each side of a pixel: docs/reference/asset-format.md, "The pixel filter". */
+export const SIDE = 2;
+const MOST = 1 << 24; // pixels of the finer picture: 128 MiB with its depth
 
 let shared = null;
 
@@ -23,6 +29,7 @@ export class Graphics extends EventTarget {
     this.users = 0;
     this.sizes = new Map(); // user -> [width, height] of its picture
     this.programs = new Map();
+    this.finer = null; // SIDE times as large as the canvas; false: this machine cannot
     this.lost = false;
     this.gl = this.canvas.getContext("webgl2", { ...ATTRIBUTES, powerPreference: "high-performance" });
     if (!this.gl) {
@@ -39,6 +46,7 @@ export class Graphics extends EventTarget {
         event.preventDefault();
         this.lost = true;
         this.programs.clear();
+        this.finer = null;
         this.dispatchEvent(new Event("lost"));
       },
       { signal },
@@ -62,8 +70,49 @@ export class Graphics extends EventTarget {
     if (size[0]) this.sizes.set(user, size);
     else this.sizes.delete(user);
     const [width, height] = [0, 1].map((i) => Math.max(1, ...Array.from(this.sizes.values(), (other) => other[i])));
-    if (this.canvas.width !== width) this.canvas.width = width;
-    if (this.canvas.height !== height) this.canvas.height = height;
+    if (this.canvas.width === width && this.canvas.height === height) return;
+    Object.assign(this.canvas, { width, height });
+    if (this.finer) this.finer.dispose();
+    this.finer = null;
+  }
+
+  /** Whether a picture of that many pixels can be drawn SIDE times as large. */
+  allows(width, height) {
+    const { gl } = this;
+    const longest = Math.min(...[gl.MAX_RENDERBUFFER_SIZE, gl.MAX_TEXTURE_SIZE].map((name) => gl.getParameter(name)));
+    return SIDE * Math.max(width, height) <= longest && SIDE * SIDE * width * height <= MOST;
+  }
+
+  /** @returns {Target | null} SIDE times as large as the canvas, shared by all players; null: this machine cannot */
+  get fine() {
+    const { width, height } = this.canvas;
+    if (this.finer === null) {
+      const finer = this.allows(width, height) ? new Target(this.gl, SIDE * width, SIDE * height) : null;
+      this.finer = finer?.whole ? finer : false;
+      if (!this.finer) finer?.dispose();
+    }
+    return this.finer || null;
+  }
+
+  /**
+   * Means over SIDE x SIDE pixels. @param {Target} fine from its lower left corner on
+   * @param {WebGLFramebuffer | null} framebuffer null: the canvas
+   */
+  average(fine, framebuffer, width, height) {
+    const { gl } = this;
+    const { program, at } = this.program(MEANS_VERTEX, MEANS_FRAGMENT);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.scissor(0, 0, width, height);
+    for (const part of [gl.DEPTH_TEST, gl.BLEND]) gl.disable(part);
+    gl.colorMask(true, true, true, true);
+    gl.useProgram(program);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, fine.texture);
+    gl.uniform1i(at.fine, 0);
+    gl.bindVertexArray(null);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.bindTexture(gl.TEXTURE_2D, null);
   }
 
   release(user) {

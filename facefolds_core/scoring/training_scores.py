@@ -1,0 +1,61 @@
+"""Scores of what the training cameras see of an asset, and which of them are bad."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from facefolds_core.facts import Fact, fact
+from facefolds_core.scoring.metrics import Array
+
+BEHIND = 5.0
+"""dB under the median of the training views from which on one is said to be bad."""
+
+METRICS = ("psnr_any", "psnr_over_plate", "psnr_found")
+"""By which they are compared: the first that all of them have."""
+
+
+@dataclass(frozen=True)
+class TrainingView:
+    """One training camera's picture of the asset, of one frame.
+
+    Attributes:
+        camera, frame: their names.
+        values: METRICS and the errors of opacity; None where one cannot be had.
+        truth, asset: (H, W, 3) the photo, and the asset over the plate or over black.
+    """
+
+    camera: str
+    frame: str
+    values: dict[str, float | None]
+    truth: Array
+    asset: Array
+
+
+def compared_by(views: Sequence[TrainingView]) -> str | None:
+    """The metric by which all of them can be compared."""
+    return next((name for name in METRICS if all(view.values[name] is not None for view in views)), None)
+
+
+def bad_views(views: Sequence[TrainingView]) -> list[TrainingView]:
+    """Those that are `BEHIND` the median, worst first."""
+    name = compared_by(views)
+    if not views or name is None:
+        return []
+    median = float(np.median([view.values[name] or 0.0 for view in views]))
+    bad = [view for view in views if (view.values[name] or 0.0) < median - BEHIND]
+    return sorted(bad, key=lambda view: view.values[name] or 0.0)
+
+
+def warnings_of(views: Sequence[TrainingView]) -> list[Fact]:
+    """A fact for each bad view."""
+    name = compared_by(views)
+    if name is None:
+        return []
+    median = float(np.median([view.values[name] or 0.0 for view in views])) if views else 0.0
+    return [
+        fact("training_view_bad", camera=view.camera, frame=view.frame, psnr=view.values[name], median=median)
+        for view in bad_views(views)
+    ]
