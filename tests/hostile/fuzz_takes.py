@@ -17,25 +17,18 @@ import numpy as np
 from safetensors.numpy import load_file
 
 from bench.run import Project
+from facefolds_core.params import merged
+from tests.cluster import takes
 from tests.hostile.damage import Counts
 
-PARAMS: dict[str, Any] = {
-    "capture": {"cameras": 8, "frames": 24, "height": 48, "width": 32},
-    "normalize": {},
-    "train": {
-        "preset": "fast",
-        "layers": 3,
-        "iterations": 60,
-        "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
-        "textures": {"steps_per_frame": 8},
-        "segments": {
-            **{"joint_frames": 0, "key_frames": 4, "frames": 4, "steps": 60, "processes": 2},
-            "checkpoint_seconds": 0.2,
-        },
+PARAMS: dict[str, Any] = merged(
+    takes.PARAMS,
+    {
+        "capture": {"frames": 24},
+        "train": {"segments": {"key_frames": 4, "frames": 4, "steps": 60, "processes": 2}},
     },
-    **{stage: {} for stage in ("sample", "reconstruct", "decimate", "texture", "bake", "compress", "evaluate")},
-}
-"""params.yaml but for the subject: steps enough that most kills come while segments are fitted."""
+)
+"""params.yaml: steps enough that most kills come while segments are fitted."""
 
 
 def training(project: Project) -> subprocess.Popen[str]:
@@ -67,8 +60,7 @@ def forget(project: Project) -> None:
 def run(count: int, seed: int, folder: Path) -> Counts:
     """`count` kills; the training after the last one may end."""
     counts, random, project = Counts(), np.random.default_rng(seed), Project(folder, "take")
-    subject = {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}
-    project.write({"subjects": {"take": subject}, **PARAMS})
+    project.write(PARAMS)
     project.run("configure", "capture", "normalize")
     start = time.perf_counter()
     project.run("train")

@@ -44,7 +44,7 @@ def test_the_web_player_shows_what_it_must(new_player: NewPlayer, vectors: Path,
         shown = np.rint(255 * player.capture(camera)[..., :3]).astype(np.uint8)
         Image.fromarray(shown).save(tmp_path / view["file"])
     found = [one for one in compare(vectors, tmp_path) if one.file.startswith(asset)]
-    # 49.7 seen, from near, where all pixels are covered; 40.0 where the player's chroma is half a pixel to the side.
+    # 49.9 seen, from near, where all pixels are covered; elsewhere 57.3 and more. One ray a pixel: 31.5 to 48.8.
     assert min(one.psnr or 0 for one in found) > 47, found
 
 
