@@ -119,7 +119,7 @@ class MatteParams(OutlineParams):
     """Where the subject is in each picture. Mattes serve the scores of cameras without masks, and the training if it is
     told so."""
 
-    method: Literal["none", "auto", "plates", "pictures"] = "auto"
+    method: Literal["none", "auto", "plates", "pictures"] = "plates"
     """How mattes are found where the capture has none. "plates" compares with clean plates; "pictures" cuts the subject
     out of each picture, which takes minutes; "auto" takes plates where they are, else pictures."""
 

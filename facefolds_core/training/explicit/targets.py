@@ -20,7 +20,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.jit import kernel
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Images, Pictures
+from facefolds_core.training.explicit.views import Images, OneFrame, Pictures
 
 KEPT_BYTES = 2 << 30
 """Of cut-outs that are kept in memory; others are made again when their frame's turn comes."""
@@ -90,11 +90,14 @@ class CutOuts(Images):
         return found
 
 
-def change_behind(images: Pictures, state: TextureState, random: np.random.Generator) -> None:
-    """Before a step: other colours behind cut-outs, and behind the layers; photos stay."""
-    if isinstance(images, CutOuts):
-        images.shuffle(random)
-        state.background[:] = torch.from_numpy(images.behind)[:, None]
+def change_behind(images: Pictures, state: TextureState, random: np.random.Generator) -> bool:
+    """Before a step: other colours behind cut-outs, and behind the layers; photos stay. Whether anything changed."""
+    cut = images.images if isinstance(images, OneFrame) else images
+    if not isinstance(cut, CutOuts):
+        return False
+    cut.shuffle(random)
+    state.background[:] = torch.from_numpy(cut.behind)[:, None]
+    return True
 
 
 @kernel(parallel=True)
