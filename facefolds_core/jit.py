@@ -16,9 +16,11 @@ kernel compiles, functions and constants, wherever they come from.
 from __future__ import annotations
 
 import hashlib
+import sys
 import types
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from pathlib import Path
 from types import EllipsisType
 from typing import Any, TypeVar, cast, overload
 
@@ -126,6 +128,8 @@ def _parts(value: Any, names: tuple[str, ...], seen: set[Any]) -> Iterator[bytes
         yield from _code_parts(value, seen)
     elif callable(value) and hasattr(value, "__name__"):  # of numpy, numba or Python: their versions are in the key
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
+        if str(value.__module__).startswith(__package__):  # an intrinsic: what it builds, no bytecode says
+            yield Path(str(sys.modules[value.__module__].__file__)).read_bytes()
     else:
         raise TypeError(f"a kernel uses a global of type {type(value).__name__}: make it a number, a tuple, an array")
 

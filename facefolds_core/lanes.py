@@ -1,8 +1,9 @@
 """Eight float32 at once, in compiled kernels: what LLVM does not find by itself without fast-math.
 
 `load(array, at)` is the eight values of a flat float32 array from `at` on, `store` puts them back, `fill` repeats a
-number, `total` adds the eight up in a fixed order, `highest` is the largest. `+ - * /` work on them, `least` and `most` compare them, and
-`where_less(a, b, x, y)` takes x where a < b, else y. All is IEEE arithmetic: results are the same on each CPU.
+number, `total` adds the eight up in a fixed order, `highest` is the largest. `+ - * /` work on them, `least` and `most`
+take the smaller and the larger ones, and `where_less(a, b, x, y)` takes x where a < b, else y.
+All is IEEE arithmetic: results are the same on each CPU.
 """
 
 # numba has no types:
@@ -11,14 +12,15 @@ number, `total` adds the eight up in a fixed order, `highest` is the largest. `+
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, models, overload, register_model
+from numba import extending, types
+from numba.extending import models, overload, register_model
 
 from facefolds_core.jit import inlined
+
+intrinsic: Any = extending.intrinsic  # for numba's own types the typing context is an argument of the caller's
 
 LANES = 8
 
@@ -133,7 +135,7 @@ def highest(typing: Any, values: Any) -> Any:
     return types.float32(values), build
 
 
-def _binary(name: str) -> Callable[..., Any]:
+def _binary(name: str) -> Any:
     @intrinsic
     def apply(typing: Any, a: Any, b: Any) -> Any:
         def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -125,4 +125,5 @@ class MatteParams(OutlineParams):
 
     train: Literal["given", "all", "none"] = "all"
     """Which mattes training uses: those given with the capture or by `mattes` of the subject, all that were found too,
-    or none."""
+    or none. Where all training pictures have one, the subject alone is trained, over a colour that changes with each
+    step, and no background is learnt."""

@@ -15,7 +15,7 @@ from facefolds_core.training.adam import EPSILON
 
 
 @kernel(parallel=True)
-def adam_step(values, first, second, gradient, seen, rates, correct, decay):  # type: ignore[no-untyped-def]
+def adam_step(values, first, second, gradient, seen, rates, correct, decay):
     """A step of the Gaussians that were seen; the others stay as they are, moments included.
 
     Args:

@@ -32,7 +32,7 @@ OFTEN = 8
 
 
 @kernel
-def list_entries(tiles, order, across, down, first, starts):  # type: ignore[no-untyped-def]
+def list_entries(tiles, order, across, down, first, starts):
     """Entries of all tiles, nearest first.
 
     Args:
@@ -101,7 +101,7 @@ def misses(seen, dx0, dy):
 
 
 @kernel(parallel=True)
-def blend(plane, colours, listed, starts, across, out, light):  # type: ignore[no-untyped-def]
+def blend(plane, colours, listed, starts, across, out, light):
     """Draw.
 
     Args:
@@ -175,7 +175,7 @@ def full(light: Any) -> Any:
 
 
 @kernel(parallel=True)
-def unblend(plane, colours, listed, starts, across, wish, rest, flat):  # type: ignore[no-untyped-def]
+def unblend(plane, colours, listed, starts, across, wish, rest, flat):
     """Derivatives of the loss in the picture, from front to back: what lies behind an entry is what all of the pixel
     shows but what has been passed.
 

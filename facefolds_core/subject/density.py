@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float32]
 
 APART, NARROW = 0.7, 0.7
-"""Two halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
+"""Halves of a Gaussian stand so far from its middle on its longest axis, and are so long, in standard deviations."""
 FAINTER = 0.8
 """Opacity of the halves, in shares of the whole's."""
 
 
 def thinned(state: State, params: StartParams) -> State:
     """Without those that are hardly there."""
-    kept = state.values[:, OPACITY] > np.log(params.fewest / (1 - params.fewest))
+    kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
     kept &= np.isfinite(state.values).all(1)
     return _part(state, kept)
 
@@ -32,7 +32,7 @@ def grown(state: State, wanted: int) -> State:
     """With so many Gaussians: those that the pictures pull at most are split along their longest axes."""
     more = min(wanted - len(state.values), len(state.values))
     pull = state.moved.copy()  # of all pictures: what many cameras see is divided first
-    state.moved[:], state.met[:] = 0, 0
+    state.moved[:] = 0
     if more <= 0:
         return state
     chosen = np.argpartition(-pull, more - 1)[:more]
@@ -47,11 +47,10 @@ def grown(state: State, wanted: int) -> State:
     others[:, MEAN] -= offset
     state.values[chosen] = halves
     state.first[chosen] = 0
-    zeros = np.zeros(more, np.float32)
     state.first = np.concatenate([state.first, np.zeros_like(others)])
     state.second = np.concatenate([state.second, state.second[chosen]])
     state.values = np.concatenate([state.values, others])
-    state.moved, state.met = np.concatenate([state.moved, zeros]), np.concatenate([state.met, zeros])
+    state.moved = np.concatenate([state.moved, np.zeros(more, np.float32)])
     return state
 
 
@@ -69,6 +68,6 @@ def longest_axes(values: Array) -> Array:
 
 
 def _part(state: State, kept: NDArray[np.bool_]) -> State:
-    for name in ("values", "first", "second", "moved", "met"):
+    for name in ("values", "first", "second", "moved"):
         setattr(state, name, np.ascontiguousarray(getattr(state, name)[kept]))
     return state

@@ -125,6 +125,7 @@ def render(splats: Splats, camera: Camera) -> tuple[Array, Array, Array]:
     drawing = draw(splats.values, view_of(camera))
     rgb, light = drawing.picture()
     depths = np.repeat(drawing.plane[:, 9:10], 3, 1)
-    depth = drawing.blended(depths).picture()[0][..., 0]
+    sums = drawing.blended(depths).picture()[0][..., 0]
     alpha = 1 - light
-    return rgb + light[..., None] * splats.background, alpha, depth / np.maximum(alpha, 1e-6)
+    rgb = np.asarray(rgb + light[..., None] * splats.background)
+    return rgb, np.asarray(alpha), np.asarray(sums / np.maximum(alpha, np.float32(1e-6)))

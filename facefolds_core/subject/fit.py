@@ -23,6 +23,8 @@ from facefolds_core.training.adam import corrections, decays
 Array = NDArray[np.float32]
 
 BETAS = (0.9, 0.999)
+ABSENT = -20.0
+"""Logit of the opacity of a Gaussian that is left out of a picture."""
 
 
 @dataclass
@@ -32,25 +34,17 @@ class State:
     Attributes:
         values, first, second: (N, COLUMNS), and Adam's moments.
         moved: (N,) sum of `unproject`'s `moved` since Gaussians were split last.
-        met: (N,) in so many pictures.
     """
 
     values: Array
     first: Array
     second: Array
     moved: Array
-    met: Array
 
     @classmethod
     def of(cls, values: Array) -> State:
-        count = len(values)
-        return cls(
-            values,
-            np.zeros_like(values),
-            np.zeros_like(values),
-            np.zeros(count, np.float32),
-            np.zeros(count, np.float32),
-        )
+        zeros = np.zeros(len(values), np.float32)
+        return cls(values, np.zeros_like(values), np.zeros_like(values), zeros)
 
 
 @dataclass(frozen=True)
@@ -68,22 +62,27 @@ class Target:
 
 def fit_start(scene: Scene, frame: int = 0, params: StartParams | None = None, seed: int = 0) -> Splats:
     """Gaussians of the training pictures of one frame."""
+    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or StartParams(), seed)
+
+
+def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[Camera], list[Array]]:
+    """Those of some cameras that have a picture of the frame, and the pictures, (H, W, 3) float32 in [0, 1]."""
     store = scene.open_frames()
-    chosen = [i for i in scene.indices("train") if (i, frame) in store]
-    cameras = [scene.camera_in_head(i, frame) for i in chosen]
-    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in chosen]
-    return fit_pictures(cameras, pictures, params or StartParams(), seed)
+    there = [i for i in cameras if (i, frame) in store]
+    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in there]
+    return [scene.camera_in_head(i, frame) for i in there], pictures
 
 
 def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: StartParams, seed: int = 0) -> Splats:
     """Gaussians of some pictures (H, W, 3) float32 in [0, 1]."""
     random = np.random.default_rng(seed)
-    state = State.of(seeds(cameras, pictures, int(params.seeds * params.count), params.ball, random))
-    begun = len(state.values)
+    pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
+    count = int(np.clip(pixels / params.pixels, params.fewest, params.most))
+    begun = int(params.seeds * count)
+    state = State.of(seeds(cameras, pictures, begun, params.ball, random))
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
     targets: list[Target] = []
     level, order = -1.0, np.arange(0)
-    decay = decays(BETAS)
     for step in range(params.iterations):
         done = step / params.iterations
         size = [share for start, share in params.levels if start <= done][-1]
@@ -91,27 +90,28 @@ def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: S
             level, targets = size, [_target(*pair, size) for pair in zip(cameras, pictures, strict=True)]
         if not len(order):
             order = random.permutation(len(targets))
-        target, order = targets[order[0]], order[1:]
-        values = state.values
-        if params.dropped > 0:  # DropGaussian
-            gone = random.random(len(values)) < params.dropped
-            values = values.copy()
-            values[gone, OPACITY] = -20
-        drawing = draw(values, target.view)
-        wish, wish_light = picture_loss(drawing, target.picture, background, params.ssim)
-        gradient, moved = differentiate(values, drawing, wish, wish_light)
-        seen = np.diff(drawing.first) > 0
-        state.moved += moved * max(target.view.size) / 2
-        state.met += seen
-        if params.opacity_price > 0:
-            o = 1 / (1 + np.exp(-state.values[seen, OPACITY]))
-            gradient[seen, OPACITY] += params.opacity_price / len(values) * o * (1 - o)
-        correct = np.array(corrections(BETAS, step + 1), np.float32)
-        adam_step(state.values, state.first, state.second, gradient, seen, _rates(params, done), correct, decay)
+        _improve(state, targets[order[0]], background, params, step, random)
+        order = order[1:]
         if (step + 1) % params.every == 0 and done < params.grown:
-            wanted = begun + (params.count - begun) * (step + 1) / (params.grown * params.iterations)
-            state = grown(thinned(state, params), min(int(wanted), params.count))
+            wanted = begun + (count - begun) * (step + 1) / (params.grown * params.iterations)
+            state = grown(thinned(state, params), min(int(wanted), count))
     return Splats(thinned(state, params).values, background)
+
+
+def _improve(
+    state: State, target: Target, background: Array, params: StartParams, step: int, random: np.random.Generator
+) -> None:
+    """One step of Adam towards one picture; some Gaussians are left out, so that none hides what another gets wrong
+    (DropGaussian, Park et al. 2025)."""
+    values = state.values.copy()
+    values[random.random(len(values)) < params.dropped, OPACITY] = ABSENT
+    drawing = draw(values, target.view)
+    wish, wish_light = picture_loss(drawing, target.picture, background, params.structure)
+    gradient, moved = differentiate(values, drawing, wish, wish_light)
+    seen = np.diff(drawing.first) > 0
+    state.moved += moved * max(target.view.size) / 2
+    rates, correct = _rates(params, step / params.iterations), np.array(corrections(BETAS, step + 1), np.float32)
+    adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
 
 
 def _target(camera: Camera, picture: Array, size: float) -> Target:

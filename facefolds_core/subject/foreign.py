@@ -48,12 +48,12 @@ def read_start(path: str | Path, scene: Scene, frame: int = 0) -> Splats:
     splats = moved(read_ply(path), scene.from_capture)
     store = scene.open_frames()
     there = spread([i for i in scene.indices("train") if (i, frame) in store], LOOKED_AT)
-    found = []
+    found = list[float]()
     for index in there:
         rgb, _, _ = render(splats, scene.camera_in_head(index, frame))
-        error = np.mean((np.clip(rgb, 0, 1) - store.image(index, frame) / 255.0) ** 2)
+        error = float(np.square(np.clip(rgb, 0, 1) - store.image(index, frame) / 255.0).mean())
         found.append(-10 * float(np.log10(max(error, 1e-10))))
-    if float(np.median(found)) < LEAST:
+    if np.median(found) < LEAST:
         raise UserError(
             "the Gaussians do not show what the pictures show",
             file=path,

@@ -18,20 +18,24 @@ Array = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
 
+FINEST, COARSEST = 100, 8
+"""Cells in a radius of the ball, at most and at least."""
+
+
 @dataclass(frozen=True)
 class BodyParams:
     """How the subject is told from the room.
 
     Attributes:
         reach: radius of the ball about the origin in which it may be, units, where the scene names none.
-        voxel: side of the cells in which Gaussians are connected, units.
+        joined: side of the cells in which Gaussians are connected, in median lengths of those in the ball.
         solid: opacity from which on a Gaussian connects.
         near: standard deviation of the neighbourhood of the origin in which the body is the heaviest, units.
         views: training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer.
     """
 
     reach: float = 0.45
-    voxel: float = 0.012
+    joined: float = 2.2
     solid: float = 0.3
     near: float = 0.1
     views: int = 3
@@ -42,16 +46,17 @@ def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -
     params = params or BodyParams()
     reach = scene.radius or params.reach
     possible = near_enough(splats, scene, params)
-    side = int(np.ceil(2 * reach / params.voxel)) + 2
-    cells = np.clip(((splats.means + reach) / params.voxel).astype(np.int64) + 1, 0, side - 1)
-    weight = np.zeros((side, side, side), np.float32)
     solid = possible & (splats.opacities > params.solid)
-    area = np.prod(np.sort(splats.sizes, 1)[:, 1:], 1) / params.voxel**2  # of the face that it shows
-    _scatter(weight, splats, solid, np.minimum(area, 4.0) * splats.opacities, reach, params)
+    if not solid.any():
+        return solid
+    voxel = float(np.clip(params.joined * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
+    side = int(np.ceil(2 * reach / voxel)) + 2
+    cells = np.clip(((splats.means + reach) / voxel).astype(np.int64) + 1, 0, side - 1)
+    weight = np.zeros((side, side, side), np.float32)
+    area = np.prod(np.sort(splats.sizes, 1)[:, 1:], 1) / voxel**2  # of the face that it shows
+    _scatter(weight, splats, solid, np.minimum(area, 4.0) * splats.opacities, reach, voxel)
     labels, count = ndimage.label(weight > 0, np.ones((3, 3, 3)))
-    if count == 0:
-        return np.zeros(len(splats), bool)
-    axes = (np.arange(side) - 0.5) * params.voxel - reach
+    axes = (np.arange(side) - 0.5) * voxel - reach
     square = axes[:, None, None] ** 2 + axes[:, None] ** 2 + axes**2
     mass = ndimage.sum_labels(weight * np.exp(-0.5 * square / params.near**2), labels, np.arange(1, count + 1))
     body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=1)
@@ -66,12 +71,12 @@ def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) 
     return np.asarray(inside & (_seeing(splats.means, cameras) >= min(params.views, len(cameras))))
 
 
-def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, params: BodyParams) -> None:
+def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, voxel: float) -> None:
     """Put Gaussians into cells: at their means, and one standard deviation to both sides along their longest axes."""
     ends = longest_axes(splats.values[chosen])
     for side in (-1, 0, 1):
         places = splats.means[chosen] + side * ends
-        cells = ((places + reach) / params.voxel).astype(np.int64) + 1
+        cells = ((places + reach) / voxel).astype(np.int64) + 1
         inside = ((cells >= 0) & (cells < weight.shape[0])).all(1)
         np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
 

@@ -38,8 +38,8 @@ def picture_loss(drawing: Drawing, photo: Array, background: Array, structure: f
     return wish, np.einsum("qhw,q->hw", wish, background)
 
 
-def _smooth(image: Array) -> Array:
-    return np.asarray(cv2.GaussianBlur(image, WINDOW, SIGMA, borderType=cv2.BORDER_REFLECT_101))
+def _smooth(image: NDArray[np.floating]) -> Array:
+    return np.asarray(cv2.GaussianBlur(image, WINDOW, SIGMA, borderType=cv2.BORDER_REFLECT_101), np.float32)
 
 
 def ssim_gradient(x: Array, y: Array) -> Array:

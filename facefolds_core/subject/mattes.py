@@ -38,7 +38,7 @@ class EdgeParams:
     """
 
     inside: float = 0.9
-    outside: float = 0.1
+    outside: float = 0.3
     band: float = 2.0
     grow: float = 4.0
     share: float = 0.75
@@ -137,8 +137,8 @@ def cut_out(picture: Image, start: Array, camera: Camera, edge: EdgeParams) -> B
 
 
 def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
-    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the mean of what the
-    Gaussians say and of what the picture's colours say before what stands behind.
+    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it.
 
     Args:
         start: (H, W) opacity of its Gaussians.
@@ -151,7 +151,8 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
         return cut.astype(np.float32)
     colours = picture.astype(np.float32) / np.float32(255)
     found = opacity_before(colours, np.clip(behind, 0, 1), inside, near & ~inside, edge.noise, PlateParams())
-    return np.where(inside, np.float32(1), np.where(near, (found + start) / 2, 0))
+    both = np.sqrt(found * np.clip(start, 0, 1))
+    return np.asarray(np.where(inside, np.float32(1), np.where(near, both, np.float32(0))))
 
 
 def _pixels(width: float, camera: Camera) -> int:

@@ -77,7 +77,7 @@ def spread_of(row: Any, view: Any, size: Any, r: Any, m: Any, t: Any, u: Any) ->
 
 
 @kernel(parallel=True)
-def project(values, view, centre, size, tile, plane, tiles):  # type: ignore[no-untyped-def]
+def project(values, view, centre, size, tile, plane, tiles):
     """What a camera sees of each Gaussian.
 
     Args:
@@ -127,7 +127,7 @@ def project(values, view, centre, size, tile, plane, tiles):  # type: ignore[no-
 
 
 @kernel(parallel=True)
-def unproject(values, view, centre, size, plane, first, flat, gradient, moved):  # type: ignore[no-untyped-def]
+def unproject(values, view, centre, size, plane, first, flat, gradient, moved):
     """The loss's derivatives by the Gaussians from those in the picture.
 
     Args:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
-from facefolds_core.jit import kernel
+import numpy as np
+import pytest
+
+from facefolds_core import lanes
+from facefolds_core.jit import fingerprint, kernel
 from facefolds_core.lanes import fill, highest, least, load, most, store, total, where_less
 
 
@@ -32,3 +36,11 @@ def test_arithmetic() -> None:
     quarters = halves[:, :2] + halves[:, 2:]
     np.testing.assert_array_equal(out[4, ::8], quarters[:, 0] + quarters[:, 1])
     np.testing.assert_array_equal(out[5, ::8], rows.max(1))
+
+
+def test_a_kernel_on_disk_is_of_these_lanes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    before = fingerprint(_all)
+    changed = tmp_path / "lanes.py"
+    changed.write_text(Path(lanes.__file__).read_text() + "\nMORE = 1\n")
+    monkeypatch.setattr(lanes, "__file__", str(changed))
+    assert fingerprint(_all) != before

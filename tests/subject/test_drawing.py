@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import torch
 
 from facefolds_core.subject import reference
 from facefolds_core.subject.drawing import differentiate, draw, view_of
+from facefolds_core.subject.splats import COLUMNS
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
 
@@ -40,3 +42,21 @@ def test_picture_and_gradients_are_those_of_the_reference() -> None:
         error = np.abs(gradient[:, columns] - true[:, columns]).max()
         assert error < 0.02 * np.abs(true[:, columns]).max(), (columns, error)
     assert (gradient[0] == 0).all() and moved[0] == 0 and (moved >= 0).all()
+
+
+def test_nothing_is_black_and_light() -> None:
+    camera = look_at_origin("one", 0, 0, 20)
+    for values in (np.zeros((0, COLUMNS), np.float32), some_splats(1) + np.float32(100)):
+        rgb, light = draw(values, view_of(camera)).picture()
+        assert (rgb == 0).all() and (light == 1).all()
+
+
+def test_threads_change_nothing() -> None:
+    values, view = some_splats(300), view_of(look_at_origin("one", 20, 10, 64))
+    results = []
+    for threads in (1, numba.config.NUMBA_NUM_THREADS):
+        numba.set_num_threads(threads)
+        drawing = draw(values, view)
+        results.append((drawing.rgb, *differentiate(values, drawing, drawing.rgb, drawing.light)))
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)

@@ -1,0 +1,121 @@
+"""A textured half ball before a patterned wall: Gaussians, the subject, mattes, what stands behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facefolds_core.captures.scene import Scene, write_scene
+from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.similarity import Similarity
+from facefolds_core.geometry.track import rotation
+from facefolds_core.subject.drawing import render
+from facefolds_core.subject.fit import fit_pictures, fit_start, pictures_of
+from facefolds_core.subject.foreign import moved, read_start
+from facefolds_core.subject.found import background, subject_of
+from facefolds_core.subject.mattes import find_mattes
+from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.ply import write_ply
+from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.sweep import depth_maps
+from tests.scenes import OPAQUE, first_hit, look_at_origin
+from tests.scenes import render as true_picture
+
+SIZE, CAMERAS, HELD = 48, 8, 3
+PARAMS = StartParams(fewest=1200, most=1200, iterations=800, every=50)
+
+
+def wall(camera):  # type: ignore[no-untyped-def]
+    """(H, W, 3) of a wall at x = -1, in soft tiles."""
+    origins, directions = camera.rays()
+    points = origins + ((-1 - origins[..., :1]) / directions[..., :1]) * directions
+    wave = np.sin(9 * points[..., 1:2]) * np.sin(9 * points[..., 2:3])
+    return 0.5 + 0.4 * wave * np.array([1.0, -0.5, 0.3])
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    folder = tmp_path_factory.mktemp("scene")
+    rig = tuple(
+        look_at_origin(f"c{i}", azimuth, 12 * (-1) ** i, SIZE)
+        for i, azimuth in enumerate(np.linspace(-40, 40, CAMERAS))
+    )
+    scene = Scene(
+        "ball", rig, tuple("holdout" if i == HELD else "train" for i in range(CAMERAS)), ("0",), np.zeros(1), 0.0,
+        Similarity(2.0, rotation(np.array([0.8, 0.0, 0.6, 0.0])), np.array([0.1, 0.2, 0.3])), (), folder,
+    )  # fmt: skip
+    pictures, masks = [], []
+    for camera in rig:
+        rgb, alpha = true_picture(camera, OPAQUE, 0)
+        pictures.append(np.round(255 * (rgb + (1 - alpha[..., None]) * wall(camera))).astype(np.uint8))
+        masks.append(np.round(255 * alpha[..., None]).astype(np.uint8))
+    write_frames(folder / "frames.arrow", (SIZE, SIZE, 3), ((i, 0, one) for i, one in enumerate(pictures)))
+    write_frames(folder / "masks.arrow", (SIZE, SIZE, 1), [(HELD, 0, masks[HELD])])
+    write_scene(scene, folder)
+    return scene
+
+
+@pytest.fixture(scope="module")
+def splats(scene: Scene) -> Splats:
+    return fit_start(scene, 0, PARAMS)
+
+
+def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
+    return float(-10 * np.log10(((np.clip(picture, 0, 1) - truth / 255) ** 2).mean()))
+
+
+def test_depths_are_found(scene: Scene) -> None:
+    cameras, pictures = pictures_of(scene, 0, range(CAMERAS))
+    small, _, depths, agree = depth_maps(cameras, pictures, 0.25)
+    origins, directions = small[0].rays()
+    distance, hit = first_hit(origins, directions, OPAQUE[0].radius)
+    sure = hit & (agree[0] >= 3)
+    assert sure.sum() > 0.4 * hit.sum()
+    error = depths[0] - distance * (directions @ small[0].forward)
+    assert np.median(np.abs(error[sure])) < 0.02
+
+
+def test_a_view_that_was_left_out(scene: Scene, splats: Splats) -> None:
+    store = scene.open_frames()
+    assert len(splats) <= PARAMS.most
+    assert psnr(render(splats, scene.cameras[0])[0], store.image(0, 0)) > 22
+    rgb, alpha, depth = render(splats, scene.cameras[HELD])
+    assert psnr(rgb, store.image(HELD, 0)) > 17
+    middle = (slice(SIZE // 2 - 3, SIZE // 2 + 3),) * 2
+    distance, _ = first_hit(*scene.cameras[HELD].rays(), OPAQUE[0].radius)
+    assert np.abs(depth - distance)[middle].mean() < 0.25  # a little of the wall shines through
+    assert alpha[middle].min() > 0.8
+
+
+def test_the_same_again(scene: Scene) -> None:
+    few = StartParams(fewest=200, most=200, iterations=12, every=4)
+    cameras, pictures = pictures_of(scene, 0, scene.indices("train"))
+    one, two = (fit_pictures(cameras, pictures, few, seed=3) for _ in range(2))
+    np.testing.assert_array_equal(one.values, two.values)
+
+
+def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> None:
+    subject = subject_of(splats, scene)
+    assert 0.1 < subject.mean() < 0.95
+    masks = scene.open_masks()
+    assert masks is not None
+    true = masks.image(HELD, 0)[..., 0] > 127
+    matte = find_mattes(scene, splats, 0, [HELD])[HELD] > 127
+    assert (matte & true).sum() / (matte | true).sum() > 0.9
+    behind = background(splats, subject, scene.cameras[HELD])
+    beside = ~true
+    assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
+
+
+def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path) -> None:
+    opaque = Splats(splats.values, np.zeros(3, np.float32))
+    write_ply(tmp_path / "a.ply", moved(opaque, scene.from_capture.inverse()))
+    found = read_start(tmp_path / "a.ply", scene)
+    for camera in scene.cameras[:2]:
+        np.testing.assert_allclose(render(found, camera)[0], render(opaque, camera)[0], atol=5e-3)
+    write_ply(tmp_path / "b.ply", opaque)  # in the scene's coordinates, not in the capture's
+    with pytest.raises(UserError, match="do not show"):
+        read_start(tmp_path / "b.ply", scene)
