@@ -68,9 +68,11 @@ def _values(scene: Scene) -> dict[tuple[int, int], int]:
     return {} if store is None else {key: int(store.image(*key)[5, 5, 0]) for key in store}
 
 
-def test_by_default_the_scenes_own_train_and_nothing_is_stored_twice(scene: Scene, folders: SubjectFolders) -> None:
+def test_where_none_is_looked_for_the_scenes_own_train_and_nothing_is_stored_twice(
+    scene: Scene, folders: SubjectFolders
+) -> None:
     assert _values(training_scene(folders)) == {(0, 0): 50}
-    _make(scene, folders)
+    _make(scene, folders, method="none")
     assert _values(training_scene(folders)) == _values(scored_scene(folders)) == {(0, 0): 50}
     assert sorted(path.name for path in folders.mattes.iterdir()) == ["mattes.json", "sheet.png", "training"]
 
@@ -84,7 +86,7 @@ def test_a_scene_without_any_has_an_empty_folder(folders: SubjectFolders) -> Non
 def test_named_ones_stand_above_all_others_and_train(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
     named = _name(tmp_path / "named", scene, 0, 0, 200, (SIZE, SIZE))
     _name(named, scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # for all frames, of another size
-    _make(scene, folders, named)
+    _make(scene, folders, named, method="none")
     wanted = {(0, 0): 200, **{(2, k): 150 for k in range(scene.num_frames)}}
     assert _values(training_scene(folders)) == _values(scored_scene(folders)) == wanted
 
