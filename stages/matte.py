@@ -11,6 +11,7 @@ from facefolds_core.captures.scene import read_scene
 from facefolds_core.config import read_stage, read_subject, read_volume_source
 from facefolds_core.params import MatteParams
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.subject.cutouts import from_gaussians
 from facefolds_core.training.mattes.folder import make_mattes
 from stages.common import run_stage
 
@@ -22,7 +23,7 @@ def matte(folders: SubjectFolders) -> str:
     start = read_volume_source(folders.config)
     place = None if named is None else Path(named)
     scene = read_scene(folders.scene)
-    found, notes = make_mattes(scene, folders.mattes, params, start, place)
+    found, notes = make_mattes(scene, folders.mattes, params, start, place, from_gaussians)
     for note in notes:
         typer.echo(f"matte: {note}")
     if not found:

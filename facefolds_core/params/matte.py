@@ -12,7 +12,7 @@ from facefolds_core.params.base import Count, Factor, Length, Natural, Pixels, S
 class CutOutParams(Section):
     """GrabCut (Rother et al. 2004, OpenCV's) in single pictures, begun from the opacity of the starting volume."""
 
-    long_side: Annotated[int, Field(ge=32, le=4096)] = 384
+    long_side: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pictures are reduced to this longer side, pixels."""
 
     inside: Share = 0.9
@@ -119,10 +119,11 @@ class MatteParams(OutlineParams):
     """Where the subject is in each picture. Mattes serve the scores of cameras without masks, and the training if it is
     told so."""
 
-    method: Literal["none", "auto", "plates", "pictures"] = "none"
+    method: Literal["none", "auto", "plates", "pictures"] = "plates"
     """How mattes are found where the capture has none. "plates" compares with clean plates; "pictures" cuts the subject
     out of each picture, which takes minutes; "auto" takes plates where they are, else pictures."""
 
-    train: Literal["given", "all", "none"] = "given"
+    train: Literal["given", "all", "none"] = "all"
     """Which mattes training uses: those given with the capture or by `mattes` of the subject, all that were found too,
-    or none."""
+    or none. Where all training pictures have one, the subject alone is trained, over a colour that changes with each
+    step, and no background is learnt."""

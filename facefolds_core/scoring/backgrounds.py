@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from facefolds_core.captures.cutout import foreground
 from facefolds_core.scoring.metrics import Array, decibels, shown
 
 BACKGROUNDS = (0.0, 1.0, 0.5)
@@ -24,9 +24,6 @@ LEAST_PATCH = 8
 """Pixels: a smaller patch is a handful of pixels."""
 COVERED = 0.5
 """Mean opacity of a patch from which on it is taken to show the subject."""
-
-WIDE, NARROW = 91, 7
-"""Pixels, windows of the two passes of blur fusion (Forte 2021)."""
 
 
 @dataclass(frozen=True)
@@ -55,24 +52,6 @@ class Cutout:
     def over(self, background: float | Array) -> Array:
         """(H, W, 3) over a grey, or over a picture (H, W, 3)."""
         return np.asarray(self.colour + (1 - self.opacity)[..., None] * background)
-
-
-def foreground(photo: Array, opacity: Array) -> Array:
-    """The subject's colours (H, W, 3) in pixels that it half covers: blur fusion (Forte 2021, "Approximate Fast
-    Foreground Colour Estimation", eq. 4 and 6), twice."""
-    first, behind = _fused(photo, photo, photo, opacity, WIDE)
-    return _fused(photo, first, behind, opacity, NARROW)[0]
-
-
-def _fused(photo: Array, front: Array, behind: Array, opacity: Array, window: int) -> tuple[Array, Array]:
-    a = opacity[..., None]
-
-    def mean(image: Array, weight: Array) -> Array:
-        total = cv2.blur(weight, (window, window))[..., None]
-        return np.asarray(cv2.blur(image * weight[..., None], (window, window)) / np.maximum(total, 1e-5))
-
-    near, far = mean(front, opacity), mean(behind, 1 - opacity)
-    return np.clip(near + a * (photo - a * near - (1 - a) * far), 0, 1), far
 
 
 def squared_error(rgb: NDArray[np.floating], alpha: Array, truth: Cutout) -> Array:

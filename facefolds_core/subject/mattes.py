@@ -68,7 +68,9 @@ def find_subject(scene: Scene, splats: Splats, frame: int = 0, edge: EdgeParams 
     subject, cuts = subject_of(splats, scene), dict[int, Bool]()
     possible = near_enough(splats, scene)
     for _ in range(edge.rounds):
-        cuts = {i: cut_out(store.image(i, frame), splats, subject, one, edge) for i, one in cameras.items()}
+        cuts = {
+            i: cut_out(store.image(i, frame), opacity_of(splats, subject, one), one, edge) for i, one in cameras.items()
+        }
         larger = [(one, grown(cuts[i].astype(np.uint8), _pixels(edge.grow, one)) > 0) for i, one in cameras.items()]
         subject = possible & voted(splats, larger, edge.share)
     return Found(subject, cuts)
@@ -107,16 +109,19 @@ def find_mattes(
         if plates is not None and (index, 0) in plates:
             opacity = from_plate(picture, plates.image(index, 0), PlateParams())
         else:
-            opacity = softened(
-                picture, cut_out(picture, splats, found.subject, camera, edge), splats, found.subject, camera, edge
-            )
+            start = opacity_of(splats, found.subject, camera)
+            cut, behind = cut_out(picture, start, camera, edge), background(splats, found.subject, camera)
+            opacity = softened(picture, cut, start, behind, camera, edge)
         mattes[index] = np.rint(255 * opacity).astype(np.uint8)
     return mattes
 
 
-def cut_out(picture: Image, splats: Splats, subject: Bool, camera: Camera, edge: EdgeParams) -> Bool:
-    """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut between what is surely its and surely not."""
-    start = opacity_of(splats, subject, camera)
+def cut_out(picture: Image, start: Array, camera: Camera, edge: EdgeParams) -> Bool:
+    """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut between what is surely its and surely not.
+
+    Args:
+        start: (H, W) opacity of its Gaussians.
+    """
     radius = _pixels(edge.band, camera)
     inside = grown((start < edge.inside).astype(np.uint8), radius) == 0
     near = grown((start > edge.outside).astype(np.uint8), radius) > 0
@@ -131,18 +136,22 @@ def cut_out(picture: Image, splats: Splats, subject: Bool, camera: Camera, edge:
     return np.asarray(ndimage.binary_fill_holes(cut))
 
 
-def softened(picture: Image, cut: Bool, splats: Splats, subject: Bool, camera: Camera, edge: EdgeParams) -> Array:
+def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
     """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
-    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it."""
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it.
+
+    Args:
+        start: (H, W) opacity of its Gaussians.
+        behind: (H, W, 3) what stands behind them.
+    """
     radius = _pixels(edge.soft, camera)
     inside = grown((~cut).astype(np.uint8), radius) == 0
     near = grown(cut.astype(np.uint8), radius) > 0
     if not inside.any() or near.all():
         return cut.astype(np.float32)
-    behind = np.clip(background(splats, subject, camera), 0, 1)
     colours = picture.astype(np.float32) / np.float32(255)
-    found = opacity_before(colours, behind, inside, near & ~inside, edge.noise, PlateParams())
-    both = np.sqrt(found * np.clip(opacity_of(splats, subject, camera), 0, 1))
+    found = opacity_before(colours, np.clip(behind, 0, 1), inside, near & ~inside, edge.noise, PlateParams())
+    both = np.sqrt(found * np.clip(start, 0, 1))
     return np.asarray(np.where(inside, np.float32(1), np.where(near, both, np.float32(0))))
 
 

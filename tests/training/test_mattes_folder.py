@@ -18,7 +18,7 @@ from facefolds_core.frame_store import write_frames
 from facefolds_core.params import ExplicitParams, MatteParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.training.mattes.find import CutOut
-from facefolds_core.training.mattes.folder import make_mattes
+from facefolds_core.training.mattes.folder import Finder, make_mattes
 from facefolds_core.training.photos import posed_photos
 from facefolds_core.training.segments.plan import plan_take
 from facefolds_core.training.volume.fit import volume_frames
@@ -53,8 +53,14 @@ def _name(folder: Path, scene: Scene, camera: int, frame: int | None, value: int
     return folder
 
 
-def _make(scene: Scene, folders: SubjectFolders, named: Path | None = None, **params: str) -> None:
-    make_mattes(scene, folders.mattes, MatteParams.model_validate(params), ExplicitParams(), named)
+def _nobody(*_: Any) -> list[CutOut]:
+    raise AssertionError("no picture is to be cut out")
+
+
+def _make(
+    scene: Scene, folders: SubjectFolders, named: Path | None = None, finder: Finder = _nobody, **params: str
+) -> None:
+    make_mattes(scene, folders.mattes, MatteParams.model_validate(params), ExplicitParams(), named, finder)
 
 
 def _values(scene: Scene) -> dict[tuple[int, int], int]:
@@ -62,9 +68,11 @@ def _values(scene: Scene) -> dict[tuple[int, int], int]:
     return {} if store is None else {key: int(store.image(*key)[5, 5, 0]) for key in store}
 
 
-def test_by_default_the_scenes_own_train_and_nothing_is_stored_twice(scene: Scene, folders: SubjectFolders) -> None:
+def test_where_none_is_looked_for_the_scenes_own_train_and_nothing_is_stored_twice(
+    scene: Scene, folders: SubjectFolders
+) -> None:
     assert _values(training_scene(folders)) == {(0, 0): 50}
-    _make(scene, folders)
+    _make(scene, folders, method="none")
     assert _values(training_scene(folders)) == _values(scored_scene(folders)) == {(0, 0): 50}
     assert sorted(path.name for path in folders.mattes.iterdir()) == ["mattes.json", "sheet.png", "training"]
 
@@ -78,7 +86,7 @@ def test_a_scene_without_any_has_an_empty_folder(folders: SubjectFolders) -> Non
 def test_named_ones_stand_above_all_others_and_train(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
     named = _name(tmp_path / "named", scene, 0, 0, 200, (SIZE, SIZE))
     _name(named, scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # for all frames, of another size
-    _make(scene, folders, named)
+    _make(scene, folders, named, method="none")
     wanted = {(0, 0): 200, **{(2, k): 150 for k in range(scene.num_frames)}}
     assert _values(training_scene(folders)) == _values(scored_scene(folders)) == wanted
 
@@ -95,27 +103,25 @@ def test_named_ones_of_pictures_that_are_not_there_are_none(folders: SubjectFold
     assert _values(scored_scene(folders)) == {(lacking[0], 0): 150}
 
 
-@pytest.mark.parametrize("beside_plates", [False, True])
-def test_what_is_known_of_training_cameras_votes(
-    scene: Scene, folders: SubjectFolders, monkeypatch: pytest.MonkeyPatch, beside_plates: bool
+@pytest.mark.parametrize(("beside_plates", "train"), [(False, "all"), (True, "all"), (True, "given")])
+def test_pictures_are_asked_where_nothing_else_is_known(
+    scene: Scene, folders: SubjectFolders, beside_plates: bool, train: str
 ) -> None:
-    """Mattes of the capture, those found beside plates; nothing of other frames or of held-out cameras."""
-    asked: list[tuple[set[tuple[int, int]], set[tuple[int, int]]]] = []
+    """Of all training pictures, or of those that the starting volume is fitted to where only given mattes train; of the
+    other cameras all."""
+    asked: list[set[tuple[int, int]]] = []
 
-    def found(scene: Scene, volume: None, missing: Any, params: Any, bar: Any, sure: Any) -> list[CutOut]:
-        assert all(matte.shape == (SIZE, SIZE) for matte in sure.values())
-        asked.append((set(missing), set(sure)))
+    def found(scene: Scene, missing: Any, params: Any, bar: Any) -> list[CutOut]:
+        asked.append(set(missing))
         return []
 
-    monkeypatch.setattr("facefolds_core.training.mattes.folder.find_subject", lambda *_: (None, ()))
-    monkeypatch.setattr("facefolds_core.training.mattes.folder.from_pictures", found)
     own = [(c, k, _grey(50)) for c in (0, 3, 4) for k in range(scene.num_frames)]
     write_frames(scene.folder / "mattes.arrow", (SIZE, SIZE, 1), own)
-    _make(scene, folders, method="auto" if beside_plates else "pictures")
+    _make(scene, folders, finder=found, method="auto" if beside_plates else "pictures", train=train)
     assert scene.splits[3] == "holdout" and scene.num_frames == 2
-    plate = {(1, 1)} if beside_plates else set()
-    rest = {(c, 1) for c in (1, 2, 5, 6)} - plate
-    assert asked == [(rest, {(0, 1), (4, 1)} | plate)]
+    frames = (0, 1) if train == "all" else (1,)
+    plate = {(1, k) for k in frames} if beside_plates else set()
+    assert asked == [{(c, k) for c in (1, 2, 5, 6) for k in frames} - plate]
 
 
 @pytest.mark.parametrize("frames", [1, 6])
@@ -124,7 +130,7 @@ def test_the_base_of_a_long_take_trains_with_them(folders: SubjectFolders, frame
     scene, black = make_scene(folders.scene, size=SIZE, frames=frames), np.zeros((SIZE, SIZE, 3), np.uint8)
     write_frames(scene.folder / "plates.arrow", black.shape, [(c, 0, black) for c in range(len(scene.cameras))])
     start = ExplicitParams.model_validate({"segments": {"joint_frames": 0, "key_frames": 2}})
-    make_mattes(scene, folders.mattes, MatteParams(method="plates", train="all"), start, None)
+    make_mattes(scene, folders.mattes, MatteParams(method="plates", train="all"), start, None, _nobody)
     trained = training_scene(folders)
     base = part_of(trained, plan_take(trained, start, 2).keys)
     seen = posed_photos(base, base.indices("train"), volume_frames(base, start))
@@ -145,9 +151,9 @@ def test_what_is_found_changes_nothing_that_training_reads(scene: Scene, folders
     def read() -> dict[str, bytes]:
         return {path.name: path.read_bytes() for path in (folders.mattes / "training").iterdir()}
 
-    _make(scene, folders)
+    _make(scene, folders, method="none", train="given")
     before = read()
-    _make(scene, folders, method="plates")
+    _make(scene, folders, method="plates", train="given")
     assert read() == before
 
 

@@ -21,6 +21,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import corrections, decays
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.targets import change_behind
 from facefolds_core.training.explicit.views import Pictures, Rays, Views
 
 Light = Callable[[TextureState, Views, int], None]
@@ -111,17 +112,20 @@ def follow_frame(
     colours, alphas = np.zeros((2, len(own), 3), np.float32), np.zeros((2, len(own), n), np.float32)
     values = state.frame_colour[0, frame].numpy(), state.frame_alpha[0, frame].numpy()
     values[0][own] -= errors[own]
-    picture, background, texture = images.frame(frame), state.background.numpy(), _texture(state, frame)
+    picture, texture = images.frame(frame), _texture(state, frame)
+    random = np.random.default_rng(frame)
     params, textures = state.params.follow, state.params.textures
     apart = _apart(len(views.pixel), h * w * textures.rays_per_texel)
     for step in range(params.steps):
+        if change_behind(images, state, random):
+            picture = images.frame(frame)
         shading_kernel.shade(
             views.codes,
             views.camera,
             views.pixel,
             np.arange(step % apart, len(views.pixel), apart),
             picture,
-            background,
+            state.background.numpy(),
             texture,
             shine,
             state.gradient.numpy().reshape(n, h, w, 4),

@@ -25,6 +25,7 @@ from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import model_bytes
+from facefolds_core.training.explicit.targets import all_mattes
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
@@ -73,6 +74,20 @@ def for_notes(params: ExplicitParams, notes: Sequence[Fact]) -> ExplicitParams:
     pruning, losses = params.pruning.model_copy(update=off), params.losses.model_copy(update={"opacity": 0.0})
     geometry = params.geometry.model_copy(update={"max_halfwidth_pixels": math.inf})
     changed = {"background": background, "pruning": pruning, "losses": losses, "geometry": geometry}
+    return params.model_copy(update=changed)
+
+
+def for_mattes(params: ExplicitParams, scene: Scene) -> ExplicitParams:
+    """The parameters of a training that knows the subject's opacity in every picture, or `params` where it does not:
+    no background learns, opacity needs no price, and nothing is cleared for looking like a room."""
+    if not all_mattes(scene):
+        return params
+    off = {"room_gain": 0.0, "beside_gain": 0.0, "beside_layers_gain": 0.0}
+    changed = {
+        "background": params.background.model_copy(update={"rate": 0.0}),
+        "losses": params.losses.model_copy(update={"opacity": 0.0, "binarisation": 0.0}),
+        "pruning": params.pruning.model_copy(update=off),
+    }
     return params.model_copy(update=changed)
 
 
@@ -125,7 +140,7 @@ def fit_with_surroundings(
         cameras = choose_cameras(scene, volume.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
-        own = for_notes(for_poses(used, scene), found)
+        own = for_mattes(for_notes(for_poses(used, scene), found), scene)
         fit = fit_scene(cameras.scene, volume, own)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):

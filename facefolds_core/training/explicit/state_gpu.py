@@ -15,7 +15,7 @@ from facefolds_core import gpu
 from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
 from facefolds_core.training.explicit.state import LossWeights, TextureState
-from facefolds_core.training.explicit.views import Pictures, Rays, Views
+from facefolds_core.training.explicit.views import Images, Pictures, Rays, Views
 
 SUMS = 256
 """Over which a step's squared errors are spread, so that threads seldom wait for one another."""
@@ -126,7 +126,7 @@ class GpuTextureState(TextureState):
             len(rays),
             *self._views(views),
             gpu.to_gpu(rays),
-            self._kept.get(("frame", frame), images, lambda: (gpu.to_gpu(images.frame(frame)),))[0],
+            self._picture(images, frame),
             away.background,
             away.texture.reshape(h, w, n, 4),
             self._kept.get("shine", self.shine, lambda: (gpu.to_gpu(self.shine),))[0],
@@ -148,6 +148,12 @@ class GpuTextureState(TextureState):
             gpu.to_gpu(decays(textures.betas)),
         )
         return float(away.squares.copy_to_host().sum())
+
+    def _picture(self, images: Pictures, frame: int) -> Any:
+        """Photos are kept; cut-outs are over other colours in each step."""
+        if isinstance(images, Images) and images.changes:
+            return gpu.to_gpu(images.frame(frame))
+        return self._kept.get(("frame", frame), images, lambda: (gpu.to_gpu(images.frame(frame)),))[0]
 
     def _views(self, views: Views) -> tuple[Any, ...]:
         """Codes, camera and pixel."""

@@ -29,6 +29,7 @@ from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.silhouettes import silhouettes
 from facefolds_core.training.explicit.state import LossWeights, TextureState, on_one_thread, state_type
+from facefolds_core.training.explicit.targets import CutOuts, all_mattes, change_behind
 from facefolds_core.training.explicit.views import Images, Rays, rays_of
 from facefolds_core.training.log import log_metrics
 from facefolds_core.training.volume.fit import Volume
@@ -46,7 +47,9 @@ class Trainer:
     def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: Device) -> None:
         self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
         self.scene = cameras.scene
-        self.images = Images(self.scene, cameras.gains)
+        self.images = (
+            CutOuts(self.scene, cameras.gains) if all_mattes(self.scene) else Images(self.scene, cameras.gains)
+        )
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -115,7 +118,7 @@ class Trainer:
             self._trace(level)
         assert self.views is not None
         if self.state is None:
-            background = first_background(self.scene, self.images, self.volume, self.params.background)
+            background = self._background()
             self.state = self._new_state(level.texels, background)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
@@ -123,6 +126,12 @@ class Trainer:
             self.state.reset_alpha()
         if new_rays:
             self.gloss.follow(self.state, self.views, self.images, self.middle)
+
+    def _background(self) -> torch.Tensor:
+        """[C, H W, 3] of the first step; of cut-outs what is behind them is drawn anew in each."""
+        if isinstance(self.images, CutOuts):
+            return torch.zeros(len(self.images.cameras), self.scene.height * self.scene.width, 3)
+        return first_background(self.scene, self.images, self.volume, self.params.background)
 
     def take_up(self, level: Level, background: torch.Tensor) -> TextureState:
         """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
@@ -176,6 +185,7 @@ class Trainer:
             frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             self.gloss.light(self.state, views, frame)
+            change_behind(self.images, self.state, self.random)
             rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
             error = self.state.step(
                 views,

@@ -257,12 +257,28 @@ class Shown:
         return self.images
 
 
+@dataclass(frozen=True)
+class OneFrame:
+    """The pictures of one frame as they are each time, whichever is asked for."""
+
+    images: Pictures
+    index: int
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        return self.images.frame(self.index)
+
+
 class Images:
     """The training images of one frame at a time, from the memory-mapped store; all must be there (`check_images`).
 
     Args:
         gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
+
+    Attributes:
+        changes: whether a frame's pictures are others in each step.
     """
+
+    changes = False
 
     def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
         self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)

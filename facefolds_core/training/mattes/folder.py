@@ -9,12 +9,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image as Pillow
+from tqdm import tqdm
 
 from facefolds_core.captures.chosen_mattes import MATTES, SCENES, USE
 from facefolds_core.captures.given_mattes import given_mattes
@@ -22,23 +23,26 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.frame_store import Image, write_frames
-from facefolds_core.params import ExplicitParams, MatteParams
+from facefolds_core.params import ExplicitParams, MatteParams, OutlineParams
 from facefolds_core.progress import progress
 from facefolds_core.spacing import spread
-from facefolds_core.training.mattes.find import CutOut, Key, beside_plates, from_pictures, small, wanted_pictures
+from facefolds_core.training.mattes.find import CutOut, Key, beside_plates, small, wanted_pictures
 from facefolds_core.training.mattes.sheet import MOST, contact_sheet
 from facefolds_core.training.segments.key_frames import trained_at_once
-from facefolds_core.training.volume.fit import iterations, volume_frames
-from facefolds_core.training.volume.search import find_subject
+from facefolds_core.training.volume.fit import volume_frames
+
+Finder = Callable[[Scene, Sequence[Key], OutlineParams, tqdm], list[CutOut]]
+"""Mattes of some pictures of a scene from the pictures alone."""
 
 
 def make_mattes(
-    scene: Scene, folder: Path, params: MatteParams, start: ExplicitParams, named: Path | None
+    scene: Scene, folder: Path, params: MatteParams, start: ExplicitParams, named: Path | None, finder: Finder
 ) -> tuple[list[CutOut], tuple[Fact, ...]]:
     """Write the folder, whole or not at all.
 
     Args:
-        start: the training whose starting volume is fitted where pictures are cut out by themselves.
+        start: the training.
+        finder: of pictures without plates.
         named: folder of mattes that the user has corrected, or None.
 
     Returns:
@@ -47,7 +51,7 @@ def make_mattes(
     store, own = scene.open_frames(), scene.open_mattes()
     given: dict[Key, Image] = {} if own is None else {key: own.image(*key) for key in own}  # mapped, not read
     by_hand = {} if named is None else {(c, k): image for c, k, image in given_mattes(named, scene)}
-    found, notes = _found(scene, {**given, **by_hand}, params, start)
+    found, notes = _found(scene, {**given, **by_hand}, params, start, finder)
     opacity = {
         (one.camera, one.frame): one.opacity(scene.height, scene.width)[..., None] for one in found if one.believed
     }
@@ -84,25 +88,22 @@ def _some_given(scene: Scene, given: Mapping[Key, Image], params: MatteParams) -
 
 
 def _found(
-    scene: Scene, known: Mapping[Key, Image], params: MatteParams, start: ExplicitParams
+    scene: Scene, known: Mapping[Key, Image], params: MatteParams, start: ExplicitParams, finder: Finder
 ) -> tuple[list[CutOut], tuple[Fact, ...]]:
     """Mattes of the pictures that serve something and have none."""
     if params.method == "none":
         return [], ()
     trained, numbers = trained_at_once(scene, start)
-    frames = [numbers[k] for k in volume_frames(trained, start)]
-    wanted, training = wanted_pictures(scene, frames), set(scene.indices("train"))
-    missing = [key for key in wanted if key not in known]
+    every = range(scene.num_frames)
+    frames = every if params.train == "all" else [numbers[k] for k in volume_frames(trained, start)]
+    missing = [key for key in wanted_pictures(scene, frames) if key not in known]
     found = [] if params.method == "pictures" else beside_plates(scene, missing, params)
     done = {(one.camera, one.frame) for one in found}
     missing = [key for key in missing if key not in done]
     if params.method == "plates" or not missing:
         return found, ()
-    with progress(total=iterations(start.volume) + len(missing), desc="matte", unit="it") as bar:
-        volume, notes = find_subject(trained, start, bar)
-        sure = {key: small(scene, known[key], params) for key in wanted if key in known and key[0] in training}
-        sure |= {(one.camera, one.frame): one.matte for one in found if one.camera in training}
-        return [*found, *from_pictures(scene, volume, missing, params, bar, sure)], notes
+    with progress(total=len(missing), desc="matte", unit="picture") as bar:
+        return [*found, *finder(scene, missing, params, bar)], ()
 
 
 def _store(path: Path, scene: Scene, opacity: Mapping[Key, Image]) -> None:

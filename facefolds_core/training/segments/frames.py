@@ -20,7 +20,18 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
 from facefolds_core.training.explicit.state import LossWeights, TextureState, state_type
-from facefolds_core.training.explicit.views import Images, MovingRays, Rays, Shown, StillRays, Views, trace_views
+from facefolds_core.training.explicit.targets import CutOuts, all_mattes, change_behind
+from facefolds_core.training.explicit.views import (
+    Images,
+    MovingRays,
+    OneFrame,
+    Pictures,
+    Rays,
+    Shown,
+    StillRays,
+    Views,
+    trace_views,
+)
 from facefolds_core.training.segments.base import Base
 
 
@@ -62,7 +73,8 @@ class FrameFitter:
         self.scene, self.base, self.gpu = scene, base, device.gpu
         still = params.background.model_copy(update={"rate": 0.0})
         self.params = params.model_copy(update={"background": still})
-        self.images = Images(scene, base.surroundings.gains)
+        gains = base.surroundings.gains
+        self.images = CutOuts(scene, gains) if all_mattes(scene) else Images(scene, gains)
         h, w = base.spec.texels
         background = torch.from_numpy(base.surroundings.background)
         shape = (base.spec.num_layers, 1)
@@ -94,12 +106,14 @@ class FrameFitter:
         losses, steps = self.base.surroundings.losses, params.segments.steps
         weights = LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, params.textures.min_alpha)
         phases: list[int] = []
-        rays, errors, images = 0, [], Shown(self.images.frame(frame))
+        rays, errors = 0, []
+        images = OneFrame(self.images, frame) if self.images.changes else Shown(self.images.frame(frame))
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
             if self.maps is not None and self.scene.poses is not None:
                 state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
+            change_behind(self.images, state, random)
             errors.append(state.step(seen, which, images, 0, weights, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
@@ -112,7 +126,7 @@ class FrameFitter:
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
         return FittedFrame(colour.half(), alpha.half(), psnr, rays)
 
-    def _follow(self, frame: int, views: Rays, images: Shown, weights: LossWeights) -> None:
+    def _follow(self, frame: int, views: Rays, images: Pictures, weights: LossWeights) -> None:
         """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
