@@ -87,7 +87,7 @@ def test_the_headline_says_over_which_pixels_it_is(copy: SubjectFolders) -> None
     write_json(copy.metrics, metrics | {"headline": "psnr_found", "matte": "found"})
     page = page_of(copy)
     assert "within the matte that was found, the pixels of the model&#39;s own opacity; held-out cameras" in page
-    assert "SSIM within the matte that was found, the pixels of the model&#39;s own opacity." in page
+    assert "dB PSNR within the matte that was found, the pixels of the model&#39;s own opacity" in page
 
 
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
