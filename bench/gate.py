@@ -41,10 +41,10 @@ CLUTTER = {"clutter": 1.0, "plates": False}
 TOLERANCES: dict[str, tuple[int, float, int]] = {
     "psnr_any": (1, 0.15, 2),
     "psnr_over_plate": (1, 0.15, 2),
-    "psnr_subject": (1, 0.15, 2),
+    "psnr_subject": (1, 0.25, 2),
     "psnr_found": (1, 0.15, 2),
     "psnr_interior": (1, 0.15, 2),
-    "psnr_band": (1, 0.2, 2),
+    "psnr_band": (1, 0.3, 2),
     "psnr_moving": (1, 0.3, 2),
     "worst_patch": (1, 1.0, 1),
     "temporal": (1, 0.02, 2),
@@ -55,10 +55,11 @@ TOLERANCES: dict[str, tuple[int, float, int]] = {
     "without_reflection": (1, 0.3, 2),
     "training_worst": (1, 1.0, 2),
 }
-"""Score -> 1 where more is better and -1 where less is, by how much it may be worse, digits. At least three times what
-the seeds 0, 1 and 2 of the actor differ by."""
-SHARES = {"bytes": 1.1, "cpu_seconds": 1.3, "peak_bytes": 1.2}
-"""Cost -> how many times as much as before it may be."""
+"""Score -> 1 where more is better and -1 where less is, by how much it may be worse, digits. The seeds 0 and 1 of the
+actor differ by 0.05 dB over any background, 0.09 of the subject, 0.10 in the band and of what moves, 0.14 in the worst
+patch, 0.22 in the worst training view."""
+SHARES = {"bytes": 1.2, "cpu_seconds": 1.3, "peak_bytes": 1.2}
+"""Cost -> how many times as much as before it may be; bytes of these seeds differ by 9 %."""
 
 
 def aside(count: int) -> list[str]:
