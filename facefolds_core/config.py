@@ -35,7 +35,7 @@ def _read(adapter: TypeAdapter[T], path: Path) -> T:
 
 def read_subject(folder: Path) -> Subject:
     """The subject's own keys (without overrides)."""
-    return _read(TypeAdapter(Subject), folder / "subject.json")
+    return _read(TypeAdapter(Subject), folder / "entry.json")
 
 
 def read_stage(kind: type[S], folder: Path) -> S:
@@ -59,18 +59,3 @@ class LevelResolutions(Section):
 def read_level_resolutions(folder: Path) -> tuple[int, ...]:
     """R^m of the coarser levels of detail, each once."""
     return _read(TypeAdapter(LevelResolutions), folder / "levels.json").mesh_resolutions
-
-
-class VolumeSource(Section):
-    """`volume.json`: what `matte` needs to know of `train`. All of it where a starting volume is fitted; beside plates
-    what says to which frames `train` fits its own; null where none is looked for. Other changes of `train` do not
-    rerun it."""
-
-    train: TrainSection | None
-
-
-def read_volume_source(folder: Path) -> ExplicitParams:
-    """The training whose starting volume `matte` fits or serves: of other models than `explicit` that of its
-    defaults."""
-    train = _read(TypeAdapter(VolumeSource), folder / "volume.json").train
-    return train if isinstance(train, ExplicitParams) else ExplicitParams(seed=0 if train is None else train.seed)

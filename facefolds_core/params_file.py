@@ -14,9 +14,6 @@ from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, m
 from facefolds_core.parsing import brief, parse_yaml
 from facefolds_core.paths import check_path_text, check_subject_name
 
-FRAMES_BY = ("preset", "model", "seed", "moving", "segments", "textures")
-"""Keys of `train` by which it is known to which frames the starting volume is fitted."""
-
 
 class Params(Section):
     """All of params.yaml.
@@ -109,6 +106,8 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         check_path_text(subject.path, name, path)
         if subject.mattes is not None:
             check_path_text(subject.mattes, name, path, "mattes")
+        if subject.start is not None:
+            check_path_text(subject.start, name, path, "start")
     params = Params(subjects=subjects, sections=sections, path=str(path))
     for name in subjects:
         for stage in STAGE_SECTIONS:
@@ -148,20 +147,12 @@ def _has(overrides: Any, name: str) -> bool:
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
-    """Write `subject.json`, one file a stage, `levels.json` and `volume.json` (see `config`); returns their paths."""
+    """Write `entry.json`, one file a stage, `levels.json` (see `config`); returns their paths."""
     core = params.subject(subject).model_dump(mode="json", by_alias=True, exclude=set(Overrides.model_fields))
-    values: dict[str, Any] = {"subject": core}
+    values: dict[str, Any] = {"entry": core}
     values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
     resolutions = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
     values["levels"] = {"mesh_resolutions": resolutions}
-    values["volume"] = {"train": _for_mattes(values["train"], values["matte"]["method"])}
     for name, value in values.items():
         write_json(folder / f"{name}.json", value)
     return [folder / f"{name}.json" for name in values]
-
-
-def _for_mattes(train: dict[str, Any], method: str) -> dict[str, Any] | None:
-    """What `matte` needs to know of `train`: beside plates only by which frames the starting volume is fitted."""
-    if method == "none":
-        return None
-    return train if method != "plates" else {key: train[key] for key in FRAMES_BY if key in train}

@@ -40,9 +40,9 @@ class SubjectFolders:
         return self.root / "scene"
 
     @property
-    def mattes(self) -> Path:
-        """matte: where the subject is in the pictures (training/mattes/folder.py), and which mattes train."""
-        return self.root / "mattes"
+    def subject(self) -> Path:
+        """subject: who stands where (subject/folder.py)."""
+        return self.root / "subject"
 
     @property
     def model(self) -> Path:

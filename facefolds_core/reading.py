@@ -35,7 +35,7 @@ STAGE_OF = {
     "config": "configure",
     "capture": "capture",
     "scene": "normalize",
-    "mattes": "matte",
+    "subject": "subject",
     "model": "train",
     "samples": "sample",
     "surfaces": "reconstruct",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.captures.chosen_mattes import scored_scene
+from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config import read_stage, read_subject, read_train
 from facefolds_core.facts import Fact
@@ -49,7 +49,7 @@ def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluat
 def evaluate_subject(folders: SubjectFolders) -> str:
     params = read_stage(EvaluateParams, folders.config)
     device = device_of(read_train(folders.config))
-    scene, asset = scored_scene(folders), read_asset(folders.asset)
+    scene, asset = found_scene(folders), read_asset(folders.asset)
     cost = read_cost(folders, asset.manifest)
     perceptual, model = find_perceptual(device), load_model(folders.model, device)
     with atomic_folder(folders.evaluation) as temporary:

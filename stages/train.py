@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from facefolds_core.captures.chosen_mattes import training_scene
+from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.config import read_train
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.training.models import train
@@ -11,7 +11,7 @@ from stages.common import run_stage
 
 def train_stage(folders: SubjectFolders) -> str:
     params = read_train(folders.config)
-    scene = training_scene(folders)
+    scene = found_scene(folders)
     report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)
     return (
         f"{report.iterations} iterations on {report.device}, {report.rays_per_second:.0f} rays/s, "

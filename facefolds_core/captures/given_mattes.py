@@ -35,7 +35,7 @@ def given_mattes(folder: Path, scene: Scene) -> Iterator[tuple[int, int, Image]]
             place="mattes",
             expected=f"CAMERA.png or CAMERA/FRAME.png of the cameras {shorten([c.name for c in scene.cameras], 100)}",
             found="a folder without them" if folder.is_dir() else "no such folder",
-            remedy="copy some from data/SUBJECT/mattes, correct the path, or take `mattes` of this subject out",
+            remedy="copy some from data/SUBJECT/subject, correct the path, or take `mattes` of this subject out",
         )
     for (camera, frame), path in files.items():
         place = f"matte of camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}"

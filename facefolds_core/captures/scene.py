@@ -65,6 +65,7 @@ class Scene:
         poses: the head's own frame -> world in each of the K frames; None where the head is taken to stand still.
         radius: of the ball about the origin that holds the subject, units; None where it is to be found.
         mattes: file of mattes in place of the scene's own, none at all if it is not there; None: the scene's own.
+        start: file of the subject's Gaussians; None until it has been found.
     """
 
     subject: str
@@ -79,6 +80,7 @@ class Scene:
     poses: Track | None = None
     radius: float | None = None
     mattes: Path | None = None
+    start: Path | None = None
 
     @property
     def width(self) -> int:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from facefolds_core.captures.chosen_mattes import scored_scene
+from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.cli.report import evaluated_subjects
 from facefolds_core.config import read_stage, read_train
 from facefolds_core.errors import report_user_errors
@@ -33,7 +33,7 @@ def command(
     with report_user_errors("waterfall"):
         st_lpips = load_st_lpips()
         for folders in map(SubjectFolders, subjects or evaluated_subjects(data)):
-            scene, device = scored_scene(folders), device_of(read_train(folders.config))
+            scene, device = found_scene(folders), device_of(read_train(folders.config))
             model, params = load_model(folders.model, device), read_stage(EvaluateParams, folders.config)
             distance = None if st_lpips is None else st_lpips.to(device)
             found = waterfall(scene, model, folders, frames, distance, params)

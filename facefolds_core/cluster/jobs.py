@@ -45,7 +45,7 @@ def subject_jobs(params: Params, root: Path, subjects: Sequence[str], stage: str
 def links_of(params: Params, root: Path, subject: str) -> tuple[tuple[str, str], ...]:
     """Its capture and the mattes that it names, where relative paths lead to them and they are no part of the code."""
     own = params.subject(subject)
-    paths = [Path(one) for one in (own.path, own.mattes) if one is not None]
+    paths = [Path(one) for one in (own.path, own.mattes, own.start) if one is not None]
     outside = [path for path in paths if not path.is_absolute() and path.parts[:1] not in [(name,) for name in CODE]]
     return tuple((str(path), str((root / path).resolve())) for path in outside)
 

@@ -33,8 +33,7 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.few_cameras import FewCameraParams
-from facefolds_core.params.matte import CutOutParams, MatteParams, OutlineParams, PlateParams, VoteParams
+from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
@@ -43,16 +42,6 @@ from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
-from facefolds_core.params.volume import (
-    CameraParams,
-    EnvironmentParams,
-    RoomParams,
-    SubjectParams,
-    VolumeLevel,
-    VolumeParams,
-    WallParams,
-    WarningParams,
-)
 
 __all__ = [
     "PRESETS",
@@ -61,17 +50,13 @@ __all__ = [
     "AttentionParams",
     "BackgroundParams",
     "BakeParams",
-    "CameraParams",
     "CaptureParams",
     "CodecName",
     "CompressParams",
-    "CutOutParams",
     "DecimateParams",
     "DivergenceParams",
-    "EnvironmentParams",
     "EvaluateParams",
     "ExplicitParams",
-    "FewCameraParams",
     "FollowParams",
     "FrameRange",
     "GeometryParams",
@@ -80,20 +65,16 @@ __all__ = [
     "HoldoutEvery",
     "LevelParams",
     "LossParams",
-    "MatteParams",
     "MeshCodec",
     "MeshParams",
     "MlpParams",
     "MovingParams",
     "NormalizeParams",
-    "OutlineParams",
     "Overrides",
-    "PlateParams",
     "Preset",
     "PruningParams",
     "ReconstructParams",
     "ReflectionParams",
-    "RoomParams",
     "SampleParams",
     "ScoreWarningParams",
     "Section",
@@ -106,11 +87,6 @@ __all__ = [
     "TrainParams",
     "TrainSection",
     "VideoCodec",
-    "VolumeLevel",
-    "VolumeParams",
-    "VoteParams",
-    "WallParams",
-    "WarningParams",
     "merged",
     "nested",
     "section_of",

@@ -7,20 +7,10 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
-from facefolds_core.params.few_cameras import FewCameraParams
-from facefolds_core.params.matte import OutlineParams
 from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
-from facefolds_core.params.volume import (
-    CameraParams,
-    EnvironmentParams,
-    RoomParams,
-    SubjectParams,
-    VolumeParams,
-    WarningParams,
-)
 
 
 class GridTextureParams(Section):
@@ -151,9 +141,6 @@ class MovingParams(Section):
     background_rate: Share = 0.03
     """Upper bound of `background.rate`, since a turning head stands before other pixels in each frame."""
 
-    volume_frames: Count = 5
-    """Frames that the starting volume is fitted to."""
-
     sample: Count = 64
     """One ray in so many is looked at to estimate how many meet the subject."""
 
@@ -210,27 +197,6 @@ class ExplicitParams(Section):
     """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
     them."""
 
-    volume: VolumeParams = VolumeParams()
-    """The starting volume."""
-
-    room: RoomParams = RoomParams()
-    """What stands around the subject, with parallax."""
-
-    subject: SubjectParams = SubjectParams()
-    """Which part of the volume is the subject."""
-
-    environment: EnvironmentParams = EnvironmentParams()
-    """What lies behind volume and room."""
-
-    warnings: WarningParams = WarningParams()
-    """When it is said that something is not well."""
-
-    cameras: CameraParams = CameraParams()
-    """What single cameras do differently."""
-
-    few_cameras: FewCameraParams = FewCameraParams()
-    """What is otherwise with few of them."""
-
     start: StartParams = StartParams()
     """What the layers take from the volume."""
 
@@ -260,9 +226,6 @@ class ExplicitParams(Section):
 
     segments: SegmentParams = SegmentParams()
     """Of takes that are too long to be trained at once."""
-
-    outlines: OutlineParams = OutlineParams()
-    """Where the subject is in a training picture, for `pruning.beside_gain`."""
 
     pruning: PruningParams = PruningParams()
     """What is left out in the end."""

@@ -15,7 +15,7 @@ from facefolds_core.params.compress import CompressParams
 from facefolds_core.params.evaluate import EvaluateParams
 from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
-from facefolds_core.params.matte import MatteParams
+from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.renamed import RENAMED, remedy_for
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 from facefolds_core.parsing import brief
@@ -23,7 +23,7 @@ from facefolds_core.parsing import brief
 SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "capture": (CaptureParams,),
     "normalize": (NormalizeParams,),
-    "matte": (MatteParams,),
+    "subject": (SubjectParams,),
     "train": get_args(TrainParams),
     "sample": (SampleParams,),
     "reconstruct": (ReconstructParams,),

@@ -47,8 +47,8 @@ class Overrides(Section):
     normalize: Raw = Field(default_factory=dict)
     """See `normalize`."""
 
-    matte: Raw = Field(default_factory=dict)
-    """See `matte`."""
+    subject: Raw = Field(default_factory=dict)
+    """See `subject`."""
 
     train: Raw = Field(default_factory=dict)
     """See `train`."""
@@ -105,12 +105,16 @@ class Subject(Overrides):
     pictures (scene/place.png)."""
 
     radius: Annotated[float, Field(gt=0, le=1e9)] | None = None
-    """Radius of the ball about the centre that holds the subject, in the capture's unit of length. null takes
-    `train.volume.reach`, and more where that cuts the subject off."""
+    """Radius of the ball about the centre that holds the subject, in the capture's unit of length; null takes a ball
+    of 45 cm about a head."""
 
     mattes: str | None = None
     """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png. They take the place of the capture's
     own or of found ones. Relative paths start at the project's folder."""
+
+    start: str | None = None
+    """A PLY file of Gaussians (3DGS, as gsplat, nerfstudio, OpenSplat and Postshot write it) in the capture's
+    coordinates, of the middle frame. They take the place of those that the stage `subject` fits."""
 
     krt_size: Pair[Count] | None = None
     """[width, height], pixels, of the images that KRT refers to; null finds out."""

@@ -25,7 +25,7 @@ REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
 STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
     "capture": ("capture",),
     "normalize": ("scene",),
-    "matte": ("mattes",),
+    "subject": ("subject",),
     "train": ("model", "training"),
     "sample": ("samples",),
     "reconstruct": ("surfaces",),

@@ -34,7 +34,7 @@ def make_index(data: Path) -> Path:
 
 def configured(data: Path) -> set[str]:
     """Subjects that `configure` has found in params.yaml."""
-    return {path.parent.name for path in (data / ".config").glob("*/subject.json")}
+    return {path.parent.name for path in (data / ".config").glob("*/entry.json")}
 
 
 def row(folder: Path) -> dict[str, Any]:

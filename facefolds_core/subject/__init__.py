@@ -1,10 +1,7 @@
-"""What is the subject, found once: Gaussians that explain the pictures of one frame, the room included.
+"""Who stands where, found once, before anything is trained: the subject's Gaussians, and mattes of all pictures.
 
-- `fit.fit_start(scene, frame)` fits them, `foreign.read_start(path, scene)` takes those of another program;
-- `drawing.render(splats, camera)` is their picture;
-- `mattes.find_subject(scene, splats)` says which are the subject, `found.subject_of` before the pictures have voted;
-- `mattes.find_mattes(scene, splats)` is the subject's opacity in each training picture;
-- `found.background(splats, subject, camera)` is what stands behind it.
-
-No stage uses it yet.
+- `find.find_subject(scene, params)` finds both; `folder.make_folder` writes what the stage `subject` leaves;
+- `fit.fit_pictures` fits Gaussians, `foreign.read_start` takes those of another program, `drawing.render` draws them;
+- `mattes.Mattes` is the subject's opacity in each picture: given, beside a plate, or from Gaussians and colours;
+- `volume.volume_of` is the subject as a grid, and `outline.profile` where it lies along the rays of a chart.
 """

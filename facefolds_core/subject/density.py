@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, TURN
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ FAINTER = 0.8
 """Opacity of the halves, in shares of the whole's."""
 
 
-def thinned(state: State, params: StartParams) -> State:
+def thinned(state: State, params: GaussianParams) -> State:
     """Without those that are hardly there."""
     kept = state.values[:, OPACITY] > np.log(params.faintest / (1 - params.faintest))
     kept &= np.isfinite(state.values).all(1)

@@ -1,4 +1,4 @@
-"""Fit Gaussians to the training pictures of one frame, the room included: small pictures first."""
+"""Fit Gaussians to pictures: small ones first."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.adam_kernel import adam_step
 from facefolds_core.subject.density import grown, thinned
 from facefolds_core.subject.drawing import View, differentiate, draw, view_of
 from facefolds_core.subject.loss import picture_loss
-from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.seeds import seeds
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats
-from facefolds_core.training.adam import corrections, decays
+from facefolds_core.adam import corrections, decays
 
 Array = NDArray[np.float32]
 
@@ -49,81 +48,112 @@ class State:
 
 @dataclass(frozen=True)
 class Target:
-    """A training picture of one size.
+    """A training picture of one size, of whole tiles.
 
     Attributes:
         view: its camera.
-        picture: (3, H, W) float32 of whole tiles.
+        picture: (3, H, W) float32; of a cut-out colours times opacity.
+        opacity: (H, W) float32 of the subject, or None where the room is in the picture, too.
     """
 
     view: View
     picture: Array
+    opacity: Array | None = None
+
+    def over(self, behind: Array) -> Array:
+        """(3, H, W): a cut-out over a colour (3,), else the picture."""
+        if self.opacity is None:
+            return self.picture
+        return np.asarray(self.picture + (1 - self.opacity) * behind[:, None, None], np.float32)
 
 
-def fit_start(scene: Scene, frame: int = 0, params: StartParams | None = None, seed: int = 0) -> Splats:
-    """Gaussians of the training pictures of one frame."""
-    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or StartParams(), seed)
+def fit_pictures(
+    cameras: Sequence[Camera],
+    pictures: Sequence[Array],
+    params: GaussianParams,
+    seed: int = 0,
+    opacities: Sequence[Array] | None = None,
+    begun: Splats | None = None,
+) -> Splats:
+    """Gaussians of some pictures (H, W, 3) float32 in [0, 1]: of the room as well, or of the subject alone.
 
-
-def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[Camera], list[Array]]:
-    """Those of some cameras that have a picture of the frame, and the pictures, (H, W, 3) float32 in [0, 1]."""
-    store = scene.open_frames()
-    there = [i for i in cameras if (i, frame) in store]
-    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in there]
-    return [scene.camera_in_head(i, frame) for i in there], pictures
-
-
-def fit_pictures(cameras: Sequence[Camera], pictures: Sequence[Array], params: StartParams, seed: int = 0) -> Splats:
-    """Gaussians of some pictures (H, W, 3) float32 in [0, 1]."""
+    Args:
+        opacities: (H, W) in [0, 1] of the subject; its colours times opacity are the pictures then, and it is
+            compared over a colour that changes with each step.
+        begun: Gaussians to begin with; they get the last steps only, and stay as many.
+    """
     random = np.random.default_rng(seed)
     pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
     count = int(np.clip(pixels / params.pixels, params.fewest, params.most))
-    begun = int(params.seeds * count)
-    state = State.of(seeds(cameras, pictures, begun, params.ball, random))
+    first, starting = 0, int(params.seeds * count)
+    if begun is None:
+        over = pictures if opacities is None else [_over_grey(*pair) for pair in zip(pictures, opacities, strict=True)]
+        state = State.of(seeds(cameras, over, starting, params.ball, random, opacities))
+    else:
+        first, state = int((1 - params.again) * params.iterations), State.of(begun.values.copy())
     background = np.mean([picture.mean((0, 1)) for picture in pictures], 0).astype(np.float32)
     targets: list[Target] = []
     level, order = -1.0, np.arange(0)
-    for step in range(params.iterations):
+    for step in range(first, params.iterations):
         done = step / params.iterations
         size = [share for start, share in params.levels if start <= done][-1]
         if size != level:
-            level, targets = size, [_target(*pair, size) for pair in zip(cameras, pictures, strict=True)]
+            alphas = [None] * len(cameras) if opacities is None else opacities
+            level = size
+            targets = [_target(*each, size) for each in zip(cameras, pictures, alphas, strict=True)]
         if not len(order):
             order = random.permutation(len(targets))
-        _improve(state, targets[order[0]], background, params, step, random)
+        behind = background if opacities is None else random.random(3, np.float32)
+        _improve(state, targets[order[0]], behind, params, step, step - first, random)
         order = order[1:]
         if (step + 1) % params.every == 0 and done < params.grown:
-            wanted = begun + (count - begun) * (step + 1) / (params.grown * params.iterations)
+            wanted = starting + (count - starting) * (step + 1) / (params.grown * params.iterations)
             state = grown(thinned(state, params), min(int(wanted), count))
-    return Splats(thinned(state, params).values, background)
+    return Splats(thinned(state, params).values, background if opacities is None else np.zeros(3, np.float32))
+
+
+def _over_grey(picture: Array, opacity: Array) -> Array:
+    return np.asarray(picture + (1 - opacity[..., None]) * np.float32(0.5))
 
 
 def _improve(
-    state: State, target: Target, background: Array, params: StartParams, step: int, random: np.random.Generator
+    state: State,
+    target: Target,
+    behind: Array,
+    params: GaussianParams,
+    step: int,
+    before: int,
+    random: np.random.Generator,
 ) -> None:
-    """One step of Adam towards one picture; some Gaussians are left out, so that none hides what another gets wrong
-    (DropGaussian, Park et al. 2025)."""
+    """One step of Adam, after so many `before`, towards one picture over a colour (3,); some Gaussians are left out, so
+    that none hides what another gets wrong (DropGaussian, Park et al. 2025)."""
     values = state.values.copy()
     values[random.random(len(values)) < params.dropped, OPACITY] = ABSENT
     drawing = draw(values, target.view)
-    wish, wish_light = picture_loss(drawing, target.picture, background, params.structure)
+    wish, wish_light = picture_loss(drawing, target.over(behind), behind, params.structure)
     gradient, moved = differentiate(values, drawing, wish, wish_light)
     seen = np.diff(drawing.first) > 0
     state.moved += moved * max(target.view.size) / 2
-    rates, correct = _rates(params, step / params.iterations), np.array(corrections(BETAS, step + 1), np.float32)
+    rates, correct = _rates(params, step / params.iterations), np.array(corrections(BETAS, before + 1), np.float32)
     adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
 
 
-def _target(camera: Camera, picture: Array, size: float) -> Target:
+def _target(camera: Camera, picture: Array, opacity: Array | None, size: float) -> Target:
     width, height = max(8, round(camera.width * size)), max(8, round(camera.height * size))
-    small = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     view = view_of(camera.resized(width, height))
-    whole = np.zeros((3, *view.padded), np.float32)
-    whole[:, :height, :width] = np.moveaxis(small, -1, 0)
-    return Target(view, whole)
+    whole = np.zeros((4, *view.padded), np.float32)
+    whole[:3, :height, :width] = np.moveaxis(_smaller(picture, width, height), -1, 0)
+    if opacity is None:
+        return Target(view, whole[:3])
+    whole[3, :height, :width] = _smaller(opacity, width, height)
+    return Target(view, whole[:3], whole[3])
 
 
-def _rates(params: StartParams, done: float) -> Array:
+def _smaller(image: Array, width: int, height: int) -> Array:
+    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _rates(params: GaussianParams, done: float) -> Array:
     """(COLUMNS,) of Adam."""
     rates = np.empty(COLUMNS, np.float32)
     first, last = params.rate_mean

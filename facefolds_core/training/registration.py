@@ -1,7 +1,7 @@
-"""Poses of a head found from the pictures alone: each frame is laid over the volume of one.
+"""Poses of a head found from the pictures alone: each frame is laid over the subject of one.
 
-The volume of the reference frame (all cameras, one moment: nothing need be known of motion) gives points of the
-subject's surface, with what each camera saw there. A pose of another frame moves the points; in the same camera's
+The subject of the reference frame (all cameras, one moment: nothing need be known of motion) gives points of its
+surface, with what each camera saw there. A pose of another frame moves the points; in the same camera's
 picture of that frame they should look alike. The six numbers of a frame follow by Gauss-Newton from coarse to fine,
 started from where its neighbour's motion leads; then one number more, how deep the points lie behind what the volume
 says, follows from all frames together. Pictures are compared after local normalisation, with Cauchy's
@@ -26,12 +26,12 @@ from facefolds_core.files import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
-from facefolds_core.params import ExplicitParams, NormalizeParams
+from facefolds_core.params import NormalizeParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.spill import by_rows
+from facefolds_core.subject.find import find_subject, reference_frame
+from facefolds_core.subject.volume import Volume, volume_of
 from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
-from facefolds_core.training.volume.fit import Volume, iterations
-from facefolds_core.training.volume.search import find_subject
 
 Array = NDArray[np.float64]
 
@@ -80,17 +80,15 @@ def find_track(scene: Scene) -> Found:
     Raises:
         UserError: if the cameras do not look at one place, or nothing stands out from the background.
     """
-    training = ExplicitParams()
-    with progress(total=iterations(training.volume), desc="volume", unit="it") as bar:
-        volume, _ = find_subject(scene, training, bar)
+    volume, reference = volume_of(find_subject(scene, SubjectParams())[0].splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     points = [surface_points(volume, camera) for camera in cameras]
     frames = scene.num_frames
     with progress(total=frames * (1 + ROUNDS) - 1, desc="poses", unit="frame") as bar:
-        poses, likeness = _all_frames(scene, cameras, points, volume.frame, bar)
+        poses, likeness = _all_frames(scene, cameras, points, reference, bar)
         for _ in range(ROUNDS):
-            points, poses, likeness = _deepened(scene, cameras, points, poses, volume.frame, bar)
-    refused = _refused(poses, likeness, volume.frame)
+            points, poses, likeness = _deepened(scene, cameras, points, poses, reference, bar)
+    refused = _refused(poses, likeness, reference)
     poses = _bridged(poses, refused)
     cloud = np.concatenate([one.positions for one in points])
     middle = cloud.mean(0)

@@ -11,7 +11,7 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.training.adam import EPSILON
+from facefolds_core.adam import EPSILON
 
 
 @kernel(parallel=True)

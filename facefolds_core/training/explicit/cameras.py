@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
-from facefolds_core.training.volume.cameras import CameraFit
+from facefolds_core.subject.cameras import CameraFit
 
 
 @dataclass(frozen=True)

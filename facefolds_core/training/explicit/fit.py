@@ -16,9 +16,8 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
-from facefolds_core.training.explicit.tracked import blend, mesh_radii, trusted_surface
-from facefolds_core.training.volume.fit import Volume
-from facefolds_core.training.volume.outline import (
+from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.outline import (
     Profile,
     choose_chart,
     profile,
@@ -26,9 +25,14 @@ from facefolds_core.training.volume.outline import (
     whole_window,
     window_uv,
 )
-from facefolds_core.training.volume.sight import seen_share
+from facefolds_core.subject.sight import seen_share
+from facefolds_core.subject.volume import Volume
+from facefolds_core.training.explicit.tracked import blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
+
+MIN_VIEW_SHARE = 0.06
+"""Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Fit:
         reasons: one a choice, and the notes.
         notes: what a user should know at once.
         losses: of the candidates for the chart, the share of the visible surface that each loses.
-        volume_psnr: of the volume on training rays, dB.
+        start_psnr: of the subject's Gaussians over the training pictures, dB.
     """
 
     chart: Chart
@@ -60,17 +64,18 @@ class Fit:
     reasons: tuple[Fact, ...]
     notes: tuple[Fact, ...]
     losses: dict[Chart, float]
-    volume_psnr: float
+    start_psnr: float
 
 
-def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
+def fit_scene(scene: Scene, volume: Volume, psnr: float, params: ExplicitParams) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
 
     Args:
-        volume: of the scene's middle frame, without what floats beside the subject.
+        volume: of the subject.
+        psnr: of its Gaussians, dB.
     """
     start, geometry = params.start, params.geometry
-    cameras = [scene.camera_in_head(i, volume.frame) for i in scene.indices("train")]
+    cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
     visible = visible_points(volume, cameras)
     chart, losses = choose_chart(volume, visible, start)
     surface, notes = trusted_surface(scene, volume, chart, params)
@@ -86,7 +91,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
     else:
         mesh = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
-        unseen = seen_share(cameras, points).reshape(mesh.shape) < params.volume.min_view_share
+        unseen = seen_share(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, params.mesh.reach)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
@@ -109,7 +114,7 @@ def fit_scene(scene: Scene, volume: Volume, params: ExplicitParams) -> Fit:
         reasons=(*_reasons(params, losses[chart], source, most), *notes),
         notes=notes,
         losses=losses,
-        volume_psnr=volume.psnr,
+        start_psnr=psnr,
     )
 
 

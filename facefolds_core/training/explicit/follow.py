@@ -18,7 +18,7 @@ from scipy import ndimage
 
 from facefolds_core.hit_codes import before
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.adam import corrections, decays
+from facefolds_core.adam import corrections, decays
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.state import LossWeights, TextureState
 from facefolds_core.training.explicit.targets import change_behind

@@ -13,7 +13,7 @@ from numba import prange
 from facefolds_core.hit_codes import corner
 from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
-from facefolds_core.training.adam import EPSILON
+from facefolds_core.adam import EPSILON
 from facefolds_core.training.explicit.adam_kernel import activate_texel
 from facefolds_core.training.explicit.shading_kernel import rgba_tap, tap_share
 

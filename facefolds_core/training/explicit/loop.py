@@ -17,6 +17,8 @@ from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.facts import Fact
 from facefolds_core.params import ExplicitParams, LossParams
 from facefolds_core.progress import progress
+from facefolds_core.subject.find import found_in, subject_in
+from facefolds_core.subject.volume import volume_of
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.cameras import choose_cameras
@@ -34,8 +36,6 @@ from facefolds_core.training.log import open_log
 from facefolds_core.training.patience import check_space, patiently
 from facefolds_core.training.report import TrainingReport, make_report
 from facefolds_core.training.trained import Trained
-from facefolds_core.training.volume.fit import iterations
-from facefolds_core.training.volume.search import find_subject
 
 
 def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log: Path) -> TrainingReport:
@@ -135,13 +135,14 @@ def fit_with_surroundings(
     began = time.perf_counter()
     used, _ = for_scene(params, scene)
     with open_log(log) as live:
-        bar = progress(total=iterations(params.volume) + params.iterations, desc="train", unit="it")
-        volume, found = find_subject(scene, used, bar)
-        cameras = choose_cameras(scene, volume.cameras)
+        bar = progress(total=params.iterations, desc="train", unit="it")
+        subject, found = subject_in(scene), ()
+        volume = volume_of(subject.splats)
+        cameras = choose_cameras(scene, subject.cameras)
         for note in (*found, *cameras.notes):
             bar.write(f"train: {note}")
         own = for_mattes(for_notes(for_poses(used, scene), found), scene)
-        fit = fit_scene(cameras.scene, volume, own)
+        fit = fit_scene(cameras.scene, volume, subject.psnr, own)
         warnings = warnings_of(scene, fit, params.warnings)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
-from facefolds_core.training.adam import EPSILON, Betas
+from facefolds_core.adam import EPSILON, Betas
 
 
 def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.adam import corrections, decays
+from facefolds_core.adam import corrections, decays
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core import gpu
-from facefolds_core.training.adam import decays
+from facefolds_core.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
 from facefolds_core.training.explicit.state import LossWeights, TextureState
 from facefolds_core.training.explicit.views import Images, Pictures, Rays, Views

@@ -32,7 +32,7 @@ from facefolds_core.training.explicit.state import LossWeights, TextureState, on
 from facefolds_core.training.explicit.targets import CutOuts, all_mattes, change_behind
 from facefolds_core.training.explicit.views import Images, Rays, rays_of
 from facefolds_core.training.log import log_metrics
-from facefolds_core.training.volume.fit import Volume
+from facefolds_core.subject.volume import Volume
 
 
 class Trainer:

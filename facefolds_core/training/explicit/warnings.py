@@ -11,8 +11,8 @@ from facefolds_core.training.explicit.fit import Fit
 def warnings_of(scene: Scene, fit: Fit, params: WarningParams) -> tuple[Fact, ...]:
     """One for each thing that is not well; its words say what to do."""
     found = []
-    if fit.volume_psnr < params.min_volume_psnr:
-        found.append(fact("volume_explains_little", psnr=fit.volume_psnr, under=params.min_volume_psnr))
+    if fit.start_psnr < params.min_volume_psnr:
+        found.append(fact("volume_explains_little", psnr=fit.start_psnr, under=params.min_volume_psnr))
     lost = fit.losses[fit.chart]
     if lost > params.max_lost:
         found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))

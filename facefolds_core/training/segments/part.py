@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 from tqdm import tqdm
 
-from facefolds_core.captures.chosen_mattes import training_scene
+from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.config import read_train
 from facefolds_core.errors import UserError, report_user_errors
@@ -82,7 +82,7 @@ def command(
         params = read_train(folders.config)
         if not isinstance(params, ExplicitParams):
             raise UserError("a model without segments", place=f"train.model of {subject}", expected="explicit")
-        scene = training_scene(folders)
+        scene = found_scene(folders)
         if part == BASE:
             made = make_base(folders, scene, params, begun)
         else:

@@ -7,15 +7,57 @@ ring by ring, from the subject's inside outwards; each ring's colours tell the n
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.params import PlateParams
 
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PlateParams:
+    """Pictures beside their clean plates: what differs is the subject.
+
+    Attributes:
+        blur: blur of both before they are compared, standard deviation, pixels.
+        different: difference of a colour, in [0, 1], above which a pixel may be the subject's.
+        least: things smaller than this share of the largest are taken for shadows or reflections.
+        outline: pixels inside of the outline within which opacity is found from colours.
+        beyond: pixels outside of the outline within which opacity is found from colours.
+        faint: least difference of a colour that shows a little of the subject beyond the outline.
+        faint_noise: least value of `faint` in multiples of the pictures' noise.
+        noise: least standard deviation of noise that is reckoned with.
+        quiet: noise is measured at least so many pixels beyond the outline.
+        spread: neighbourhood whose colours the subject is taken to have at the outline, standard deviation,
+            pixels.
+        deviation: least standard deviation of the subject's colours at the outline.
+        alike: price, as a logarithm of likelihood, of an opacity that differs by 1 from those around it.
+        beside: surroundings of a pixel that `alike` compares, standard deviation, pixels.
+        solid: bonus, as a logarithm of likelihood, of an opacity of 1.
+        steps: opacities from 0 to 1 that are compared.
+    """
+
+    blur: float = 0.7
+    different: float = 0.05
+    least: float = 0.05
+    outline: int = 8
+    beyond: int = 6
+    faint: float = 0.012
+    faint_noise: float = 2.5
+    noise: float = 0.01
+    quiet: int = 12
+    spread: float = 6.0
+    deviation: float = 0.01
+    alike: float = 3.0
+    beside: float = 1.5
+    solid: float = 2.0
+    steps: int = 21
+
 
 TINY = float(np.finfo(np.float32).eps)
 """No mean is formed by a smaller weight, no variance is smaller."""

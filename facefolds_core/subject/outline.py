@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
-from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.params import StartParams
-from facefolds_core.training.volume import look_kernel
-from facefolds_core.training.volume.fit import Volume
+from facefolds_core.subject import look_kernel
+from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
@@ -65,14 +64,6 @@ def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
     shape = uv.shape[:-1]
     middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
     return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))
-
-
-def thickness(volume: Volume, least: float) -> float:
-    """Depth over which a surface is spread in the volume, units: from a tenth to nine tenths of the opacity, median
-    over the directions of the hemisphere that are opaque by `least`; 0 where none is."""
-    found = profile(volume, Chart(SPHERE_CENTRE), window_uv(FULL_WINDOW, 96, 96), least)
-    depths = (found.outer - found.inner)[np.isfinite(found.radius)]
-    return float(np.median(depths)) if len(depths) else 0.0
 
 
 def window_uv(window: Window, rows: int, columns: int) -> Array:

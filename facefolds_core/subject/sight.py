@@ -1,4 +1,4 @@
-"""Which points the cameras see, compiled for CPUs. Reference: `reference.seen_share`."""
+"""Which points the cameras see, compiled for CPUs."""
 
 from __future__ import annotations
 

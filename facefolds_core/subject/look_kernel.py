@@ -9,7 +9,7 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.training.volume.trilinear import sample
+from facefolds_core.subject.trilinear import sample
 
 CLEAR, OPAQUE = 1e-4, 1e-3
 """Samples with less alpha are left out, and so is what lies behind less transmittance."""

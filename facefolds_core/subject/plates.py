@@ -7,20 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.params import PlateParams
-from facefolds_core.training.mattes.cut_out import grown
-from facefolds_core.training.mattes.known_background import opacity_before
+from facefolds_core.subject.cut_out import grown
+from facefolds_core.subject.known_background import PlateParams, opacity_before
 
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
 
-def from_plate(image: Image, plate: Image, params: PlateParams) -> Array:
+def from_plate(image: Image, plate: Image, params: PlateParams | None = None) -> Array:
     """(H, W) opacity of the subject in [0, 1].
 
     Args:
         image, plate: (H, W, 3).
     """
+    params = params or PlateParams()
     subject = _different(image, plate, params)
     return _soft(image, plate, subject, params) if subject.any() else subject.astype(np.float32)
 

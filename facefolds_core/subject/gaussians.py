@@ -1,4 +1,4 @@
-"""How the start representation is fitted."""
+"""How Gaussians are fitted to pictures."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class StartParams:
-    """Of `fit_start`.
+class GaussianParams:
+    """Of `fit_pictures`.
 
     Attributes:
         pixels: of all training pictures a Gaussian; there are `fewest` to `most` of them at the end.
@@ -23,6 +23,7 @@ class StartParams:
         faintest: opacity under which a Gaussian is taken away.
         dropped: share of the Gaussians that is left out of each picture.
         structure: weight of SSIM beside the mean absolute difference.
+        again: share of the iterations that Gaussians get which are there already: the last ones.
     """
 
     pixels: float = 120.0
@@ -43,3 +44,4 @@ class StartParams:
     faintest: float = 0.01
     dropped: float = 0.1
     structure: float = 0.2
+    again: float = 0.25

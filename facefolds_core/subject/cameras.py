@@ -1,7 +1,7 @@
-"""What single cameras do differently from the others, told from what the volume shows on their rays: their exposure
+"""What single cameras do differently from the others, told from what the Gaussians show in their pictures: their exposure
 and white balance, and whether they look where they are said to look.
 
-Only rays count on which the volume is nearly opaque: what is behind is no surface that several cameras see alike."""
+Only pixels count that the subject covers: what is behind is no surface that several cameras see alike."""
 
 from __future__ import annotations
 
@@ -10,10 +10,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.params import CameraParams
 
 Array = NDArray[np.float32]
 Gains = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CameraParams:
+    """How cameras are judged.
+
+    Attributes:
+        min_opacity: of pixels that count.
+        min_rays: a camera with fewer of them keeps the gain 1.
+        prior: uncertainty of colours when gains are fitted, which draws gains towards 1.
+        outlier: pixels whose residual is beyond so many medians are left out of the second fit.
+        min_gain_spread: gains whose standard deviation over cameras is smaller are taken to be 1.
+        max_error_ratio: a camera with an error over so many medians is left out.
+    """
+
+    min_opacity: float = 0.95
+    min_rays: int = 50
+    prior: float = 0.02
+    outlier: float = 2.5
+    min_gain_spread: float = 0.03
+    max_error_ratio: float = 2.0
 
 
 def camera_gains(
@@ -79,12 +99,12 @@ class CameraFit:
 
     measured: Gains
     errors: Gains
-    params: CameraParams
+    params: CameraParams = CameraParams()
 
     @classmethod
-    def alike(cls, count: int, params: CameraParams) -> CameraFit:
+    def alike(cls, count: int) -> CameraFit:
         """Nothing known yet: all cameras alike."""
-        return cls(np.ones((count, 3)), np.full(count, np.nan), params)
+        return cls(np.ones((count, 3)), np.full(count, np.nan))
 
     @property
     def gains(self) -> Gains:

@@ -1,15 +1,10 @@
-"""Trilinear values of a grid of density and colour, and what is wanted at a point put to its eight voxels: compiled.
-
-What is read comes back as numbers, not in an array: for all a compiler knows, an array that is written between two
-reads may be the grid, so that it keeps eight additions in line that could run side by side (half of a step)."""
+"""Trilinear values of a grid of density and colour, compiled."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from facefolds_core.jit import add4, inlined
+from facefolds_core.jit import inlined
 
 
 @inlined
@@ -63,19 +58,3 @@ def sample(grid, x, y, z):  # type: ignore[no-untyped-def]
         value(grid, i, j, k, w, 2),
         value(grid, i, j, k, w, 3),
     )
-
-
-@inlined
-def put(gradient: Any, touched: Any, i: Any, j: Any, k: Any, w: Any, g: Any) -> None:
-    """Add g, of raw density and rgb, to the voxels of the cell (i, j, k) by the weights w; say so in touched (X, Y)."""
-    i1, j1, k1 = i + np.uint64(1), j + np.uint64(1), k + np.uint64(1)
-    touched[i, j], touched[i, j1], touched[i1, j], touched[i1, j1] = True, True, True, True
-    g0, g1, g2, g3 = g
-    add4(gradient, (i, j, k), w[0] * g0, w[0] * g1, w[0] * g2, w[0] * g3)
-    add4(gradient, (i, j, k1), w[1] * g0, w[1] * g1, w[1] * g2, w[1] * g3)
-    add4(gradient, (i, j1, k), w[2] * g0, w[2] * g1, w[2] * g2, w[2] * g3)
-    add4(gradient, (i, j1, k1), w[3] * g0, w[3] * g1, w[3] * g2, w[3] * g3)
-    add4(gradient, (i1, j, k), w[4] * g0, w[4] * g1, w[4] * g2, w[4] * g3)
-    add4(gradient, (i1, j, k1), w[5] * g0, w[5] * g1, w[5] * g2, w[5] * g3)
-    add4(gradient, (i1, j1, k), w[6] * g0, w[6] * g1, w[6] * g2, w[6] * g3)
-    add4(gradient, (i1, j1, k1), w[7] * g0, w[7] * g1, w[7] * g2, w[7] * g3)

@@ -1,0 +1,100 @@
+"""The subject's silhouette in one picture: roughly from its Gaussians, to the pixel from the picture's colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.known_background import PlateParams, opacity_before
+
+Array = NDArray[np.float32]
+Image = NDArray[np.uint8]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class EdgeParams:
+    """How an outline is found in a picture.
+
+    Attributes:
+        inside, outside: opacities of the Gaussians above and below which they are believed;
+        band: and so many pixels off from where they are neither, at a picture of 384 pixels;
+        grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
+        share: of the pictures that see a Gaussian and take it for the subject's, at least.
+        rounds: how often pictures and Gaussians tell each other.
+        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels.
+        noise: standard deviation of what stands behind, of values in [0, 1].
+        agreeing: IoU of a silhouette with the Gaussians', under which it is not believed.
+    """
+
+    inside: float = 0.9
+    outside: float = 0.3
+    band: float = 2.0
+    grow: float = 4.0
+    share: float = 0.75
+    rounds: int = 2
+    soft: float = 4.0
+    noise: float = 0.1
+    agreeing: float = 0.65
+
+
+def cut_out(picture: Image, start: Array, camera: Camera, edge: EdgeParams) -> Bool:
+    """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut (Rother et al. 2004) between what is surely its
+    and surely not.
+
+    Args:
+        start: (H, W) opacity of its Gaussians.
+    """
+    radius = pixels(edge.band, camera)
+    inside = grown((start < edge.inside).astype(np.uint8), radius) == 0
+    near = grown((start > edge.outside).astype(np.uint8), radius) > 0
+    labels = np.where(start > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[inside], labels[~near] = cv2.GC_FGD, cv2.GC_BGD
+    cut = start > 0.5
+    if near.any() and not near.all() and cut.any():
+        cv2.setRNGSeed(0)  # its clusters begin at random
+        models, mode = np.zeros((2, 1, 65)), cv2.GC_INIT_WITH_MASK
+        cv2.grabCut(np.ascontiguousarray(picture[..., ::-1]), labels, (0, 0, 1, 1), models[0], models[1], 3, mode)
+        cut = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+    return np.asarray(ndimage.binary_fill_holes(cut))
+
+
+def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
+    """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it.
+
+    Args:
+        start: (H, W) opacity of its Gaussians.
+        behind: (H, W, 3) what stands behind them.
+    """
+    radius = pixels(edge.soft, camera)
+    inside = grown((~cut).astype(np.uint8), radius) == 0
+    near = grown(cut.astype(np.uint8), radius) > 0
+    if not inside.any() or near.all():
+        return cut.astype(np.float32)
+    colours = picture.astype(np.float32) / np.float32(255)
+    found = opacity_before(colours, np.clip(behind, 0, 1), inside, near & ~inside, edge.noise, PlateParams())
+    both = np.sqrt(found * np.clip(start, 0, 1))
+    return np.asarray(np.where(inside, np.float32(1), np.where(near, both, np.float32(0))))
+
+
+def agreement(cut: Bool, other: Bool) -> float:
+    """IoU of silhouettes (H, W); 1 of two empty ones."""
+    union = int((cut | other).sum())
+    return int((cut & other).sum()) / union if union else 1.0
+
+
+def pixels(width: float, camera: Camera) -> int:
+    """A width given for pictures of 384 pixels, in this camera's."""
+    return max(1, round(width * max(camera.width, camera.height) / 384))
+
+
+def grown(silhouette: Image, radius: int) -> Image:
+    """(H, W) 0 or 1, dilated by so many pixels."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return np.asarray(cv2.dilate(silhouette, disc), np.uint8)

@@ -1,0 +1,203 @@
+"""The subject, found once: its Gaussians, its opacity in every picture, and what single cameras do differently."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.found_scene import MATTES, START
+from facefolds_core.captures.cutout import foreground
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.files import atomic_folder
+from facefolds_core.frame_store import write_frames
+from facefolds_core.params import SubjectParams
+from facefolds_core.spacing import spread
+from facefolds_core.subject.cameras import CameraFit
+from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.fit import fit_pictures
+from facefolds_core.subject.foreign import read_start
+from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.mattes import Body, Image, Key, Mattes, body_among
+from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.storage import FoundSubject, read_found, write_found
+
+Array = NDArray[np.float32]
+
+VIEWS = 24
+"""Pictures that tell where the subject is: of a head that turns before fewer cameras, those of several frames."""
+LOOKED_AT = 40_000
+"""Pixels of a camera by which its gain is told, at most."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A training picture and the subject in it.
+
+    Attributes:
+        camera: position among the training cameras.
+        key: of the picture.
+        colours: (H, W, 3) times opacity.
+        opacity: (H, W).
+    """
+
+    camera: int
+    key: Key
+    colours: Array
+    opacity: Array
+
+
+def reference_frame(scene: Scene) -> int:
+    """The frame in which the subject is found: the middle one; of a head that turns the one nearest its mean pose."""
+    return scene.num_frames // 2 if scene.poses is None else scene.poses.nearest()
+
+
+def frames_looked_at(scene: Scene) -> list[int]:
+    """The reference frame; of a head that turns before few cameras others as well, spread over the take."""
+    first = reference_frame(scene)
+    if scene.poses is None:
+        return [first]
+    count = math.ceil(VIEWS / max(1, len(scene.indices("train")))) - 1
+    return list(dict.fromkeys([first, *spread(range(scene.num_frames), count)]))
+
+
+def find_subject(
+    scene: Scene, params: SubjectParams, named: Mapping[Key, Image] | None = None, start: Path | None = None
+) -> tuple[FoundSubject, Mattes]:
+    """Gaussians of the subject alone, and what makes the mattes of all pictures.
+
+    Where the mattes of the pictures looked at are known, Gaussians are fitted to the subject cut out of them. Else
+    they are fitted to whole pictures of one frame first, told apart from the room, and then trained on with the subject
+    cut out.
+
+    Args:
+        named: mattes that the user has corrected.
+        start: PLY of Gaussians, in place of our own fit.
+
+    Raises:
+        UserError: if nothing is found; see `read_start`.
+    """
+    frame, store, how = reference_frame(scene), scene.open_frames(), gaussian_params(params, scene)
+    keys = [(c, k) for k in frames_looked_at(scene) for c in scene.indices("train") if (c, k) in store]
+    mattes, begun = Mattes(scene, named), None
+    if start is not None or not all(mattes.known(key) for key in keys):
+        splats = fit_room(scene, frame, how, params.seed) if start is None else read_start(start, scene, frame)
+        body = body_among(scene, splats, frame)
+        _check(body, scene)
+        mattes, begun = Mattes(scene, named, body), splats.part(body.subject)
+    views = [view_cut_out(scene, mattes, key) for key in keys]
+    if not any((view.opacity > 0.5).any() for view in views):
+        raise _nothing(scene)
+    if start is None:
+        cameras, given = [scene.camera_in_head(*view.key) for view in views], [view.opacity for view in views]
+        colours = [view.colours for view in views]
+        splats = fit_pictures(cameras, colours, how, params.seed, given, begun)
+    else:
+        assert begun is not None
+        splats = begun
+    fit, psnr = judged(scene, splats, views)
+    return FoundSubject(splats, psnr, fit), mattes
+
+
+def fit_room(scene: Scene, frame: int, params: GaussianParams | None = None, seed: int = 0) -> Splats:
+    """Gaussians of the training pictures of one frame, room included."""
+    return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or GaussianParams(), seed)
+
+
+def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list, list[Array]]:  # type: ignore[type-arg]
+    """Those of some cameras that have a picture of the frame, and the pictures, (H, W, 3) float32 in [0, 1]."""
+    store = scene.open_frames()
+    there = [i for i in cameras if (i, frame) in store]
+    pictures = [store.image(i, frame).astype(np.float32) / np.float32(255) for i in there]
+    return [scene.camera_in_head(i, frame) for i in there], pictures
+
+
+def gaussian_params(params: SubjectParams, scene: Scene) -> GaussianParams:
+    """How they are fitted."""
+    own = GaussianParams()
+    names = ("iterations", "fewest", "most")
+    found = replace(own, **{name: getattr(params, name) for name in names})
+    return found if scene.radius is None else replace(found, ball=scene.radius)
+
+
+def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
+    """A training picture with the subject cut out of it."""
+    opacity = mattes.of(key).opacity.astype(np.float32) / np.float32(255)
+    picture = scene.open_frames().image(*key).astype(np.float32) / np.float32(255)
+    plates = scene.open_plates()
+    if plates is not None and (key[0], 0) in plates:
+        plate = plates.image(key[0], 0).astype(np.float32) / np.float32(255)
+        colours = np.clip(picture - (1 - opacity)[..., None] * plate, 0, opacity[..., None])
+    else:
+        colours = opacity[..., None] * foreground(picture, opacity)
+    return View(scene.indices("train").index(key[0]), key, np.asarray(colours, np.float32), opacity)
+
+
+def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
+    """What single cameras do differently, and PSNR over the pictures, dB."""
+    shown, alphas, seen, numbers, squares = [], [], [], [], []
+    for view in views:
+        rgb, light = draw(splats.values, view_of(scene.camera_in_head(*view.key))).picture()
+        squares.append(float(np.square(rgb - view.colours).mean()))
+        sure = np.flatnonzero((view.opacity > 0.99).reshape(-1))
+        sure = sure[:: max(1, len(sure) // LOOKED_AT)]
+        shown.append(rgb.reshape(-1, 3)[sure])
+        alphas.append(1 - light.reshape(-1)[sure])
+        seen.append(view.colours.reshape(-1, 3)[sure])
+        numbers.append(np.full(len(sure), view.camera, np.int32))
+    parts = [np.concatenate(each) for each in (shown, alphas, seen, numbers)]
+    fit = CameraFit.alike(len(scene.indices("train"))).refined(*parts)
+    return fit, -10 * math.log10(max(float(np.mean(squares)), 1e-10))
+
+
+def found_in(scene: Scene, params: SubjectParams, folder: Path) -> Scene:
+    """The scene with subject and mattes; what it has not is found now, and written to the folder.
+
+    Args:
+        folder: there while the scene is used.
+    """
+    if scene.start is not None and all_mattes(scene):
+        return scene
+    found, mattes = find_subject(scene, params)
+    with atomic_folder(folder) as temporary:
+        write_found(temporary / START, found)
+        if not all_mattes(scene):
+            keys = sorted(key for key in scene.open_frames() if scene.splits[key[0]] == "train")
+            rows = ((*key, mattes.of(key).opacity[..., None]) for key in keys)
+            write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
+    made = folder / MATTES
+    return replace(scene, start=folder / START, mattes=made if made.exists() else scene.mattes)
+
+
+def all_mattes(scene: Scene) -> bool:
+    """Whether the subject's opacity is known in every training picture."""
+    mattes, training = scene.open_mattes(), set(scene.indices("train"))
+    return mattes is not None and all(key in mattes for key in scene.open_frames() if key[0] in training)
+
+
+def subject_in(scene: Scene) -> FoundSubject:
+    """Of a scene whose subject was found."""
+    assert scene.start is not None
+    return read_found(scene.start, len(scene.indices("train")))
+
+
+def _check(body: Body, scene: Scene) -> None:
+    if not body.subject.any():
+        raise _nothing(scene)
+
+
+def _nothing(scene: Scene) -> UserError:
+    return UserError(
+        "no subject was found in the images",
+        file=scene.folder,
+        place=f"frame {scene.frame_ids[reference_frame(scene)]}",
+        expected="something near the cameras' common point that stands out from what lies behind it",
+        found="nothing that several cameras agree on",
+        remedy="look at the pictures of the normalised scene: are they dark, empty or all alike? Then check the "
+        "calibration, or take other frames",
+    )

@@ -1,0 +1,124 @@
+"""data/SUBJECT/subject: who stands where, to look at, to correct, to train and to score with.
+
+- `gaussians.npz`: the subject in one frame (storage.py);
+- `sheet.png`: cut-outs over green, those first that contradict the others, in red frames;
+- `CAMERA/FRAME.png`: each matte that was found or named, white is the subject;
+- `mattes.arrow`: these and the capture's own, for the stages (`frame_store.FrameStore`, one channel);
+- `mattes.json`: of each picture whence its matte is, and how well it agrees with the others and with true masks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image as Pillow
+
+from facefolds_core.captures.found_scene import MATTES, START
+from facefolds_core.captures.given_mattes import given_mattes
+from facefolds_core.captures.scene import Scene
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.frame_store import Image, write_frames
+from facefolds_core.params import SubjectParams
+from facefolds_core.progress import progress
+from facefolds_core.spacing import spread
+from facefolds_core.subject.find import find_subject
+from facefolds_core.subject.mattes import Key, Matte, Mattes, Source
+from facefolds_core.subject.sheet import MOST, contact_sheet, tile
+from facefolds_core.subject.storage import FoundSubject, write_found
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is told of one picture's matte.
+
+    Attributes:
+        key: (camera, frame) in the scene.
+        source: whence it is.
+        agreement: see `Matte`.
+        iou: with the true mask, where there is one.
+    """
+
+    key: Key
+    source: Source
+    agreement: float | None
+    iou: float | None
+
+
+def make_folder(
+    scene: Scene, folder: Path, params: SubjectParams, named: Path | None = None, start: Path | None = None
+) -> tuple[FoundSubject, list[Told]]:
+    """Write the folder, whole or not at all.
+
+    Args:
+        named: folder of mattes that the user has corrected, or None.
+        start: PLY of Gaussians in place of our own fit, or None.
+    """
+    by_hand = {} if named is None else {(c, k): image for c, k, image in given_mattes(named, scene)}
+    found, mattes = find_subject(scene, params, by_hand, start)
+    with atomic_folder(folder) as temporary:
+        write_found(temporary / START, found)
+        told, tiles = list[Told](), dict[Key, Image]()
+        rows = _rows(scene, mattes, temporary, told, tiles)
+        write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
+        Pillow.fromarray(contact_sheet(list(tiles.values()))).save(temporary / "sheet.png")
+        write_json(temporary / "mattes.json", _described(scene, told, found))
+    return found, told
+
+
+def _rows(
+    scene: Scene, mattes: Mattes, folder: Path, told: list[Told], tiles: dict[Key, Image]
+) -> Iterator[tuple[int, int, Image]]:
+    """Mattes of all pictures; `told` and `tiles` grow with them."""
+    store, masks = scene.open_frames(), scene.open_masks()
+    keys = sorted(store)
+    shown = set(spread(keys, MOST))
+    with progress(total=len(keys), desc="mattes", unit="picture") as bar:
+        for key in keys:
+            matte = mattes.of(key)
+            iou = _iou(matte.opacity, masks.image(*key)[..., 0]) if masks is not None and key in masks else None
+            told.append(Told(key, matte.source, matte.agreement, iou))
+            if matte.source != "capture":
+                _save(scene, key, matte, folder)
+            if key in shown or matte.source == "gaussians":
+                tiles[key] = tile(scene, key, store.image(*key), matte)
+            yield (*key, matte.opacity[..., None])
+            bar.update()
+    doubtful = [one.key for one in told if one.source == "gaussians"]
+    ordered = [*doubtful, *(key for key in sorted(shown) if key not in doubtful)][:MOST]
+    kept = {key: tiles[key] for key in ordered}
+    tiles.clear()
+    tiles.update(kept)
+
+
+def _save(scene: Scene, key: Key, matte: Matte, folder: Path) -> None:
+    place = folder / scene.cameras[key[0]].name / f"{scene.frame_ids[key[1]]}.png"
+    place.parent.mkdir(exist_ok=True)
+    Pillow.fromarray(matte.opacity).save(place)
+
+
+def _iou(opacity: Image, mask: Image) -> float:
+    true, here = mask > 127, opacity > 127
+    union = int((true | here).sum())
+    return int((true & here).sum()) / union if union else 1.0
+
+
+def _described(scene: Scene, told: list[Told], found: FoundSubject) -> dict[str, Any]:
+    """mattes.json."""
+    pictures = [
+        {
+            "camera": scene.cameras[one.key[0]].name,
+            "frame": scene.frame_ids[one.key[1]],
+            "source": one.source,
+            "agreement": None if one.agreement is None else round(one.agreement, 5),
+            "iou": None if one.iou is None else round(one.iou, 5),
+        }
+        for one in told
+    ]
+    known = [one.iou for one in told if one.iou is not None]
+    mean = round(float(np.mean(known)), 5) if known else None
+    start = {"gaussians": len(found.splats), "psnr": round(found.psnr, 3)}
+    return {"version": 2, "start": start, "iou": mean, "pictures": pictures}

@@ -1,1 +1,0 @@
-"""Where the subject is in each picture: mattes from whatever there is."""

@@ -1,1 +1,0 @@
-"""A coarse volume from the images alone: where the subject is, before there are layers."""
