@@ -80,17 +80,13 @@ WORDS = {
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
-    "few_cameras": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of them "
-    "sees is empty, layers lie closer and move more smoothly",
-    "few_cameras_no_plates": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of "
-    "them sees is empty, texels of a still head are large; clean plates would help",
     "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
     "room is fitted, too",
     "room_gains": "a room with parallax gains {gain:.1f} dB on cameras that its fit did not see",
     "room_not_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}); a "
     "room with parallax would gain {gain:.1f} dB on cameras that its fit did not see, under {least:g}: there is none",
     "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
-    "{gain:g} times as dense, its holes are filled (train.start.fog_gain, fog_holes), and opacity costs nothing",
+    "{gain:g} times as dense, its holes are filled (train.start.fog_gain, fog_holes)",
     "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
     "{margin:g} units (train.subject.walls)",
     "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",

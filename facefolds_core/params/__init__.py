@@ -18,12 +18,10 @@ from facefolds_core.params.compress import (
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
-    BackgroundParams,
     DivergenceParams,
     ExplicitParams,
     FollowParams,
     GridTextureParams,
-    LossParams,
     MovingParams,
 )
 from facefolds_core.params.export import (
@@ -33,7 +31,6 @@ from facefolds_core.params.export import (
     SampleParams,
     TextureParams,
 )
-from facefolds_core.params.few_cameras import FewCameraParams
 from facefolds_core.params.matte import CutOutParams, MatteParams, OutlineParams, PlateParams, VoteParams
 from facefolds_core.params.mlp import MlpParams
 from facefolds_core.params.pruning import PruningParams
@@ -59,7 +56,6 @@ __all__ = [
     "SECTIONS",
     "STAGE_SECTIONS",
     "AttentionParams",
-    "BackgroundParams",
     "BakeParams",
     "CameraParams",
     "CaptureParams",
@@ -71,7 +67,6 @@ __all__ = [
     "EnvironmentParams",
     "EvaluateParams",
     "ExplicitParams",
-    "FewCameraParams",
     "FollowParams",
     "FrameRange",
     "GeometryParams",
@@ -79,7 +74,6 @@ __all__ = [
     "GridTextureParams",
     "HoldoutEvery",
     "LevelParams",
-    "LossParams",
     "MatteParams",
     "MeshCodec",
     "MeshParams",

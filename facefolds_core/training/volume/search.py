@@ -12,7 +12,6 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.few_cameras import for_scene
 from facefolds_core.training.volume.asked import room_gain
 from facefolds_core.training.volume.fit import Volume, VolumeFit
 from facefolds_core.training.volume.fog import clear_of_fog
@@ -30,8 +29,8 @@ def find_subject(scene: Scene, params: ExplicitParams, bar: tqdm) -> tuple[Volum
     Raises:
         UserError: see `VolumeFit`.
     """
-    params, few = for_scene(in_ball(scene.radius, params), scene)
-    plain, notes = VolumeFit(scene, params, outer=False), list(few)
+    params = in_ball(scene.radius, params)
+    plain, notes = VolumeFit(scene, params, outer=False), list[Fact]()
     plain.run(0, bar)
     # With mattes the room is known where the subject is not: an outer zone would take up the subject.
     cut_out = all(view.photo.matte is not None for view in plain.views)
