@@ -27,10 +27,11 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.scoring.matte import interior_and_band, matte_errors
 from facefolds_core.scoring.metrics import psnr
 from facefolds_core.subject.drawing import render
-from facefolds_core.subject.fit import fit_pictures, pictures_of
+from facefolds_core.subject.find import pictures_of
+from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.found import background
-from facefolds_core.subject.mattes import find_mattes, find_subject
-from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.mattes import Mattes, body_among
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
 
@@ -77,12 +78,14 @@ def measure(name: str, scene: Scene, seen: bool, sheet: Path) -> str:
     """Fit, score, draw the sheet; one line of Markdown's table."""
     cameras, pictures = pictures_of(scene, 0, [*scene.indices("train"), *(scene.indices("holdout") if seen else [])])
     begun = time.perf_counter(), time.process_time()
-    splats = fit_pictures(cameras, pictures, StartParams())
+    splats = fit_pictures(cameras, pictures, GaussianParams())
     fitted = time.perf_counter() - begun[0], time.process_time() - begun[1]
     write_ply(sheet.with_suffix(".ply"), splats)
-    subject = find_subject(scene, splats).subject
+    body = body_among(scene, splats, 0)
+    subject = body.subject
     held = [i for i in scene.indices("holdout") if (i, 0) in scene.open_frames()]
-    mattes, masks, rows, tiles = find_mattes(scene, splats, 0, held), scene.open_masks(), list[list[float]](), []
+    finder, masks, rows, tiles = Mattes(scene, body=body), scene.open_masks(), list[list[float]](), []
+    mattes = {index: finder.of((index, 0)).opacity for index in held}
     for index in held:
         truth, camera = scene.open_frames().image(index, 0) / 255.0, scene.camera_in_head(index, 0)
         drawn = np.clip(render(splats, camera)[0], 0, 1).astype(np.float64)

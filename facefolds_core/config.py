@@ -13,7 +13,7 @@ from typing import TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from facefolds_core.errors import UserError
-from facefolds_core.params import SECTIONS, ExplicitParams, Section, Subject, TrainParams, TrainSection
+from facefolds_core.params import SECTIONS, Section, Subject, TrainParams, TrainSection
 from facefolds_core.parsing import brief, parse_json
 from facefolds_core.reading import read_text
 

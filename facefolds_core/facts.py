@@ -57,12 +57,12 @@ WORDS = {
     # of a training: why it chose as it did
     "centre_chosen": "chart: of the candidates that lose least of the visible surface, within {tie:.0%}, "
     "the one farthest back (it loses {lost:.1%})",
-    "window_chosen": "window: directions in which the volume is at least {opacity:.0%} opaque (and the tracked mesh, "
+    "window_chosen": "window: directions in which the subject is at least {opacity:.0%} opaque (and the tracked mesh, "
     "where there is one), and {margin} on each side",
-    "middle_from_volume": "middle radius: the volume, where half of its opacity is reached from outside",
-    "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the volume lies over {reach} "
+    "middle_from_volume": "middle radius: where half of the subject's opacity is reached from outside",
+    "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the subject lies over {reach} "
     "outside it",
-    "halfwidth_chosen": "halfwidth: {least}, more where the volume is blurred or far from the middle, at most {most}",
+    "halfwidth_chosen": "halfwidth: {least}, more where the subject is blurred or far from the middle, at most {most}",
     "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
     "resolution_chosen": "{what}: auto took {chosen} of {tried}: {below:.2f} dB below the best of them on {views} "
     "views of cameras of the split {split}, {to_finest:.1f} dB to the finest one's pictures",
@@ -80,29 +80,14 @@ WORDS = {
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
     "or lie beside the subject",
     "layer_dropped": "layer {layer} dropped: alpha at most {alpha:.4f}",
-    "few_cameras": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of them "
-    "sees is empty, layers lie closer and move more smoothly",
-    "few_cameras_no_plates": "{cameras} training cameras are few (train.few_cameras.at_most {most}): what only one of "
-    "them sees is empty, texels of a still head are large; clean plates would help",
-    "room_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}): the "
-    "room is fitted, too",
-    "room_gains": "a room with parallax gains {gain:.1f} dB on cameras that its fit did not see",
-    "room_not_fitted": "a far sphere behind the subject leaves {psnr:.1f} dB at the coarse level (under {under:g}); a "
-    "room with parallax would gain {gain:.1f} dB on cameras that its fit did not see, under {least:g}: there is none",
-    "fog": "the subject is fog in the volume, {depth:.2f} units deep (over {over:g}): it is taken to be "
-    "{gain:g} times as dense, its holes are filled (train.start.fog_gain, fog_holes), and opacity costs nothing",
-    "walls": "{count} flat thing(s) behind the subject are left to the room, with what stands out by less than "
-    "{margin:g} units (train.subject.walls)",
-    "cut_by_the_ball": "{share:.1%} of the subject lie at the edge of the ball of {reach:g} units: {then}",
     "reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not see",
     "smooth_reflection": "a reflection shared by layers and frames gains {gain:.2f} dB on cameras that its fit did not "
     "see, if its maps are {times:g} times as smooth as elsewhere ({fine:.2f} dB with finer ones)",
     "no_reflection": "no reflection: it would gain {gain:.2f} dB on cameras that its fit did not see, under {least:g}",
     "in_segments": "{frames} frames, trained as {segments} segments over a base of {keys} key frames (fit.json: "
     "key_frames)",
-    "volume_explains_little": "warning: the starting volume explains the images with {psnr:.1f} dB only (under "
-    "{under:g}): look at fit.png; check the calibration, and that nothing but the subject moves. clean plates or "
-    "mattes help (docs/guide/subjects.md)",
+    "start_explains_little": "warning: the subject's Gaussians explain the pictures with {psnr:.1f} dB only (under "
+    "{under:g}): look at fit.png; check the calibration, and subject/sheet.png (docs/guide/subjects.md)",
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in the chart around "
     "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres or train.start.belts, or look at "
     "fit.png for what is no subject",
@@ -127,7 +112,7 @@ WORDS = {
 WARNINGS = frozenset(
     {
         *("pictures_disagree", "front_guessed", "camera_contradicts", "mesh_is_off", "cut_by_the_ball"),
-        *("volume_explains_little", "surface_without_a_place", "front_is_guessed"),
+        *("start_explains_little", "surface_without_a_place", "front_is_guessed"),
         *("codec_misses", "stands_still", "matte_is_found", "training_view_bad"),
     }
 )

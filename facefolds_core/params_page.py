@@ -64,7 +64,7 @@ Each key can be set for one run, and for sweeps, by its path; `++` adds it where
 
 ```
 dvc exp run -S '++train.volume.reach=0.4'                        # of a section
-dvc exp run -S '++subjects.actor.train.losses.opacity=0.01'      # of one subject
+dvc exp run -S '++subjects.actor.train.textures.frame_rate=0.4'  # of one subject
 dvc exp run --queue -S '++train.volume.reach=0.4,0.45,0.5'       # a sweep: one experiment each
 ```
 """

@@ -62,7 +62,7 @@ def train(scene: Scene, params: TrainParams | None = None, scratch: str | Path |
             parameters goes on; of a take that is trained in segments, of these. By default there is none.
 
     Raises:
-        UserError: if an image is missing, nothing stands out from the background, or training diverges.
+        UserError: if an image or its matte is missing, there is no subject, or training diverges.
     """
     params = ExplicitParams() if params is None else params
     with TemporaryDirectory(prefix="facefolds-train-") as temporary:

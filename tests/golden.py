@@ -39,7 +39,7 @@ subjects:
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     train: {preset: quick, iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
-capture: {cameras: 8, frames: 2, height: 48, width: 32}
+capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true}
 normalize: {}
 train: {}
 sample: {resolution: 64}

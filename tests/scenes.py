@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, write_scene
+from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, Split, write_scene
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
@@ -103,10 +103,12 @@ def make_scene(
     size: int = 40,
     frames: int = 2,
     surface_radius: float | None = None,
+    mattes: bool = False,
 ) -> Scene:
     """Write a scene of spheres as `normalize` would, with one held-out camera (the middle one) and its masks.
 
     Args:
+        mattes: whether the true opacity of all training pictures is there, too.
         surface_radius: writes a tracked mesh of this radius; None leaves it out.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -129,13 +131,15 @@ def make_scene(
             for k in range(frames):
                 yield i, k, np.round(render(camera, layers, k)[0] * 255).astype(np.uint8)
 
-    def masks() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-        for i in scene.indices("holdout"):
+    def opacities(split: Split) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+        for i in scene.indices(split):
             for k in range(frames):
                 yield i, k, np.round(render(rig[i], layers, k)[1][..., None] * 255).astype(np.uint8)
 
     write_frames(folder / "frames.arrow", (size, size, 3), images())
-    write_frames(folder / "masks.arrow", (size, size, 1), masks())
+    write_frames(folder / "masks.arrow", (size, size, 1), opacities("holdout"))
+    if mattes:
+        write_frames(folder / "mattes.arrow", (size, size, 1), opacities("train"))
     if surface_radius is not None:
         vertices, faces = _sphere_mesh(surface_radius)
         stacked = np.repeat(vertices[None], frames, 0).astype(np.float32)

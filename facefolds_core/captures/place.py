@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import REACH, Scene
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import VolumeParams
 from facefolds_core.spacing import spread
 
 Image = NDArray[np.uint8]
@@ -51,7 +50,7 @@ def draw_place(path: Path, scene: Scene, frames: FrameStore) -> None:
     """The ball, the centre and the axes (red: the subject's front, green: its left, blue: up) over the first frame."""
     there = [i for i in range(len(scene.cameras)) if (i, 0) in frames]
     chosen = spread(there, MOST)
-    radius = VolumeParams().reach if scene.radius is None else scene.radius
+    radius = REACH if scene.radius is None else scene.radius
     cells = [_cell(scene.cameras[i], frames.image(i, 0), radius) for i in chosen]
     across = math.ceil(math.sqrt(len(cells) * cells[0].shape[0] / cells[0].shape[1] * 1.5))
     blank = np.full_like(cells[0], 255)

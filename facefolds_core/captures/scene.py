@@ -41,6 +41,8 @@ SCENE_VERSION = 3
 """Version 1 had lines of text in `left_out`, version 2 no `poses`; both are still read."""
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
+REACH = 0.45
+"""Radius of the ball about the origin in which a subject is looked for, units, where the capture names none."""
 
 Split = Literal["train", "validate", "holdout", "out"]
 """What a camera is for. "train": seen by every stage that fits something. "validate": set aside from training, for

@@ -18,12 +18,10 @@ from facefolds_core.params.compress import (
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
-    BackgroundParams,
     DivergenceParams,
     ExplicitParams,
     FollowParams,
     GridTextureParams,
-    LossParams,
     MovingParams,
 )
 from facefolds_core.params.export import (
@@ -48,7 +46,6 @@ __all__ = [
     "SECTIONS",
     "STAGE_SECTIONS",
     "AttentionParams",
-    "BackgroundParams",
     "BakeParams",
     "CaptureParams",
     "CodecName",
@@ -64,7 +61,6 @@ __all__ = [
     "GridTextureParams",
     "HoldoutEvery",
     "LevelParams",
-    "LossParams",
     "MeshCodec",
     "MeshParams",
     "MlpParams",

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share, Weight
+from facefolds_core.params.base import Betas, Count, Factor, Rate, Section, Seed, Share
 from facefolds_core.params.pruning import PruningParams
 from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.segments import SegmentParams
@@ -32,8 +32,8 @@ class GridTextureParams(Section):
     """Of the colours shared by layers and frames; it falls along the last level. The other rates are factors on it."""
 
     full_rate_iterations: Count = 460
-    """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and decay,
-    smoothing and backgrounds with them: they go the same way more finely. At full rate four times as many lost 0.3 dB
+    """Of more `iterations` than these, the steps at half and full resolution are smaller in proportion, and decay
+    and smoothing with them: they go the same way more finely. At full rate four times as many lost 0.3 dB
     on cameras left out (`mugsy`, `studio`), since layers begin to show each camera its own picture."""
 
     final_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
@@ -96,39 +96,6 @@ class FollowParams(Section):
     """Adam's, of colours; of logits of alpha times `textures.alpha_rate`."""
 
 
-class LossParams(Section):
-    """Prices beside the squared error, a ray."""
-
-    opacity: Weight = 0.003
-    """Weight of the opacity regulariser 1 - T, T a ray's transmittance: what the background explains stays clear."""
-
-    late_opacity: Weight = 0.1
-    """After the rounds of geometry `losses.opacity` falls to this part of itself."""
-
-    binarisation: Weight = 0.003
-    """Weight of t (1 - t), t = min(T, 1/2), after the rounds: rays that are nearly opaque become opaque."""
-
-
-class BackgroundParams(Section):
-    """Each camera's static background, learnt without masks."""
-
-    stride: Count = 4
-    """The first guess looks at the volume on every n-th pixel."""
-
-    max_opacity: Share = 0.05
-    """Pixels on which the volume is less opaque show the background itself."""
-
-    frames: Count = 5
-    """Frames whose mean is taken, at most."""
-
-    moving_frames: Count = 12
-    """Frames whose mean is taken of a head that turns: each uncovers another part of the room."""
-
-    rate: Annotated[float, Field(ge=0, le=1)] = 0.1
-    """A pixel moves by this times the cube of the transmittance times its error. Fast backgrounds take up the subject;
-    at 0 layers are painted with the room."""
-
-
 class MovingParams(Section):
     """What a head that turns (`normalize.stabilize`) needs beside: its rays meet other texels in each frame."""
 
@@ -137,9 +104,6 @@ class MovingParams(Section):
 
     shares: Count = 3
     """Shares of a frame's rays that are traced, each as large as a step takes."""
-
-    background_rate: Share = 0.03
-    """Upper bound of `background.rate`, since a turning head stands before other pixels in each frame."""
 
     sample: Count = 64
     """One ray in so many is looked at to estimate how many meet the subject."""
@@ -214,12 +178,6 @@ class ExplicitParams(Section):
 
     reflection: ReflectionParams = ReflectionParams()
     """What gloss adds, by the direction."""
-
-    losses: LossParams = LossParams()
-    """Prices beside the squared error."""
-
-    background: BackgroundParams = BackgroundParams()
-    """Of each camera."""
 
     moving: MovingParams = MovingParams()
     """Of a head that turns."""

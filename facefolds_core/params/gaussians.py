@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Seed, Section
+from facefolds_core.params.base import Count, Section, Seed
 
 
 class SubjectParams(Section):

@@ -6,8 +6,6 @@ RENAMED: dict[str, str] = {
     "train.level_halfwidth": "train.geometry.halfwidth",
     "train.lr_texture": "train.textures.learning_rate",
     "train.lr_volume": "train.volume.learning_rate",
-    "train.lambda_veil": "train.losses.opacity",
-    "train.lambda_solid": "train.losses.binarisation",
     "train.mattes": "matte",
 }
 """Old key -> new key or section; until 0.1 the names of the model `explicit`."""
@@ -69,8 +67,25 @@ FIXED: dict[str, str] = {
 }
 """Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
 
+CUT_OUT = "the subject is cut out of all training pictures, over changing colours: no background is learnt"
+
 GONE: dict[str, str] = {
     "capture.fps": "she plays as fast as she was filmed; `subjects.NAME.fps` sets another rate",
+    "train.background": CUT_OUT,
+    "train.moving.background_rate": CUT_OUT,
+    "train.losses": f"{CUT_OUT}, and opacity needs no price",
+    "train.lambda_veil": f"{CUT_OUT}, and opacity needs no price",
+    "train.lambda_solid": f"{CUT_OUT}, and opacity needs no price",
+    "train.outlines": f"{CUT_OUT}; `matte` has the keys of how it is found",
+    **{
+        f"train.pruning.{key}": f"{CUT_OUT}, and no room is painted"
+        for key in (
+            *("room_gain", "room_frames", "room_texels", "gain_limit"),
+            *("beside_layers_gain", "beside_layers_opacity", "beside_gain", "beside_share", "beside_cameras"),
+        )
+    },
+    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel`, `geometry.max_halfwidth` "
+    "and `geometry.blur` can be set",
     "train.segments.rate": "frames are fitted at the base's rate",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.between": "an asset has the capture's frames",

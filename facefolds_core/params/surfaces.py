@@ -10,7 +10,7 @@ from facefolds_core.params.base import Count, Factor, Length, Many, Pixels, Sect
 
 
 class StartParams(Section):
-    """What the layers take from the volume: centre, window, opacity."""
+    """What the layers take from the subject as it was found: centre, window, opacity."""
 
     centres: Annotated[Many[Annotated[float, Field(ge=-10, le=10)]], Field(min_length=1, max_length=1000)] = (
         *(-0.1, -0.15, -0.2, -0.25),
@@ -41,19 +41,10 @@ class StartParams(Section):
     """Margin of the window in u and v beyond what holds the subject."""
 
     subject_opacity: Share = 0.5
-    """Opacity of the volume from which on a direction holds the subject."""
-
-    fog_depth: Length = 0.13
-    """Median depth over which the subject is spread in the volume, units, from which on it counts as fog."""
-
-    fog_gain: Annotated[float, Field(ge=1, le=1000)] = 10.0
-    """Fog is taken to be so many times as dense. 1 leaves it as it is."""
-
-    fog_holes: Annotated[float, Field(ge=0, le=1)] = 0.12
-    """Holes and dents of fog that a ball of this radius, units, does not fit into are filled. 0: none."""
+    """Opacity of the subject's Gaussians from which on a direction holds the subject."""
 
     beside_opacity: Share = 0.3
-    """Directions in which the volume is less opaque lie beside the subject and become transparent."""
+    """Directions in which they are less opaque lie beside the subject and become transparent."""
 
     min_opacity: Annotated[float, Field(gt=0, lt=1)] = 0.02
     """Least opacity of all layers together at the start."""
@@ -72,16 +63,16 @@ class MeshParams(Section):
     """How far a tracked mesh is believed, where there is one."""
 
     reach: Length = 0.03
-    """Where the volume lies outside the tracked mesh by more, units, the volume is believed: a mesh knows no hair."""
+    """Where the Gaussians lie outside the tracked mesh by more, units, they are believed: a mesh knows no hair."""
 
     max_distance: Length = 0.02
-    """A direction in which mesh and volume lie farther apart, units, is off."""
+    """A direction in which mesh and Gaussians lie farther apart, units, is off."""
 
     max_share_off: Share = 0.5
     """A mesh that is off in more than this share of the directions is left out."""
 
     nodes: Annotated[int, Field(ge=8, le=4096)] = 128
-    """Rows and columns of (u, v) at which mesh and volume are compared."""
+    """Rows and columns of (u, v) at which mesh and Gaussians are compared."""
 
     trust: Annotated[float, Field(ge=0, le=10)] = 0.004
     """The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""

@@ -1,5 +1,5 @@
-"""What single cameras do differently from the others, told from what the Gaussians show in their pictures: their exposure
-and white balance, and whether they look where they are said to look.
+"""What single cameras do differently from the others, told from what the Gaussians show in their pictures: their
+exposure and white balance, and whether they look where they are said to look.
 
 Only pixels count that the subject covers: what is behind is no surface that several cameras see alike."""
 
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
 
 Array = NDArray[np.float32]
 Gains = NDArray[np.float64]

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.found_scene import MATTES, START
 from facefolds_core.captures.cutout import foreground
+from facefolds_core.captures.found_scene import MATTES, START
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import SubjectParams
 from facefolds_core.spacing import spread
 from facefolds_core.subject.cameras import CameraFit
@@ -109,7 +110,7 @@ def fit_room(scene: Scene, frame: int, params: GaussianParams | None = None, see
     return fit_pictures(*pictures_of(scene, frame, scene.indices("train")), params or GaussianParams(), seed)
 
 
-def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list, list[Array]]:  # type: ignore[type-arg]
+def pictures_of(scene: Scene, frame: int, cameras: Sequence[int]) -> tuple[list[Camera], list[Array]]:
     """Those of some cameras that have a picture of the frame, and the pictures, (H, W, 3) float32 in [0, 1]."""
     store = scene.open_frames()
     there = [i for i in cameras if (i, frame) in store]
@@ -140,18 +141,16 @@ def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
     """What single cameras do differently, and PSNR over the pictures, dB."""
-    shown, alphas, seen, numbers, squares = [], [], [], [], []
+    parts, squares = list[tuple[Array, Array, Array, NDArray[np.int32]]](), []
     for view in views:
         rgb, light = draw(splats.values, view_of(scene.camera_in_head(*view.key))).picture()
         squares.append(float(np.square(rgb - view.colours).mean()))
         sure = np.flatnonzero((view.opacity > 0.99).reshape(-1))
         sure = sure[:: max(1, len(sure) // LOOKED_AT)]
-        shown.append(rgb.reshape(-1, 3)[sure])
-        alphas.append(1 - light.reshape(-1)[sure])
-        seen.append(view.colours.reshape(-1, 3)[sure])
-        numbers.append(np.full(len(sure), view.camera, np.int32))
-    parts = [np.concatenate(each) for each in (shown, alphas, seen, numbers)]
-    fit = CameraFit.alike(len(scene.indices("train"))).refined(*parts)
+        colours, seen = (image.reshape(-1, 3)[sure] for image in (rgb, view.colours))
+        parts.append((colours, 1 - light.reshape(-1)[sure], seen, np.full(len(sure), view.camera, np.int32)))
+    shown, alpha, photos, numbers = (np.concatenate(each) for each in zip(*parts, strict=True))
+    fit = CameraFit.alike(len(scene.indices("train"))).refined(shown, alpha, photos, numbers)
     return fit, -10 * math.log10(max(float(np.mean(squares)), 1e-10))
 
 

@@ -9,15 +9,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.adam import corrections, decays
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.adam_kernel import adam_step
 from facefolds_core.subject.density import grown, thinned
 from facefolds_core.subject.drawing import View, differentiate, draw, view_of
-from facefolds_core.subject.loss import picture_loss
 from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.loss import picture_loss
 from facefolds_core.subject.seeds import seeds
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats
-from facefolds_core.adam import corrections, decays
 
 Array = NDArray[np.float32]
 

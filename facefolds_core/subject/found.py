@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import REACH, Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.density import longest_axes
 from facefolds_core.subject.drawing import draw, view_of
@@ -27,14 +27,12 @@ class BodyParams:
     """How the subject is told from the room.
 
     Attributes:
-        reach: radius of the ball about the origin in which it may be, units, where the scene names none.
         joined: side of the cells in which Gaussians are connected, in median lengths of those in the ball.
         solid: opacity from which on a Gaussian connects.
         near: standard deviation of the neighbourhood of the origin in which the body is the heaviest, units.
         views: training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer.
     """
 
-    reach: float = 0.45
     joined: float = 2.2
     solid: float = 0.3
     near: float = 0.1
@@ -44,7 +42,7 @@ class BodyParams:
 def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
     """(N,) whether a Gaussian is the subject's."""
     params = params or BodyParams()
-    reach = scene.radius or params.reach
+    reach = scene.radius or REACH
     possible = near_enough(splats, scene, params)
     solid = possible & (splats.opacities > params.solid)
     if not solid.any():
@@ -66,7 +64,7 @@ def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -
 def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
     """(N,) Gaussians in the subject's ball that enough cameras have in their pictures."""
     params = params or BodyParams()
-    inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or params.reach)
+    inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or REACH)
     cameras = scene.views_of("train")
     return np.asarray(inside & (_seeing(splats.means, cameras) >= min(params.views, len(cameras))))
 

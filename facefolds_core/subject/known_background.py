@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 

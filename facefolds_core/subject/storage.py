@@ -34,14 +34,9 @@ class FoundSubject:
 
 def write_found(path: Path, found: FoundSubject) -> None:
     """Write the file, whole or not at all."""
-    arrays = {
-        "values": found.splats.values,
-        "psnr": np.array([found.psnr]),
-        "gains": found.cameras.measured,
-        "errors": found.cameras.errors,
-    }
+    gains, errors, psnr = found.cameras.measured, found.cameras.errors, np.array([found.psnr])
     with atomic_file(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, values=found.splats.values, psnr=psnr, gains=gains, errors=errors)
 
 
 def read_found(path: Path, cameras: int) -> FoundSubject:
@@ -56,11 +51,13 @@ def read_found(path: Path, cameras: int) -> FoundSubject:
     arrays = read_npz(path, DAMAGED)
     shapes = {"values": (None, COLUMNS), "psnr": (1,), "gains": (cameras, 3), "errors": (cameras,)}
     for name, shape in shapes.items():
-        array = arrays.get(name)
-        wrong = array is None or array.dtype.kind != "f" or array.ndim != len(shape)
-        if wrong or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
-            found = "nothing" if array is None else f"{array.dtype} {array.shape}"
-            raise UserError(DAMAGED, file=path, place=name, expected=f"numbers {shape}", found=found, remedy=remake(path))
+        array = arrays.get(name, np.zeros(0, np.int64))
+        fits = array.dtype.kind == "f" and array.ndim == len(shape)
+        if not fits or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):
+            found = f"{array.dtype} {array.shape}"
+            raise UserError(
+                DAMAGED, file=path, place=name, expected=f"floats {shape}", found=found, remedy=remake(path)
+            )
     values = arrays["values"].astype(np.float32)
     if not len(values) or not np.isfinite(values).all() or not (arrays["gains"] > 0).all():
         raise UserError(DAMAGED, file=path, expected="finite numbers, gains above 0", remedy=remake(path))

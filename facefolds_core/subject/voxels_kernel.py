@@ -29,8 +29,8 @@ def deposit(means, sizes, turns, mass, colours, lower, voxel, soft, reach, grid)
         low, high = [0, 0, 0], [0, 0, 0]
         for a in range(3):
             half = reach * math.sqrt(r[a][0] ** 2 * v0 + r[a][1] ** 2 * v1 + r[a][2] ** 2 * v2)
-            low[a] = max(0, int(math.ceil((means[n, a] - half - lower[a]) / voxel)))
-            high[a] = min(grid.shape[a] - 1, int(math.floor((means[n, a] + half - lower[a]) / voxel)))
+            low[a] = max(0, math.ceil((means[n, a] - half - lower[a]) / voxel))
+            high[a] = min(grid.shape[a] - 1, math.floor((means[n, a] + half - lower[a]) / voxel))
         for i in range(low[0], high[0] + 1):
             dx = lower[0] + i * voxel - means[n, 0]
             for j in range(low[1], high[1] + 1):

@@ -10,7 +10,7 @@ import yaml
 
 PARAMS: dict[str, Any] = {
     "subjects": {"take": {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}},
-    "capture": {"cameras": 8, "frames": 6, "height": 48, "width": 32},
+    "capture": {"cameras": 8, "frames": 6, "height": 48, "width": 32, "mattes": True},
     "normalize": {},
     "train": {
         "preset": "fast",

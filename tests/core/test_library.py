@@ -31,7 +31,7 @@ Made = tuple[Scene, Trained, Asset]
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     folder = tmp_path_factory.mktemp("library")
-    make_scene(folder / "scene", size=40, surface_radius=OPAQUE[0].radius)
+    make_scene(folder / "scene", size=40, surface_radius=OPAQUE[0].radius, mattes=True)
     scene = facefolds.load_scene(folder / "scene")
     levels = [{"resolution": n, "iterations": 60} for n in (24, 40)]
     params = {"preset": "fast", "layers": 4, "iterations": 330, "volume": {"levels": levels}}

@@ -81,7 +81,7 @@ def model(scene: Scene, device: str, log: Path) -> dict[str, np.ndarray]:
 
 
 def main(folder: Path) -> None:
-    scene = make_scene(folder / "scene", cameras=5, size=20)
+    scene = make_scene(folder / "scene", cameras=5, size=20, mattes=True)
     for device in ("cpu", "cuda"):
         found = {**volume(device == "cuda"), **model(scene, device, folder / f"log_{device}")}
         np.savez(folder / f"{device}.npz", **found)

@@ -28,7 +28,7 @@ SCRIPTS = {
         from facefolds_core.training.explicit.loop import train_explicit
         from tests.scenes import OPAQUE, make_scene
 
-        scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius)
+        scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius, mattes=True)
         volume = {"levels": [{"resolution": 16, "iterations": 20}, {"resolution": 32, "iterations": 20}]}
         params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183, "volume": volume})
         train_explicit(scene, params, folder / "model", folder / "log")

@@ -9,7 +9,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-import torch
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
@@ -53,7 +52,7 @@ SLACK = 2.0
 
 GLOSS = 3.0
 """Times the actor's own, so that a missing reflection shows on small pictures."""
-FILM = CaptureParams(cameras=14, frames=4, height=96, width=64, plates=True)
+FILM = CaptureParams(cameras=14, frames=4, height=96, width=64, plates=True, mattes=True)
 TRAIN = {
     "preset": "fast",
     "iterations": 190,
@@ -177,15 +176,3 @@ def test_geometry_that_does_not_move_is_caught(
 ) -> None:
     monkeypatch.setattr(trainer, "recentre", lambda radii, *_: np.zeros(radii.shape[:2]))
     assert {"psnr_any", "psnr_interior"} & caught(run, train(scene, tmp_path).found)
-
-
-def test_backgrounds_that_paint_the_subject_are_caught(
-    scene: Scene, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each camera's background is its own photo: nothing asks for layers."""
-
-    def photos(_: Scene, images: Any, *__: Any) -> torch.Tensor:
-        return torch.from_numpy(images.frame(0).astype(np.float32) / 255)
-
-    monkeypatch.setattr(trainer, "first_background", photos)
-    assert {"psnr_any", "opacity_inside"} <= caught(run, train(scene, tmp_path).found)

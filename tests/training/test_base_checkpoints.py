@@ -68,7 +68,7 @@ def make(scene: Scene, plan: TakePlan, folder: Path, begun: Path | None = None, 
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, TakePlan, dict[str, bytes]]:
     """A take, and its base trained in one go."""
     folder = tmp_path_factory.mktemp("base")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
     plan = plan_take(scene, params(), 2)
     with counted() as steps:
         found = make(scene, plan, folder / "take")

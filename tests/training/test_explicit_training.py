@@ -60,7 +60,7 @@ def _held_out_psnr(scene: Scene, folder: Path) -> float:
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("explicit")
-    scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius)
+    scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius, mattes=True)
     train_explicit(scene, _params(), folder / "model", folder / "log")
     return scene, folder / "model"
 
@@ -216,12 +216,18 @@ def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: 
     assert "dvc repro" in str(caught.value.remedy)
 
 
+def test_a_missing_matte_is_said_at_once(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no matte"):
+        train_explicit(make_scene(tmp_path / "scene", size=8), _params(), tmp_path / "model", tmp_path / "log")
+
+
 @pytest.mark.parametrize("grey", [0, 90])
 def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> None:
     scene = make_scene(tmp_path / "scene", size=24)
     image = np.full((24, 24, 3), grey, np.uint8)
     pairs = [(i, k) for i in range(len(scene.cameras)) for k in range(scene.num_frames)]
     write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
+    write_frames(scene.folder / "mattes.arrow", (24, 24, 1), [(*pair, 0 * image[..., :1]) for pair in pairs])
     few = {"levels": [{"resolution": 24, "iterations": 20}]}
     with pytest.raises(UserError, match="no subject was found"):
         train_explicit(scene, _params(volume=few), tmp_path / "model", tmp_path / "log")
@@ -230,10 +236,10 @@ def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> No
 def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plain = make_scene(tmp_path / "plain", size=64)
+    plain = make_scene(tmp_path / "plain", size=64, mattes=True)
     train_explicit(plain, _params(), tmp_path / "plain_model", tmp_path / "plain_log")
     assert "left out" not in capsys.readouterr().out
-    scene = make_scene(tmp_path / "scene", size=64, surface_radius=1.25 * OPAQUE[0].radius)
+    scene = make_scene(tmp_path / "scene", size=64, surface_radius=1.25 * OPAQUE[0].radius, mattes=True)
     train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
     assert "left out" in (tmp_path / "model" / "fit.json").read_text()
     assert "left out" in capsys.readouterr().out

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-import pytest
 import torch
 
 from facefolds_core import hit_codes
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.adam import decays
-from facefolds_core.training.explicit import follow_kernel, reference
+from facefolds_core.training.explicit import follow_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
-from facefolds_core.training.explicit.state import LossWeights, TextureState
+from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, Views
 
 PARAMS = ExplicitParams()
 LIGHT = PARAMS.textures.min_light
 LAYERS, SHAPE, RAYS = 4, (9, 7), 600
-FREE = LossWeights(0.0, 0.0, 0.0)
 RATES = np.array([PARAMS.follow.rate, PARAMS.follow.rate * PARAMS.textures.alpha_rate], np.float32)
 
 
@@ -31,19 +29,6 @@ def random_views(rays: int = RAYS) -> Views:
 
 def random_texture() -> np.ndarray:
     return np.random.default_rng(1).random((*SHAPE, LAYERS, 4), np.float32)
-
-
-@pytest.mark.parametrize("least", [LIGHT, 0.3])
-def test_errors_by_texel_match_autograd(least: float) -> None:
-    rng, views, texture = np.random.default_rng(2), random_views(), random_texture()
-    images = rng.integers(0, 256, (1, RAYS, 3)).astype(np.uint8)
-    background, shine = rng.random((1, RAYS, 3), np.float32), rng.random((RAYS, 3), np.float32) * 0.2
-    sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
-    rays = views.codes, views.camera, views.pixel
-    follow_kernel.errors_by_texel(*rays, images, background, texture, shine, sums, least)
-    given = (torch.from_numpy(x) for x in (images[0] / np.float32(255), background[0], texture, shine))
-    expected = reference.errors_by_texel(torch.from_numpy(views.codes.astype(np.int32)), *given, least)
-    torch.testing.assert_close(torch.from_numpy(sums).permute(1, 2, 0, 3), expected, atol=2e-5, rtol=0)
 
 
 def test_shares_match_the_reference() -> None:
@@ -95,9 +80,11 @@ def test_texels_in_error_take_their_neighbours_along() -> None:
 
 
 class Film:
-    """Pictures of rays that meet one opaque layer, bilinear, at random; in one frame a patch has another colour."""
+    """Cut-outs, opaque everywhere, of rays that meet one opaque layer, bilinear, at random; in one frame a patch has
+    another colour."""
 
     shape, frames, moved, rays = (16, 16), 5, 3, 6000
+    behind = np.full((1, 3), 0.5, np.float32)
     usual, other = np.array([0.8, 0.6, 0.5]), np.array([0.2, 0.3, 0.1])
 
     def __init__(self, noise: float = 0.0) -> None:
@@ -112,12 +99,16 @@ class Film:
         self.truth[self.moved, ((place > 0.3) & (place < 0.6)).all(1)] = self.other
         self.images = np.rint(255 * (self.truth + noise * rng.normal(size=self.truth.shape)).clip(0, 1))
 
-    def frame(self, index: int) -> np.ndarray:
-        return self.images[index].astype(np.uint8)[None]
+    def cut(self, index: int) -> np.ndarray:
+        opaque = np.full((self.rays, 1), 255)
+        return np.concatenate([self.images[index], opaque], -1).astype(np.uint8)[None]
+
+    def shuffle(self, random: np.random.Generator) -> None:
+        self.behind = random.random((1, 3), np.float32)
 
     def state(self) -> TextureState:
         start = torch.tensor([*self.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
-        state = TextureState(self.shape, 1, self.frames, start, torch.zeros(1, self.rays, 3), PARAMS)
+        state = TextureState(self.shape, 1, self.frames, start, PARAMS)
         state.layers[0, ..., 3] = 9
         return state
 
@@ -136,7 +127,7 @@ def test_a_patch_that_changes_in_one_frame_is_followed() -> None:
     film = Film()
     state = film.state()
     assert film.error(state, film.moved) > 0.4
-    _, share = follow(state, film.source, film, FREE, RATES, unlit)
+    _, share = follow(state, film.source, film, RATES, unlit)
     assert film.error(state, film.moved) < 0.04
     for frame in set(range(film.frames)) - {film.moved}:
         assert not state.frame_colour[0, frame].any() and not state.frame_alpha[0, frame].any()
@@ -151,7 +142,7 @@ def test_noise_and_what_all_frames_show_are_no_motion() -> None:
     film.images[film.moved] = film.images[0]
     state = film.state()
     state.colour[0] += 0.1  # wrong, in all frames alike
-    usual, share = follow(state, film.source, film, FREE, RATES, unlit)
+    usual, share = follow(state, film.source, film, RATES, unlit)
     assert share == 0 and usual.min() > 0.09
     assert not state.frame_colour.any()
 
@@ -170,7 +161,7 @@ def test_a_frame_alone_goes_towards_its_pictures() -> None:
     state = film.state()
     errors = mean_errors(state, film.source, film, film.moved, unlit)
     chosen = lagging(errors, film.shape, PARAMS.follow.min_error)
-    follow_frame(state, film.source, film, film.moved, chosen, errors, FREE, RATES, unlit)
+    follow_frame(state, film.source, film, film.moved, chosen, errors, RATES, unlit)
     assert film.error(state, film.moved) < 0.04
 
 
@@ -180,7 +171,7 @@ def test_following_does_not_depend_on_the_number_of_threads() -> None:
         numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
         film = Film()
         state = film.state()
-        follow(state, film.source, film, FREE, RATES, unlit)
+        follow(state, film.source, film, RATES, unlit)
         found.append(state.frame_colour.clone())
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     assert torch.equal(*found)
@@ -194,10 +185,9 @@ def test_texels_with_a_gradient_are_all_known() -> None:
     views = random_views(40)
     sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
     rays = views.codes, views.camera, views.pixel
-    blank = np.zeros((1, 40, 3), np.float32)
-    follow_kernel.errors_by_texel(
-        *rays, blank.astype(np.uint8), blank, random_texture() * 0.3, np.zeros((0, 3), np.float32), sums, 0.0
-    )
+    blank, none = np.zeros((1, 40, 4), np.uint8), np.zeros((0, 3), np.float32)
+    behind, texture = np.zeros((1, 3), np.float32), random_texture() * 0.3
+    shading_kernel.shade(*rays, np.arange(40), blank, behind, texture, none, sums, 0.0, 0.0, True)
     met = np.flatnonzero(sums[..., 3].sum(0).ravel())
     assert not np.setdiff1d(met, _met(views, SHAPE)).size
 
@@ -206,7 +196,7 @@ def test_where_something_moves_all_frames_are_asked_by_their_whole_error() -> No
     film = Film()
     state = film.state()
     state.colour[0] += 0.1  # as a mean over the frames would be
-    usual, _ = follow(state, film.source, film, FREE, RATES, unlit)
+    usual, _ = follow(state, film.source, film, RATES, unlit)
     followed = state.frame_colour[0].abs().amax(-1) > 0
     assert followed[0].any() and not followed[0].all()
     assert not usual[followed[0].numpy()].any()

@@ -49,12 +49,6 @@ def test_finer_texels_take_longer(scene: Scene) -> None:
     assert 3 < forecast(long, fine).seconds / forecast(long, params()).seconds < 4.5
 
 
-def test_few_cameras_without_plates_have_larger_texels(scene: Scene) -> None:
-    many = take(scene, 960, 600)
-    few = replace(many, splits=("train",) * 8 + ("out",) * 16)
-    assert forecast(few, params()).disk < 0.5 * forecast(many, params()).disk
-
-
 def test_what_cannot_fit_is_refused_with_numbers(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="memory") as caught:
         check_forecast(Forecast(3, 10**15, 0, 1.0), params(), None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 from unittest.mock import patch
 
 import numpy as np
@@ -16,7 +16,6 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.reflection_maps import Maps
-from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import Views, trace_views
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.frames import FrameFitter
@@ -38,7 +37,7 @@ def lit(begin: Literal["rounds", "end"] = "rounds", **segments: object) -> Expli
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path, Base]:
     """A take, and its base, which is given a reflection whether it helps or not."""
     folder = tmp_path_factory.mktemp("lit")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", lambda *_: 1.0):
         base = base_of(plan_take(scene, lit(), 2), scene, lit(), folder / "checkpoints" / "take", folder / "log")
     assert base.textures.reflection is not None and float(base.textures.reflection.environment.detach().max()) > 0
@@ -72,24 +71,6 @@ def test_frames_of_a_turning_head_are_lit_as_it_stands(made: tuple[Scene, Path, 
     followed = 2  # which texels lag is asked of all rays, and which rays they concern
     assert len(turned) == lit().segments.steps + followed
     assert all(np.allclose(turn, turns.at(3).rotation) for turn in turned)  # type: ignore[arg-type]
-
-
-def test_frames_pay_for_opacity_what_their_base_paid(made: tuple[Scene, Path, Base]) -> None:
-    """The subject of this base is fog: it costs nothing, whatever the parameters say."""
-    scene, _, base = made
-    assert base.surroundings.losses == lit().losses.model_copy(update={"opacity": 0.0})
-    other = replace(base, surroundings=replace(base.surroundings, losses=lit().losses))
-    paid = list[float]()
-    step = TextureState.step
-
-    def counting(self: TextureState, *given: Any) -> float:
-        paid.append(given[4].opacity)
-        return step(self, *given)
-
-    with patch.object(TextureState, "step", counting):
-        for one in (base, other):
-            FrameFitter(scene, one, lit(), choose("cpu")).fit(3, np.array([0.5, 0.5]), b"12345678")
-    assert sorted(set(paid)) == [0.0, pytest.approx(lit().losses.opacity * lit().losses.late_opacity)]
 
 
 def test_processes_are_handed_what_is_reflected(made: tuple[Scene, Path, Base], tmp_path: Path) -> None:

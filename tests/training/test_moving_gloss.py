@@ -23,13 +23,14 @@ from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.views import StillRays, trace_views
 from tests.geometry.test_track import about
 from tests.scenes import make_scene
+from tests.training.test_explicit_kernels import random_cut
 from tests.training.test_moving import TURNED, layers, rays
 from tests.training.test_segments import params
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    return make_scene(tmp_path_factory.mktemp("moving") / "scene", size=24, surface_radius=0.33)
+    return make_scene(tmp_path_factory.mktemp("moving") / "scene", size=24, surface_radius=0.33, mattes=True)
 
 
 def model() -> RadianceManifolds:
@@ -57,14 +58,19 @@ def test_a_turned_head_mirrors_what_is_there_in_the_room(scene: Scene) -> None:
 class Noise:
     """Other pictures in each frame."""
 
-    def frame(self, index: int) -> np.ndarray:
-        return np.random.default_rng(index).integers(0, 256, (6, 24 * 24, 3), np.uint8)
+    behind = np.full((6, 3), 0.5, np.float32)
+
+    def cut(self, index: int) -> np.ndarray:
+        return random_cut(np.random.default_rng(index), (6, 24 * 24))
+
+    def shuffle(self, random: np.random.Generator) -> None:
+        """They stay over grey."""
 
 
 def test_the_rays_of_a_fit_are_every_so_many_th_of_all_frames_together(scene: Scene) -> None:
     turns = Track.of([about((0, 0, 1), 5.0 * k) for k in range(6)], np.zeros((6, 3)))
     source = rays(replace(scene, frame_ids=tuple("abcdef"), poses=turns), share=150)
-    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), params())
     state.layers[0] = 4 * torch.randn(state.layers[0].shape, generator=torch.Generator().manual_seed(0))
     window = (-0.6, 0.6, -0.6, 0.6)
     every, some = (
@@ -83,7 +89,7 @@ def test_steps_are_lit_as_the_head_stands_in_their_frame(scene: Scene) -> None:
     """In each frame another picture of the room, that of the model at the layer in the middle."""
     turns = Track.of([about((0, 0, 1), 20.0 * k) for k in range(2)], np.zeros((2, 3)))
     source = rays(replace(scene, frame_ids=tuple("ab"), poses=turns), share=150)
-    state = TextureState((8, 8), 3, 2, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    state = TextureState((8, 8), 3, 2, torch.full((2, 2, 4), 0.5), params())
     window, rng = (-0.6, 0.6, -0.6, 0.6), np.random.default_rng(0)
     given = ReflectionParams(texels=6, environment_texels=5)
     gloss = GlossFit(layers().chart, window, given, turns)
@@ -116,7 +122,7 @@ def test_rays_that_are_clear_reflect_in_the_middle(scene: Scene) -> None:
 
 def test_nothing_is_fitted_before_anything_is_opaque(scene: Scene) -> None:
     """No gloss would be found then, and without gloss no light ever after."""
-    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), torch.zeros(6, 24 * 24, 3), params())
+    state = TextureState((8, 8), 3, 6, torch.full((2, 2, 4), 0.5), params())
     source = StillRays(trace_views(scene, layers(), 1))
     gloss = GlossFit(layers().chart, layers().window, ReflectionParams(texels=4, environment_texels=4), None)
     gloss.follow(state, source, Noise(), layers().middle.detach())

@@ -30,6 +30,7 @@ from facefolds_core.training.explicit.reflection_maps import (
     values_at,
 )
 from facefolds_core.training.explicit.views import Views
+from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 PARAMS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
@@ -86,19 +87,20 @@ def test_a_mirror_before_the_face_shows_what_is_behind_the_eye() -> None:
     torch.testing.assert_close(added, torch.tensor([[0.2, 0.4, 0.6]]))
 
 
-def test_look_is_the_difference_of_photo_and_reference() -> None:
+def test_look_is_the_difference_of_cut_out_and_reference() -> None:
     rng = np.random.default_rng(0)
     codes = rng.integers(0, 65536, (400, 4, 2)).astype(np.uint16)
     codes[codes[..., 1] == 0] = 0
     texture = rng.random((6, 9, 4, 4), np.float32)
-    images, background = rng.integers(0, 256, (1, 400, 3)).astype(np.uint8), rng.random((1, 400, 3), np.float32)
+    cut, behind = random_cut(rng, (1, 400)), rng.random((1, 3), np.float32)
     seen = np.zeros((400, 6), np.float32)
-    look(codes, np.zeros(400, np.int32), np.arange(400, dtype=np.int32), images, background, texture, seen, 0.002)
+    look(codes, np.zeros(400, np.int32), np.arange(400, dtype=np.int32), cut, behind, texture, seen, 0.002)
     rgba = reference.look_up(torch.from_numpy(codes.astype(np.int32)), torch.from_numpy(texture))
     weights, through = reference.compositing_weights(rgba[..., 3])
     st = (torch.from_numpy(codes.astype(np.float32)) - 1) / 65534
-    colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * torch.from_numpy(background[0])
-    expected = torch.cat([torch.from_numpy(images[0]) / 255 - colour, 1 - through[:, None]], 1)
+    colour = (weights[..., None] * rgba[..., :3]).sum(1) + through[:, None] * torch.from_numpy(behind)
+    wanted = reference.over(torch.from_numpy(cut[0]) / 255, torch.from_numpy(behind))
+    expected = torch.cat([wanted - colour, 1 - through[:, None]], 1)
     expected = torch.cat([expected, (weights[..., None] * st).sum(1)], 1)
     torch.testing.assert_close(torch.from_numpy(seen), expected, atol=5e-3, rtol=0)  # what lies behind T < 0.002
 

@@ -79,7 +79,7 @@ def counted(most: int = 1000) -> Iterator[list[int]]:
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("segments")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
     train(scene, folder)
     return scene, folder
 
@@ -204,7 +204,7 @@ def test_an_unknown_key_frame_is_refused(again: tuple[Scene, Path]) -> None:
 
 def test_a_head_that_turns_is_fitted_frame_by_frame_too(tmp_path: Path) -> None:
     """Its rays meet other texels in each frame. It is the sphere itself, said to have shifted by next to nothing."""
-    scene = make_scene(tmp_path / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    scene = make_scene(tmp_path / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
     shifts = np.outer(np.linspace(-1e-4, 1e-4, FRAMES), [0, 1, 0])
     scene = replace(scene, poses=Track.of([np.eye(3)] * FRAMES, shifts))
     with counted() as fitted:

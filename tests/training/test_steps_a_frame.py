@@ -83,13 +83,11 @@ def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
     assert smoothed == [3 * parts * k for k in range(56)]
 
 
-def test_decay_and_backgrounds_go_at_the_level_s_pace() -> None:
-    given = params()
-    given = given.model_copy(update={"background": given.background.model_copy(update={"rate": 0.5})})
-    state = TextureState((4, 4), 2, 1, torch.zeros(2, 2, 4), torch.zeros(1, 4, 3), given)
-    assert (state.kept_of_frames, state.background_rate) == (np.float32(0.999), 0.5)
+def test_frames_decay_at_the_level_s_pace() -> None:
+    state = TextureState((4, 4), 2, 1, torch.zeros(2, 2, 4), params())
+    assert state.kept_of_frames == np.float32(0.999)
     state.pace = 0.25
-    assert state.kept_of_frames == pytest.approx(0.999**0.25) and state.background_rate == 0.125
+    assert state.kept_of_frames == pytest.approx(0.999**0.25)
 
 
 @pytest.mark.parametrize(("pixels", "stride"), [(3_000_000, 8), (2_000_000, 8), (1_440_000, 5), (540_672, 2), (100, 1)])

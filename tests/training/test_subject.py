@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from facefolds_core.facts import Fact
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.track import Track
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.loop import for_notes, for_poses
 from facefolds_core.training.volume import kernel
 from facefolds_core.training.volume.cameras import CameraFit
 from facefolds_core.training.volume.fit import Volume
@@ -21,7 +18,6 @@ from facefolds_core.training.volume.room import Room
 from facefolds_core.training.volume.search import cut_share, in_ball
 from facefolds_core.training.volume.subject import EMPTY, body_at_centre, positions, subject_of
 from facefolds_core.training.volume.walls import Wall
-from tests.scenes import make_scene
 
 PARAMS = ExplicitParams()
 REACH, VOXEL = 0.45, 0.015
@@ -113,19 +109,6 @@ def test_fog_is_taken_to_be_denser_and_a_solid_head_is_left() -> None:
     assert middle < surface - 0.03 and surface > 0.2 - 2 * VOXEL
 
 
-def test_where_the_subject_was_fog_what_looks_like_the_room_stays_with_it() -> None:
-    notes: list[Fact] = []
-    assert for_notes(PARAMS, notes) is PARAMS
-    clear_of_fog(_volume((_ball(0.2, 0.0, 0.0, 0.0), float(np.log(np.expm1(0.1))))), PARAMS, notes)
-    found = for_notes(PARAMS, notes)
-    assert found.background.rate == 0 < PARAMS.background.rate
-    assert found.pruning.room_gain == 0 < PARAMS.pruning.room_gain
-    assert found.pruning.beside_layers_gain == 0 < PARAMS.pruning.beside_layers_gain
-    assert found.geometry.max_halfwidth_pixels == np.inf > PARAMS.geometry.max_halfwidth_pixels
-    assert found.losses.opacity == 0 < PARAMS.losses.opacity
-    assert found.losses.binarisation == PARAMS.losses.binarisation
-
-
 def test_a_hole_in_fog_is_filled_and_a_wide_dent_is_not() -> None:
     """A head with a tunnel of 0.06 across, which the room was given, and a dent as wide as itself."""
     points, thin = _points(), float(np.log(np.expm1(0.1)))
@@ -159,16 +142,6 @@ def test_closing_fills_what_a_ball_does_not_fit_into() -> None:
     assert closing(wall, 2.0)[..., 2:-2].all() and not closing(wall, 1.0)[9, 9].any()
     assert not closing(np.zeros((4, 5, 6), bool), 3.0).any()
     np.testing.assert_array_equal(closing(wall, 0.0), wall)
-
-
-def test_behind_a_turning_head_backgrounds_learn_more_slowly(tmp_path: Path) -> None:
-    still = make_scene(tmp_path, size=16)
-    assert for_poses(PARAMS, still) is PARAMS
-    turning = replace(still, poses=Track.of([np.eye(3)] * still.num_frames, np.zeros((still.num_frames, 3))))
-    found = for_poses(PARAMS, turning)
-    assert found.background.rate == PARAMS.moving.background_rate < PARAMS.background.rate
-    slow = ExplicitParams.model_validate({"background": {"rate": 0.01}})
-    assert for_poses(slow, turning).background.rate == 0.01
 
 
 def test_a_denser_volume_has_so_many_times_the_optical_depth() -> None:

@@ -1,4 +1,4 @@
-"""Cut-outs over changing colours: what a step is compared with where the subject's opacity is known."""
+"""Cut-outs over changing colours: what a step is compared with."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
-from facefolds_core.training.explicit.targets import CutOuts, all_mattes, put_over
-from facefolds_core.training.explicit.views import Images
+from facefolds_core.training.explicit.targets import CutOuts, OneFrame, check_mattes, without_matte
 from tests.scenes import make_scene
 
 SIZE = 24
@@ -40,14 +40,36 @@ def scene(tmp_path: Path) -> Scene:
     return replace(made, mattes=tmp_path / "mattes.arrow")
 
 
-def test_the_plate_is_taken_out_and_any_colour_put_in(scene: Scene) -> None:
-    images = CutOuts(scene)
-    images.shuffle(np.random.default_rng(1))
+def test_the_plate_is_taken_out(scene: Scene) -> None:
     m = disc().reshape(-1, 1) / 255.0
-    found = images.frame(0)
-    for picture, behind in zip(found, images.behind, strict=True):
-        expected = m * [200, 120, 60] + (1 - m) * 255 * behind
-        np.testing.assert_allclose(picture, expected, atol=2.5)  # photo, cut-out and picture are each of 8 bits
+    for cut in CutOuts(scene).cut(0):
+        np.testing.assert_allclose(cut[:, :3], m * [200, 120, 60], atol=1.5)  # photo and cut-out are of 8 bits
+        np.testing.assert_array_equal(cut[:, 3:], disc().reshape(-1, 1))
+
+
+def test_gains_of_cameras_are_taken_out_before(scene: Scene) -> None:
+    gains = np.full((len(scene.indices("train")), 3), 1.0)
+    gains[1] = [1.1, 1.25, 0.9]
+    plain, alike = CutOuts(scene).cut(0), CutOuts(scene, gains).cut(0)
+    np.testing.assert_array_equal(alike[0], plain[0])
+    inside = plain[1, :, 3] == 255
+    np.testing.assert_allclose(alike[1, inside, :3], plain[1, inside, :3] / gains[1], atol=1.1)
+
+
+def test_what_is_not_kept_is_cut_out_again_and_is_the_same(scene: Scene) -> None:
+    kept, anew = CutOuts(scene), CutOuts(scene, kept_bytes=0)
+    first = kept.cut(0), anew.cut(0)
+    kept.cut(1), anew.cut(1)
+    assert kept.cut(0) is first[0] and anew.cut(0) is not first[1]
+    np.testing.assert_array_equal(anew.cut(0), kept.cut(0))
+
+
+def test_one_frame_is_itself_whichever_is_asked_for(scene: Scene) -> None:
+    pictures = CutOuts(scene)
+    one = OneFrame(pictures, 1)
+    np.testing.assert_array_equal(one.cut(0), pictures.cut(1))
+    one.shuffle(np.random.default_rng(0))
+    np.testing.assert_array_equal(one.behind, np.random.default_rng(0).random((6, 3), np.float32))
 
 
 def test_each_step_has_other_colours_for_each_camera(scene: Scene) -> None:
@@ -67,21 +89,15 @@ def test_without_plates_half_covered_pixels_get_the_colours_of_the_subject(scene
     assert np.abs(straight - [200, 120, 60]).mean() < 25
 
 
-def test_pictures_of_a_subject_that_is_not_known_everywhere_stay_photos(scene: Scene, tmp_path: Path) -> None:
-    assert all_mattes(scene)
-    assert not all_mattes(replace(scene, mattes=tmp_path / "none.arrow"))
+def test_a_picture_without_a_matte_is_named(scene: Scene, tmp_path: Path) -> None:
+    check_mattes(scene)
+    assert without_matte(scene) == []
+    none = replace(scene, mattes=tmp_path / "none.arrow")
+    assert len(without_matte(none)) == len(scene.indices("train")) * scene.num_frames
     last = scene.indices("train")[-1]
-    rest = [key for key in scene.open_frames() if key != (last, 0)]
+    rest = [key for key in scene.open_frames() if key != (last, 1)]
     write_frames(tmp_path / "some.arrow", (SIZE, SIZE, 1), ((*key, disc()) for key in rest))
-    assert not all_mattes(replace(scene, mattes=tmp_path / "some.arrow"))
-    assert not Images(scene).changes
-
-
-def test_compositing_is_what_the_formula_says() -> None:
-    rng = np.random.default_rng(0)
-    alpha = rng.integers(0, 256, (2, 50, 1), dtype=np.uint8)
-    cut = np.concatenate([(rng.random((2, 50, 3)) * alpha).astype(np.uint8), alpha], -1)
-    behind, out = rng.random((2, 3), np.float32), np.empty((2, 50, 3), np.uint8)
-    put_over(cut, behind, out)
-    expected = cut[..., :3] + (255.0 - cut[..., 3:]) * behind[:, None]
-    assert np.abs(out - expected).max() <= 0.51
+    with pytest.raises(UserError, match="no matte") as caught:
+        check_mattes(replace(scene, mattes=tmp_path / "some.arrow"))
+    assert caught.value.place == f"camera {scene.cameras[last].name}, frame {scene.frame_ids[1]}"
+    assert "`subject`" in str(caught.value.remedy)

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 def serial(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     """A take, trained in one process."""
     folder = tmp_path_factory.mktemp("workers")
-    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33)
+    scene = make_scene(folder / "scene", size=32, frames=FRAMES, surface_radius=0.33, mattes=True)
     train(scene, folder, processes=1)
     return scene, folder
 

@@ -118,16 +118,17 @@ class Checkpoints:
         logged = [(iteration, psnr, rows) for iteration, psnr, rows in about["logged"]]
         random = np.random.default_rng()
         random.bit_generator.state = about["random"]
-        saved = [torch.from_numpy(np.array(arrays[f"saved{i}"])) for i in range(len(GRIDS) + 1)]
+        saved = [torch.from_numpy(np.array(arrays[f"saved{i}"])) for i in range(len(GRIDS))]
         grids = {name: arrays[name] for name in (*GRIDS, "steps")}
-        middle, background = (torch.from_numpy(np.array(arrays[name])) for name in ("middle", "background"))
+        middle, behind = torch.from_numpy(np.array(arrays["middle"])), np.array(arrays["behind"])
         lit = [f"reflection_{field.name}" for field in fields(Maps)]
         maps = Maps(*(np.array(arrays[name]) for name in lit)) if lit[0] in arrays else None
         shine, (on, smoother) = np.array(arrays["shine"]), about["reflection"]
         trainer.iteration, trainer.rays = about["counts"]
         trainer.rate, trainer.psnr = about["rate"], about["psnr"]
         trainer.logged, trainer.events, trainer.random, trainer.middle = logged, events, random, middle
-        state = trainer.take_up(levels[level], background)
+        trainer.pictures.behind = behind
+        state = trainer.take_up(levels[level])
         trainer.gloss.on, trainer.gloss.smoother, trainer.gloss.maps, state.shine = on, smoother, maps, shine
         for name, values in grids.items():
             torch.as_tensor(getattr(state, name)).numpy()[:] = values
@@ -143,7 +144,7 @@ def _arrays(trainer: Trainer, state: TextureState, at: Attempt) -> dict[str, NDA
         found |= {f"reflection_{name}": values for name, values in vars(trainer.gloss.maps).items()}
     found |= {
         "shine": state.shine,
-        "background": state.background.numpy(),
+        "behind": trainer.pictures.behind,
         "middle": trainer.middle.numpy(),
         "steps": state.steps,
     }

@@ -2,7 +2,7 @@
 
 A blink is in one frame of twelve, on a hundredth of the texels. The steps before make all frames alike where they
 are alike, and share what a step costs among all texels; a lid that closes in one frame would need many more of them.
-Which texels lag is seen in the photos: C - I, averaged over the rays that meet a texel, with the rays of all cameras,
+Which texels lag is seen in the pictures: C - I, averaged over the rays that meet a texel, with the rays of all cameras,
 is small of a texel that is right, whatever the noise of single pixels. What it is in all frames is no motion, but
 where something moves: there the static part is a mean over the frames.
 """
@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from facefolds_core.adam import corrections, decays
 from facefolds_core.hit_codes import before
 from facefolds_core.params import ExplicitParams
-from facefolds_core.adam import corrections, decays
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
-from facefolds_core.training.explicit.state import LossWeights, TextureState
-from facefolds_core.training.explicit.targets import change_behind
-from facefolds_core.training.explicit.views import Pictures, Rays, Views
+from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.views import Rays, Views
 
 Light = Callable[[TextureState, Views, int], None]
 """Sets the state's `shine` for rays of a frame."""
@@ -33,15 +33,13 @@ Errors = NDArray[np.float32]
 def follow(
     state: TextureState,
     source: Rays,
-    images: Pictures,
-    weights: LossWeights,
+    pictures: Pictures,
     rates: NDArray[np.float32],
     light: Light,
 ) -> tuple[Errors, float]:
     """All frames, each where its texels' mean error differs from their usual one.
 
     Args:
-        weights: of the losses.
         rates: (2,) of colour and of logits of alpha, in the first step.
 
     Returns:
@@ -49,13 +47,13 @@ def follow(
         frames.
     """
     frames, least = len(state.steps), state.params.follow.min_error
-    errors = np.stack([mean_errors(state, source, images, k, light) for k in range(frames)])
+    errors = np.stack([mean_errors(state, source, pictures, k, light) for k in range(frames)])
     usual = np.median(errors, 0).astype(np.float32)
     moves = np.any([lagging(one - usual, state.shape, least) for one in errors], 0)
     usual[moves] = 0  # there the static part is a mean of what moves, and errs in all frames
     lag = [lagging(one - usual, state.shape, least) & moves for one in errors]
     for frame, chosen in enumerate(lag):
-        follow_frame(state, source, images, frame, chosen, errors[frame], weights, rates, light)
+        follow_frame(state, source, pictures, frame, chosen, errors[frame], rates, light)
     return usual, float(np.mean(lag))
 
 
@@ -65,19 +63,18 @@ def follow_rates(params: ExplicitParams, rate: float) -> NDArray[np.float32]:
     return own * np.array([1, params.textures.alpha_rate], np.float32)
 
 
-def mean_errors(state: TextureState, source: Rays, images: Pictures, frame: int, light: Light) -> Errors:
+def mean_errors(state: TextureState, source: Rays, pictures: Pictures, frame: int, light: Light) -> Errors:
     """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
     (h, w), n = state.shape, state.layers.shape[2]
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
-    background, least = state.background.numpy(), state.params.textures.min_light
-    picture = images.frame(frame)
+    cut, behind, least = pictures.cut(frame), pictures.behind, state.params.textures.min_light
     shares = list(source.in_use(frame))
     enough = 4 * state.params.textures.rays_per_texel * h * w  # as many rays as of four steps
     apart = max(1, int(sum(len(views.pixel) for views in shares) / enough))
     for views in shares:
         light(state, views, frame)
-        rays = (array[::apart] for array in (views.codes, views.camera, views.pixel))
-        follow_kernel.errors_by_texel(*rays, picture, background, texture, state.shine[::apart], sums, least)
+        rays = views.codes, views.camera, views.pixel, np.arange(0, len(views.pixel), apart)
+        shading_kernel.shade(*rays, cut, behind, texture, state.shine, sums, 0.0, least, True)
     total = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
     sums[:] = 0
     known = total[:, 3:] >= 0.5
@@ -93,11 +90,10 @@ def lagging(errors: Errors, shape: tuple[int, int], least: float) -> NDArray[np.
 def follow_frame(
     state: TextureState,
     source: Rays,
-    images: Pictures,
+    pictures: Pictures,
     frame: int,
     chosen: NDArray[np.bool_],
     errors: Errors,
-    weights: LossWeights,
     rates: NDArray[np.float32],
     light: Light,
 ) -> None:
@@ -112,28 +108,25 @@ def follow_frame(
     colours, alphas = np.zeros((2, len(own), 3), np.float32), np.zeros((2, len(own), n), np.float32)
     values = state.frame_colour[0, frame].numpy(), state.frame_alpha[0, frame].numpy()
     values[0][own] -= errors[own]
-    picture, texture = images.frame(frame), _texture(state, frame)
+    cut, texture = pictures.cut(frame), _texture(state, frame)
     random = np.random.default_rng(frame)
     params, textures = state.params.follow, state.params.textures
     apart = _apart(len(views.pixel), h * w * textures.rays_per_texel)
     for step in range(params.steps):
-        if change_behind(images, state, random):
-            picture = images.frame(frame)
+        pictures.shuffle(random)
         shading_kernel.shade(
             views.codes,
             views.camera,
             views.pixel,
             np.arange(step % apart, len(views.pixel), apart),
-            picture,
-            state.background.numpy(),
+            cut,
+            pictures.behind,
             texture,
             shine,
             state.gradient.numpy().reshape(n, h, w, 4),
-            weights.opacity,
-            weights.binarisation,
-            0.0,
-            weights.min_alpha,
+            textures.min_alpha,
             textures.min_light,
+            False,
         )
         falling = 1 - (1 - textures.final_rate) * step / params.steps
         follow_kernel.follow_step(

@@ -1,6 +1,6 @@
-"""What frames have not followed, texel by texel, and the steps that make up for it, compiled.
+"""Steps on texels of one frame that do not follow what moves, and which rays show those, compiled.
 
-Reference: `reference.py`. For how threads share the work see `facefolds_core.scatter`."""
+Reference: `reference.py`."""
 
 from __future__ import annotations
 
@@ -10,81 +10,10 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.hit_codes import corner
-from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 from facefolds_core.adam import EPSILON
+from facefolds_core.jit import compiled, inlined, kernel
 from facefolds_core.training.explicit.adam_kernel import activate_texel
-from facefolds_core.training.explicit.shading_kernel import rgba_tap, tap_share
-
-_scatter = scatter_of(4)
-
-
-@kernel(parallel=True)
-def errors_by_texel(codes, camera, pixel, images, background, texture, shine, sums, min_light):  # type: ignore[no-untyped-def]
-    """Add to sums (N, H, W, 4), over all P rays, w (C - I) and w: w is what a texel adds to a ray's colour.
-
-    codes (P, N, 2), camera and pixel (P,), images, background, texture (H, W, N, 4), shine as of
-    `shading_kernel.shade`; layers behind less transmittance than `min_light` are skipped.
-    """
-    layers, count = texture.shape[2], codes.shape[0]
-    index = np.empty((layers, CHUNK), np.int32)
-    wish = np.empty((layers, CHUNK, 6), np.float32)
-    for start in range(0, count, CHUNK):
-        own = min(CHUNK, count - start)
-        for block in prange((own + BLOCK - 1) // BLOCK):
-            for k in range(block * BLOCK, min((block + 1) * BLOCK, own)):
-                _errors(k, start + k, codes, camera, pixel, images, background, texture, shine, index, wish, min_light)
-        for task in prange(layers):
-            n = spread(task, layers)
-            _scatter(index[n, :own], wish[n, :own], sums[n])
-
-
-@compiled
-def _errors(
-    k: Any,
-    p: Any,
-    codes: Any,
-    camera: Any,
-    pixel: Any,
-    images: Any,
-    background: Any,
-    texture: Any,
-    shine: Any,
-    index: Any,
-    wish: Any,
-    min_light: Any,
-) -> None:
-    """What ray p wants of each layer, into index[:, k] and wish[:, k]."""
-    height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    one, inverse = np.float32(1.0), np.float32(1 / 255.0)
-    transmittance = one
-    r0, r1, r2 = np.float32(0.0), np.float32(0.0), np.float32(0.0)
-    e0, e1, e2 = r0, r1, r2
-    if shine.shape[0] > 0:
-        e0, e1, e2 = shine[p, 0], shine[p, 1], shine[p, 2]
-    for n in range(layers):
-        index[n, k] = -1
-        if codes[p, n, 0] == 0 or transmittance < min_light:
-            continue
-        column, b = corner(codes[p, n, 0], width)
-        row, a = corner(codes[p, n, 1], height)
-        i, j, of = np.uint64(row), np.uint64(column), np.uint64(n)
-        light = transmittance * rgba_tap(texture, i, j, of, 3, a, b)
-        r0 += light * (rgba_tap(texture, i, j, of, 0, a, b) + e0)
-        r1 += light * (rgba_tap(texture, i, j, of, 1, a, b) + e1)
-        r2 += light * (rgba_tap(texture, i, j, of, 2, a, b) + e2)
-        index[n, k] = row * width + column
-        wish[n, k, 0], wish[n, k, 1], wish[n, k, 5] = a, b, light
-        transmittance -= light
-    cam, pix = camera[p], pixel[p]
-    d0 = r0 + transmittance * background[cam, pix, 0] - images[cam, pix, 0] * inverse
-    d1 = r1 + transmittance * background[cam, pix, 1] - images[cam, pix, 1] * inverse
-    d2 = r2 + transmittance * background[cam, pix, 2] - images[cam, pix, 2] * inverse
-    for n in range(layers):
-        if index[n, k] >= 0:
-            light = wish[n, k, 5]
-            wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * d0, light * d1, light * d2
+from facefolds_core.training.explicit.shading_kernel import tap_share
 
 
 @kernel(parallel=True)

@@ -19,7 +19,8 @@ from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded, smoothed
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Pictures, Rays, StillRays, Views
+from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.views import Rays, StillRays, Views
 
 
 class GlossFit:
@@ -40,7 +41,7 @@ class GlossFit:
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, images: Pictures, middle: torch.Tensor) -> None:
+    def follow(self, state: TextureState, source: Rays, pictures: Pictures, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
@@ -49,7 +50,7 @@ class GlossFit:
         if self.maps is not None:
             self.maps = replace(self.maps, surface=self._normals)
             if self.poses is None:
-                self._shine(state, self.look(state, source, images))
+                self._shine(state, self.look(state, source, pictures))
 
     def light(self, state: TextureState, views: Views, frame: int) -> None:
         """Before a step on the rays of one frame: what the reflection adds to each, if they are others in each frame.
@@ -65,20 +66,20 @@ class GlossFit:
         begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
         return self.on and begun and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, number: int, rounds: int, state: TextureState, source: Rays, images: Pictures) -> Fact | None:
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: Pictures) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
         if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
             return None
-        seen = self.look(state, source, images)
+        seen = self.look(state, source, pictures)
         found = self._decide(state, seen)
         if self.on and self.params.begin == "end":
             self._fit(state, seen, done=True)
         return found
 
-    def fit(self, state: TextureState, source: Rays, images: Pictures, done: bool) -> None:
+    def fit(self, state: TextureState, source: Rays, pictures: Pictures, done: bool) -> None:
         """Fit to what the textures leave over now; `done` if they are trained no more."""
-        self._fit(state, self.look(state, source, images), done)
+        self._fit(state, self.look(state, source, pictures), done)
 
     def _fit(self, state: TextureState, seen: Seen, done: bool) -> None:
         used = self._used(seen)
@@ -120,18 +121,18 @@ class GlossFit:
         """What the model gets."""
         return None if self.maps is None else self.maps.model()
 
-    def look(self, state: TextureState, source: Rays, images: Pictures) -> Seen:
+    def look(self, state: TextureState, source: Rays, pictures: Pictures) -> Seen:
         """What textures leave over, on rays for a fit."""
         if self.poses is not None:
-            return self._look_in_turns(state, source, images, self.poses)
+            return self._look_in_turns(state, source, pictures, self.poses)
         views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
         frames = spread(range(len(state.steps)), self.params.frames)
         for frame in frames:
-            state.look(views, images.frame(frame), frame, sums)
+            state.look(views, pictures, frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames)).filled(views)
 
-    def _look_in_turns(self, state: TextureState, source: Rays, images: Pictures, poses: Track) -> Seen:
+    def _look_in_turns(self, state: TextureState, source: Rays, pictures: Pictures, poses: Track) -> Seen:
         """Of some rays of each of some frames, as many as a fit takes: in each frame the room shines from elsewhere.
 
         Frames are looked at twice. What all their rays see would take up to a gigabyte; how many are opaque, and so
@@ -141,14 +142,14 @@ class GlossFit:
         opaque, before, found = [], 0, []
         for frame in frames:
             views, _ = source.part(frame, 0, 1)
-            sums = _seen(state, views, images, frame)
+            sums = _seen(state, views, pictures, frame)
             opaque.append(np.flatnonzero(sums[:, 3] >= self.params.min_opacity).astype(np.int32))
         step = self._step(sum(map(len, opaque)))
         for frame, there in zip(frames, opaque, strict=True):
             views = source.part(frame, 0, 1)[0].part(there[-before % step :: step])
             before += len(there)
             turn = np.asarray(poses.at(frame).rotation, np.float32)
-            found.append(Seen.of(views.camera, views.directions, _seen(state, views, images, frame), 1, turn))
+            found.append(Seen.of(views.camera, views.directions, _seen(state, views, pictures, frame), 1, turn))
         return Seen.together(found)
 
     def _used(self, seen: Seen) -> Seen:
@@ -172,8 +173,8 @@ def _views(source: Rays) -> Views:
     return source.views
 
 
-def _seen(state: TextureState, views: Views, images: Pictures, frame: int) -> NDArray[np.float32]:
+def _seen(state: TextureState, views: Views, pictures: Pictures, frame: int) -> NDArray[np.float32]:
     """(P, 6) what rays see in one frame, as `TextureState.look` gives it."""
     sums = np.zeros((len(views.pixel), 6), np.float32)
-    state.look(views, images.frame(frame), frame, sums)
+    state.look(views, pictures, frame, sums)
     return sums

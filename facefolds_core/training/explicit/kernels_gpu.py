@@ -26,12 +26,12 @@ def shade(
     camera,
     pixel,
     rays,
-    images,
-    background,
+    cut,
+    behind,
     texture,
     shine,
     gradient,
-    terms,  # float32: weights of opacity and binarisation, rate, min_alpha; float64: min_light
+    terms,  # float32: min_alpha; float64: min_light; bool: shares
     squares,  # (S,) float64: sums of |C - I|^2 are added to them in turn
 ):
     k = cuda.grid(1)
@@ -48,8 +48,8 @@ def shade(
         codes,
         camera,
         pixel,
-        images,
-        background,
+        cut,
+        behind,
         texture,
         shine,
         terms,

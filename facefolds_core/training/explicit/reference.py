@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from facefolds_core.adam import EPSILON, Betas
 from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
-from facefolds_core.adam import EPSILON, Betas
 
 
 def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:
@@ -61,32 +61,29 @@ def contributions(codes: Tensor, texture: Tensor, min_light: float) -> Tensor:
 
 def shade(
     codes: Tensor,  # [R, N, 2] int32
-    target: Tensor,  # [R, 3] in [0, 1]
-    background: Tensor,  # [R, 3]
+    cut: Tensor,  # [R, 4] in [0, 1], colours times opacity
+    behind: Tensor,  # [R, 3]
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor | None,  # [R, 3]
-    opacity_weight: float,
-    binarisation_weight: float,
-    rate: float,
     min_alpha: float,
     min_light: float,
-) -> tuple[Tensor, Tensor, Tensor]:
-    """As `shading_kernel.shade`: gradient [H, W, N, 4], new background [R, 3], sum of |C - I|^2."""
+) -> tuple[Tensor, Tensor]:
+    """As `shading_kernel.shade`: gradient [H, W, N, 4], sum of |C - I|^2."""
     texture = texture.detach().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha, min_light), rgba[..., 3], 0.0)
         weights, transmittance = compositing_weights(alpha)
         rgb = rgba[..., :3] if shine is None else rgba[..., :3] + shine[:, None]
-        colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * background
-        squares = (colour - target).square().sum()
-        nearly = transmittance.clamp(max=0.5)
-        loss = (
-            0.5 * squares + (opacity_weight * (1 - transmittance) + binarisation_weight * nearly * (1 - nearly)).sum()
-        )
-        (gradient,) = torch.autograd.grad(loss, texture)
-    moved = background - rate * (transmittance**3)[:, None] * (colour - target)
-    return gradient, moved.detach().clamp(0, 1), squares.detach()
+        colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * behind
+        squares = (colour - over(cut, behind)).square().sum()
+        (gradient,) = torch.autograd.grad(0.5 * squares, texture)
+    return gradient, squares.detach()
+
+
+def over(cut: Tensor, behind: Tensor) -> Tensor:
+    """[R, 3]: cut-outs [R, 4], premultiplied, over colours [R, 3]."""
+    return cut[:, :3] + (1 - cut[:, 3:]) * behind
 
 
 def adam_step(
@@ -127,21 +124,21 @@ def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, 
 
 def errors_by_texel(
     codes: Tensor,  # [R, N, 2] int32
-    target: Tensor,  # [R, 3] in [0, 1]
-    background: Tensor,  # [R, 3]
+    cut: Tensor,  # [R, 4] in [0, 1], colours times opacity
+    behind: Tensor,  # [R, 3]
     texture: Tensor,  # [H, W, N, 4]
     shine: Tensor,  # [R, 3]
     min_light: float,
 ) -> Tensor:
-    """As `follow_kernel.errors_by_texel`: [H, W, N, 4]."""
+    """As `shading_kernel.shade` with `shares`: [H, W, N, 4], over the rays w (C - I) and w."""
     texture = texture.detach().clone().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3], 0.0, min_light), rgba[..., 3], 0.0).detach()
         weights, transmittance = compositing_weights(alpha)
-        colour = (weights[..., None] * (rgba[..., :3] + shine[:, None])).sum(1) + transmittance[:, None] * background
+        colour = (weights[..., None] * (rgba[..., :3] + shine[:, None])).sum(1) + transmittance[:, None] * behind
         # A colour's derivative is its weight.
-        (errors,) = torch.autograd.grad(0.5 * (colour - target).square().sum(), texture, retain_graph=True)
+        (errors,) = torch.autograd.grad(0.5 * (colour - over(cut, behind)).square().sum(), texture, retain_graph=True)
         (shares,) = torch.autograd.grad(colour[:, 0].sum(), texture)
     return torch.cat([errors[..., :3], shares[..., :1]], -1)
 

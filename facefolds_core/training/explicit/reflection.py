@@ -1,7 +1,7 @@
 """Fit of the shared reflection (`model.reflection`) while the explicit model is trained.
 
-For a ray with the opacity o, the mean place (s, t) of what it shows and the direction r of its reflection, the photo's
-difference from the rendering without reflections is, mean over frames,
+For a ray with the opacity o, the mean place (s, t) of what it shows and the direction r of its reflection, the
+cut-out's difference from the rendering without reflections is, mean over frames,
 
     R = o (gloss(s, t) E(r) - m(s, t)),
 

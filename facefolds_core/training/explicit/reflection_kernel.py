@@ -10,14 +10,14 @@ from numba import prange
 
 from facefolds_core.hit_codes import SCALE, corner
 from facefolds_core.jit import inlined, kernel
-from facefolds_core.training.explicit.shading_kernel import rgba_tap
+from facefolds_core.training.explicit.shading_kernel import difference, rgb_tap, rgba_tap
 
 
 @kernel(parallel=True)
-def look(codes, camera, pixel, images, background, texture, seen, min_light):  # type: ignore[no-untyped-def]
-    """Adds to seen (P, 6) of each ray, in one frame: photo minus C (3), opacity, and opacity times (s, t).
+def look(codes, camera, pixel, cut, behind, texture, seen, min_light):  # type: ignore[no-untyped-def]
+    """Adds to seen (P, 6) of each ray, in one frame: I - C (3), opacity, and opacity times (s, t).
 
-    Arguments as of `shading_kernel.shade`; C without reflections, over the background.
+    Arguments as of `shading_kernel.shade`; C without reflections.
     """
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
     one, zero = np.float32(1.0), np.float32(0.0)
@@ -30,19 +30,17 @@ def look(codes, camera, pixel, images, background, texture, seen, min_light):  #
             i, a = corner(codes[p, n, 1], height)
             row, column, of = np.uint64(i), np.uint64(j), np.uint64(n)
             light = through * rgba_tap(texture, row, column, of, 3, a, b)
-            r0 += light * rgba_tap(texture, row, column, of, 0, a, b)
-            r1 += light * rgba_tap(texture, row, column, of, 1, a, b)
-            r2 += light * rgba_tap(texture, row, column, of, 2, a, b)
+            c0, c1, c2 = rgb_tap(texture, row, column, of, a, b)
+            r0, r1, r2 = r0 + light * c0, r1 + light * c1, r2 + light * c2
             s += light * (np.float32(codes[p, n, 0]) - one) / np.float32(SCALE)
             t += light * (np.float32(codes[p, n, 1]) - one) / np.float32(SCALE)
             through -= light
             if through < min_light:
                 break
-        cam, pix = camera[p], pixel[p]
-        inverse = np.float32(1 / 255.0)
-        seen[p, 0] += images[cam, pix, 0] * inverse - r0 - through * background[cam, pix, 0]
-        seen[p, 1] += images[cam, pix, 1] * inverse - r1 - through * background[cam, pix, 1]
-        seen[p, 2] += images[cam, pix, 2] * inverse - r2 - through * background[cam, pix, 2]
+        d0, d1, d2 = difference(cut, behind, camera[p], pixel[p], r0, r1, r2, through)
+        seen[p, 0] -= d0
+        seen[p, 1] -= d1
+        seen[p, 2] -= d2
         seen[p, 3] += one - through
         seen[p, 4] += s
         seen[p, 5] += t

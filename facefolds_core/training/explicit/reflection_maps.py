@@ -34,7 +34,7 @@ class Seen:
         directions: (P, 3) unit vectors in the head's frame.
         st: (P, 2) place of what shows.
         opacity: (P,).
-        residual: (P, 3) photo minus rendering without reflections.
+        residual: (P, 3) cut-out minus rendering without reflections.
         turns: (P, 3, 3) of each ray from the head's axes to those of the room, which the light is fixed to; None where
             the head stands still.
     """

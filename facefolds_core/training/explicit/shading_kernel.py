@@ -31,42 +31,51 @@ def rgba_tap(texture, i, j, n, q, a, b):  # type: ignore[no-untyped-def]
     return top * (one - a) + bottom * a
 
 
+@inlined
+def rgb_tap(texture, i, j, n, a, b):  # type: ignore[no-untyped-def]
+    """The three colours, as `rgba_tap`."""
+    r, g = rgba_tap(texture, i, j, n, 0, a, b), rgba_tap(texture, i, j, n, 1, a, b)
+    return r, g, rgba_tap(texture, i, j, n, 2, a, b)
+
+
+@inlined
+def difference(cut, behind, cam, pix, r0, r1, r2, transmittance):  # type: ignore[no-untyped-def]
+    """C - I of a ray through a pixel: what its layers show, r + T g, less what is cut out, F + (1 - m) g.
+
+    cut (C, H W, 4) uint8: F and m; behind (C, 3): g."""
+    inverse = np.float32(1 / 255.0)
+    clear = transmittance - np.float32(255 - cut[cam, pix, 3]) * inverse
+    d0 = r0 + clear * behind[cam, 0] - cut[cam, pix, 0] * inverse
+    d1 = r1 + clear * behind[cam, 1] - cut[cam, pix, 1] * inverse
+    d2 = r2 + clear * behind[cam, 2] - cut[cam, pix, 2] * inverse
+    return d0, d1, d2
+
+
 @kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
     codes,  # (P, N, 2) uint16 (`hit_codes`): crossings with each layer
     camera,  # (P,) int32
     pixel,  # (P,) int32
     rays,  # (R,) int64, which of the P to shade, none twice
-    images,  # (C, H W, 3) uint8
-    background,  # (C, H W, 3) float32, updated in place
+    cut,  # (C, H W, 4) uint8, the subject cut out: colours F times opacity m, and m
+    behind,  # (C, 3) float32, the colour g behind it and behind the layers
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
     shine,  # (P, 3) float32, added to the colours that a ray meets; (0, 3) for none
     gradient,  # (N, H, W, 4), added to
-    opacity_weight,  # weight of opacity
-    binarisation_weight,  # weight of rays that are nearly, but not quite, opaque
-    rate,  # of the background
     min_alpha,  # layers with less alpha are left out
     min_light,  # layers behind less transmittance are left out
+    shares,  # whether alpha's part of `gradient` gets w, what a texel adds to a ray's colour, in place of its gradient
 ):
-    """Differentiates the sum over rays of 0.5 |C - I|^2 + opacity_weight (1 - T) + binarisation_weight t (1 - t).
-
-    T is the transmittance, t = min(T, 1/2).
+    """Differentiates the sum over rays of 0.5 |C - I|^2, with C = sum_i w_i c_i + T g and I = F + (1 - m) g; T is the
+    transmittance.
 
     Adds the gradient to `gradient`; returns the sum of |C - I|^2.
-    C = sum_i w_i c_i + T B. Each pixel's background moves by -rate T^3 (C - I): in proportion to the cube of the
-    transmittance, so that it cannot explain what the layers have begun to explain.
     """
     layers, count = texture.shape[2], rays.shape[0]
     squares = np.zeros((count + BLOCK - 1) // BLOCK)
     index = np.empty((layers, CHUNK), np.int32)
     wish = np.empty((layers, CHUNK, 6), np.float32)
-    terms = (
-        np.float32(opacity_weight),
-        np.float32(binarisation_weight),
-        np.float32(rate),
-        np.float32(min_alpha),
-        min_light,
-    )
+    terms = np.float32(min_alpha), min_light, shares
     for start in range(0, count, CHUNK):
         own = min(CHUNK, count - start)
         for block in prange((own + BLOCK - 1) // BLOCK):
@@ -76,8 +85,8 @@ def shade(  # type: ignore[no-untyped-def]
                 camera,
                 pixel,
                 rays[start + first : start + last],
-                images,
-                background,
+                cut,
+                behind,
                 texture,
                 shine,
                 terms,
@@ -99,8 +108,8 @@ def _shade(
     camera: Any,
     pixel: Any,
     rays: Any,
-    images: Any,
-    background: Any,
+    cut: Any,
+    behind: Any,
     texture: Any,
     shine: Any,
     terms: Any,
@@ -112,9 +121,7 @@ def _shade(
     own = (np.empty(layers, np.int64), np.empty((layers, 4), np.float32), np.empty(layers, np.float32))
     total = 0.0
     for k in range(rays.shape[0]):
-        total += shade_ray(
-            k, rays[k], codes, camera, pixel, images, background, texture, shine, terms, index, wish, own
-        )
+        total += shade_ray(k, rays[k], codes, camera, pixel, cut, behind, texture, shine, terms, index, wish, own)
     return total
 
 
@@ -125,8 +132,8 @@ def shade_ray(
     codes: Any,
     camera: Any,
     pixel: Any,
-    images: Any,
-    background: Any,
+    cut: Any,
+    behind: Any,
     texture: Any,
     shine: Any,
     terms: Any,
@@ -135,13 +142,14 @@ def shade_ray(
     own: Any,
 ) -> Any:
     """Ray p of `shade`, number k of its block: the texels before its crossings in index (N, R), -1 where there is none,
-    and what is wanted there in wish (N, R, 6): fractions of row and column, gradient of rgba. Returns |C - I|^2.
+    and what is wanted there in wish (N, R, 6): fractions of row and column, gradient of rgba (`shares`: of rgb, and w).
+    Returns |C - I|^2.
 
     Scratch: own, arrays (N,) int64, (N, 4) and (N,).
     """
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    opacity_weight, binarisation_weight, rate, min_alpha, min_light = terms
-    one, zero, inverse = np.float32(1.0), np.float32(0.0), np.float32(1 / 255.0)
+    min_alpha, min_light, shares = terms
+    one, zero = np.float32(1.0), np.float32(0.0)
     layer, c, before = own
     transmittance, r0, r1, r2 = one, zero, zero, zero
     e0, e1, e2 = zero, zero, zero
@@ -160,9 +168,8 @@ def shade_ray(
         if alpha < min_alpha:
             continue
         # All is read before anything is written: for all a compiler knows, scratch may be the texture.
-        c0 = rgba_tap(texture, i, j, of, 0, a, b) + e0
-        c1 = rgba_tap(texture, i, j, of, 1, a, b) + e1
-        c2 = rgba_tap(texture, i, j, of, 2, a, b) + e2
+        c0, c1, c2 = rgb_tap(texture, i, j, of, a, b)
+        c0, c1, c2 = c0 + e0, c1 + e1, c2 + e2
         index[n, k] = row * width + column
         wish[n, k, 0], wish[n, k, 1] = a, b
         c[m, 0], c[m, 1], c[m, 2], c[m, 3] = c0, c1, c2, alpha
@@ -176,23 +183,14 @@ def shade_ray(
         if transmittance < min_light:
             break
     cam, pix = camera[p], pixel[p]
-    s0, s1, s2 = background[cam, pix, 0], background[cam, pix, 1], background[cam, pix, 2]
-    d0 = r0 + transmittance * s0 - images[cam, pix, 0] * inverse
-    d1 = r1 + transmittance * s1 - images[cam, pix, 1] * inverse
-    d2 = r2 + transmittance * s2 - images[cam, pix, 2] * inverse
-    step = rate * transmittance * transmittance * transmittance
-    background[cam, pix, 0] = min(max(s0 - step * d0, zero), one)
-    background[cam, pix, 1] = min(max(s1 - step * d1, zero), one)
-    background[cam, pix, 2] = min(max(s2 - step * d2, zero), one)
-    # From the back: s is the colour, rest the transmittance of all that lies behind layer q.
-    push = opacity_weight - binarisation_weight * max(one - 2 * transmittance, zero)
-    rest = one
+    d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, transmittance)
+    s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
+    # From the back: s is the colour of all that lies behind layer q.
     for q in range(m - 1, -1, -1):
         n, alpha, light = layer[q], c[q, 3], before[q]
         g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
         wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
-        wish[n, k, 5] = light * (d0 * g0 + d1 * g1 + d2 * g2 + push * rest)
-        rest *= one - alpha
+        wish[n, k, 5] = light * alpha if shares else light * (d0 * g0 + d1 * g1 + d2 * g2)
         s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
     return d0 * d0 + d1 * d1 + d2 * d2
 

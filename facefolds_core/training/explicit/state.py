@@ -6,37 +6,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core.params import ExplicitParams
 from facefolds_core.adam import corrections, decays
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
-from facefolds_core.training.explicit.views import Pictures, Rays, Views
+from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.views import Rays, Views
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
-
-
-@dataclass(frozen=True)
-class LossWeights:
-    """Of one step, beside the squared error, a ray; T is its transmittance.
-
-    Attributes:
-        opacity: weight of the opacity regulariser 1 - T.
-        binarisation: weight of the binarisation loss t (1 - t), t = min(T, 1/2).
-        min_alpha: layers with less are skipped.
-    """
-
-    opacity: float
-    binarisation: float
-    min_alpha: float
 
 
 def model_bytes(texels: tuple[int, int], layers: int, frames: int) -> int:
@@ -52,11 +37,10 @@ class TextureState:
         colour [3, M, 3], layers [3, M, N, 4], frame_colour [3, K, M, 3], frame_alpha [3, K, M, N].
         start: [rows, columns, 4] colour and opacity of all layers together at the start, over the window with its
             borders at the first and last rows and columns.
-        background: [C, pixels, 3] float32.
         params: of the training.
         shine: (P, 3) what the reflection adds to each ray of the views; (0, 3) where there is none.
         steps: [K] Adam steps on each frame since the grids last grew; their sum is the static part's.
-        pace: share of a step's decay and of a background's step that a step makes (`Level.pace`).
+        pace: share of a step's decay that a step makes (`Level.pace`).
     """
 
     pace = 1.0
@@ -67,7 +51,6 @@ class TextureState:
         layers: int,
         frames: int,
         start: Tensor,
-        background: Tensor,
         params: ExplicitParams,
     ) -> None:
         m = shape[0] * shape[1]
@@ -79,7 +62,6 @@ class TextureState:
         self.frame_alpha = torch.zeros(3, frames, m, layers)
         self.start = start
         self.colour[0] = self._start()[:, :3]
-        self.background = background
         self.shine = np.zeros((0, 3), np.float32)
         self.reset_alpha()
         self._allocate()
@@ -132,14 +114,18 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Pictures,
+        pictures: Pictures,
         frame: int,
-        weights: LossWeights,
+        min_alpha: float,
         rates: NDArray[np.float32],
     ) -> float:
-        """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it."""
+        """One step on rays of one frame: shade, differentiate, update. Returns the mean squared error before it.
+
+        Args:
+            min_alpha: layers with less are skipped.
+        """
         correct = self._count_step(frame)
-        squares = self._step(views, rays, images, frame, weights, rates, correct)
+        squares = self._step(views, rays, pictures, frame, min_alpha, rates, correct)
         return squares / (3 * len(rays))
 
     def _count_step(self, frame: int) -> NDArray[np.float32]:
@@ -153,9 +139,9 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Pictures,
+        pictures: Pictures,
         frame: int,
-        weights: LossWeights,
+        min_alpha: float,
         rates: NDArray[np.float32],
         correct: NDArray[np.float32],
     ) -> float:
@@ -167,16 +153,14 @@ class TextureState:
             views.camera,
             views.pixel,
             rays,
-            images.frame(frame),
-            self.background.numpy(),
+            pictures.cut(frame),
+            pictures.behind,
             texture.numpy().reshape(h, w, n, 4),
             self.shine,
             self.gradient.numpy().reshape(n, h, w, 4),
-            weights.opacity,
-            weights.binarisation,
-            self.background_rate,
-            weights.min_alpha,
+            min_alpha,
             self.params.textures.min_light,
+            False,
         )
         adam_kernel.adam_step(
             self.colour.numpy(),
@@ -191,11 +175,6 @@ class TextureState:
             decays(self.params.textures.betas),
         )
         return squares
-
-    @property
-    def background_rate(self) -> float:
-        """By which a pixel of a background moves, times its error."""
-        return self.params.background.rate * self.pace
 
     @property
     def kept_of_frames(self) -> np.float32:
@@ -214,12 +193,12 @@ class TextureState:
     def _smooth(self, logits: Tensor) -> None:
         logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
 
-    def look(self, views: Views, images: NDArray[np.uint8], frame: int, seen: NDArray[np.float32]) -> None:
+    def look(self, views: Views, pictures: Pictures, frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
         (h, w), n = self.shape, self.layers.shape[2]
         texture = self.activated(frame).numpy().reshape(h, w, n, 4)
-        background, least = self.background.numpy(), self.params.textures.min_light
-        look(views.codes, views.camera, views.pixel, images, background, texture, seen, least)
+        cut, behind, least = pictures.cut(frame), pictures.behind, self.params.textures.min_light
+        look(views.codes, views.camera, views.pixel, cut, behind, texture, seen, least)
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
@@ -256,7 +235,7 @@ class TextureState:
         self.frame_colour, self.frame_alpha = self.frame_colour[:1].clone(), self.frame_alpha[:1].clone()
 
     def _values(self) -> list[Tensor]:
-        return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0], self.background]
+        return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0]]
 
 
 def state_type(gpu: bool) -> type[TextureState]:

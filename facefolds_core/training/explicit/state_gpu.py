@@ -14,8 +14,9 @@ from torch import Tensor
 from facefolds_core import gpu
 from facefolds_core.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
-from facefolds_core.training.explicit.state import LossWeights, TextureState
-from facefolds_core.training.explicit.views import Images, Pictures, Rays, Views
+from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.views import Rays, Views
 
 SUMS = 256
 """Over which a step's squared errors are spread, so that threads seldom wait for one another."""
@@ -45,7 +46,6 @@ class _Away:
     colour: Any
     layers: Any
     frames: list[tuple[Any, Any]]
-    background: Any
     texture: Any
     gradient: Any
     squares: Any
@@ -59,7 +59,6 @@ class GpuTextureState(TextureState):
     layers = _Home()
     frame_colour = _Home()
     frame_alpha = _Home()
-    background = _Home()
     _away: _Away | None = None
 
     def __init__(self, *arguments: Any) -> None:
@@ -73,7 +72,6 @@ class GpuTextureState(TextureState):
             return
         away.colour.copy_to_host(self.colour.numpy())
         away.layers.copy_to_host(self.layers.numpy())
-        away.background.copy_to_host(self.background.numpy())
         for k, (colour, alpha) in enumerate(away.frames):
             self.frame_colour[:, k] = torch.from_numpy(colour.copy_to_host())
             self.frame_alpha[:, k] = torch.from_numpy(alpha.copy_to_host())
@@ -87,7 +85,6 @@ class GpuTextureState(TextureState):
                 gpu.to_gpu(self.colour.numpy()),
                 gpu.to_gpu(self.layers.numpy()),
                 [(gpu.to_gpu(colour.numpy()), gpu.to_gpu(alpha.numpy())) for colour, alpha in frames],
-                gpu.to_gpu(self.background.numpy()),
                 gpu.empty((m, n, 4)),
                 gpu.zeros((n, m, 4)),
                 gpu.zeros(SUMS, np.float64),
@@ -110,9 +107,9 @@ class GpuTextureState(TextureState):
         self,
         views: Views,
         rays: NDArray[np.int64],
-        images: Pictures,
+        pictures: Pictures,
         frame: int,
-        weights: LossWeights,
+        min_alpha: float,
         rates: NDArray[np.float32],
         correct: NDArray[np.float32],
     ) -> float:
@@ -121,17 +118,16 @@ class GpuTextureState(TextureState):
         textures = self.params.textures
         self._activate(away, frame)
         away.squares.copy_to_device(np.zeros(SUMS))
-        terms = (weights.opacity, weights.binarisation, self.background_rate, weights.min_alpha)
         kernels_gpu.shade.run(
             len(rays),
             *self._views(views),
             gpu.to_gpu(rays),
-            self._picture(images, frame),
-            away.background,
+            self._kept.get(("frame", frame), pictures, lambda: (gpu.to_gpu(pictures.cut(frame)),))[0],
+            gpu.to_gpu(pictures.behind),
             away.texture.reshape(h, w, n, 4),
             self._kept.get("shine", self.shine, lambda: (gpu.to_gpu(self.shine),))[0],
             away.gradient.reshape(n, h, w, 4),
-            (*(np.float32(x) for x in terms), textures.min_light),
+            (np.float32(min_alpha), textures.min_light, False),
             away.squares,
             LAYERS=n,
         )
@@ -148,12 +144,6 @@ class GpuTextureState(TextureState):
             gpu.to_gpu(decays(textures.betas)),
         )
         return float(away.squares.copy_to_host().sum())
-
-    def _picture(self, images: Pictures, frame: int) -> Any:
-        """Photos are kept; cut-outs are over other colours in each step."""
-        if isinstance(images, Images) and images.changes:
-            return gpu.to_gpu(images.frame(frame))
-        return self._kept.get(("frame", frame), images, lambda: (gpu.to_gpu(images.frame(frame)),))[0]
 
     def _views(self, views: Views) -> tuple[Any, ...]:
         """Codes, camera and pixel."""

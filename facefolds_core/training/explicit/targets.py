@@ -1,84 +1,106 @@
-"""What a training step is compared with: photos, or the subject alone over a colour that changes from step to step.
+"""What a training step is compared with: the subject alone, over a colour that changes from step to step.
 
-Where the subject's opacity m is known in every training picture, its own colours F are, too: F = I - (1 - m) B before a
-plate B, else `foreground` estimates them. Layers are then compared with F + (1 - m) g over any colour g, a new one for
+The subject's opacity m is known in every training picture, and so its own colours F are: F = I - (1 - m) B before a
+plate B, else `foreground` estimates them. Layers are compared with F + (1 - m) g over any colour g, a new one for
 each camera in each step: |C + T g - F - (1 - m) g|^2 asks for the right colour and for the right opacity at once,
-inside, at the outline and outside. What stands behind need not be learnt, and nothing can be painted with it.
+inside, at the outline and outside. What stands behind need not be known, and nothing can be painted with it.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-import torch
-from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.captures.cutout import foreground
 from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
 from facefolds_core.frame_store import FrameStore
-from facefolds_core.jit import kernel
-from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.views import Images, OneFrame, Pictures
+from facefolds_core.training.explicit.views import Images
 
 KEPT_BYTES = 2 << 30
-"""Of cut-outs that are kept in memory; others are made again when their frame's turn comes."""
+"""Of cut-outs that a training keeps in memory; others are made again when their frame's turn comes."""
 
 
-def all_mattes(scene: Scene) -> bool:
-    """Whether the subject's opacity is known in every training picture."""
-    mattes, photos = scene.open_mattes(), scene.open_frames()
-    training = set(scene.indices("train"))
-    return mattes is not None and all(key in mattes for key in photos if key[0] in training)
+def without_matte(scene: Scene) -> list[tuple[int, int]]:
+    """(camera, frame) of the training pictures in which the subject's opacity is not known."""
+    mattes, training = scene.open_mattes(), set(scene.indices("train"))
+    return [key for key in scene.open_frames() if key[0] in training and (mattes is None or key not in mattes)]
 
 
-class CutOuts(Images):
-    """The subject of the training pictures, over the colours that `shuffle` draws.
+def check_mattes(scene: Scene) -> None:
+    """Refuse a scene in which a training picture has no matte.
+
+    Raises:
+        UserError: naming the camera and the frame.
+    """
+    missing = without_matte(scene)
+    if missing:
+        camera, frame = missing[0]
+        raise UserError(
+            "a training picture has no matte",
+            file=scene.folder / "mattes.arrow" if scene.mattes is None else scene.mattes,
+            place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
+            expected="the subject's opacity in every training picture: the explicit model is trained with it alone",
+            found=f"{len(missing)} training pictures without",
+            remedy="run the stage `subject`, which finds them",
+        )
+
+
+class Pictures(Protocol):
+    """Cut-outs of the training cameras, by frame."""
+
+    @property
+    def behind(self) -> NDArray[np.float32]:
+        """(C, 3) in [0, 1]: the colour behind the subject and behind the layers, of each camera."""
+        ...
+
+    def shuffle(self, random: np.random.Generator) -> None:
+        """Other colours behind."""
+        ...
+
+    def cut(self, index: int) -> NDArray[np.uint8]:
+        """(C, H W, 4) RGBA of a frame, colours times opacity."""
+        ...
+
+
+class CutOuts:
+    """See `Pictures`.
 
     Args:
         scene: with mattes of all training pictures.
-        gains: as of `Images`.
-
-    Attributes:
-        behind: (C, 3) float32, of each camera.
+        gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
+        kept_bytes: of cut-outs that are kept in memory; the last frame's always are.
     """
 
-    changes = True
-
-    def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
-        super().__init__(scene, gains)
+    def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None, kept_bytes: int = KEPT_BYTES) -> None:
+        self._kept_bytes = kept_bytes
+        self._photos = Images(scene, gains)
         mattes = scene.open_mattes()
         assert mattes is not None
         self._mattes: FrameStore = mattes
         self._kept: OrderedDict[int, NDArray[np.uint8]] = OrderedDict()
-        self.behind = np.full((len(self.cameras), 3), 0.5, np.float32)
+        self.behind = np.full((len(self._photos.cameras), 3), 0.5, np.float32)
 
     def shuffle(self, random: np.random.Generator) -> None:
-        """Other colours behind the subject."""
         self.behind = random.random(self.behind.shape, np.float32)
 
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        """(C, H W, 3): the subject over `behind`."""
-        cut = self.cut(index)
-        out = np.empty((*cut.shape[:2], 3), np.uint8)
-        put_over(cut, self.behind, out)
-        return out
-
     def cut(self, index: int) -> NDArray[np.uint8]:
-        """(C, H W, 4) RGBA of a frame, colours times opacity."""
         found = self._kept.pop(index, None)
         if found is None:
             found = self._cut(index)
         self._kept[index] = found
-        while len(self._kept) > 1 and len(self._kept) * found.nbytes > KEPT_BYTES:
+        while len(self._kept) > 1 and len(self._kept) * found.nbytes > self._kept_bytes:
             self._kept.popitem(last=False)
         return found
 
     def _cut(self, index: int) -> NDArray[np.uint8]:
-        photos, plates = super().frame(index), self.plates()
+        photos, plates = self._photos.frame(index), self._photos.plates()
         found = np.empty((*photos.shape[:2], 4), np.uint8)
-        for position, (camera, photo, plate) in enumerate(zip(self.cameras, photos, plates, strict=True)):
+        for position, (camera, photo, plate) in enumerate(zip(self._photos.cameras, photos, plates, strict=True)):
             matte = self._mattes.image(camera, index)[..., 0]
             opacity, picture = matte / np.float32(255), photo.reshape(*matte.shape, 3) / np.float32(255)
             if plate is None:
@@ -90,22 +112,19 @@ class CutOuts(Images):
         return found
 
 
-def change_behind(images: Pictures, state: TextureState, random: np.random.Generator) -> bool:
-    """Before a step: other colours behind cut-outs, and behind the layers; photos stay. Whether anything changed."""
-    cut = images.images if isinstance(images, OneFrame) else images
-    if not isinstance(cut, CutOuts):
-        return False
-    cut.shuffle(random)
-    state.background[:] = torch.from_numpy(cut.behind)[:, None]
-    return True
+@dataclass(frozen=True)
+class OneFrame:
+    """The cut-outs of one frame, whichever is asked for."""
 
+    pictures: Pictures
+    index: int
 
-@kernel(parallel=True)
-def put_over(cut, behind, out):  # type: ignore[no-untyped-def]
-    """cut (C, P, 4) uint8 RGBA, premultiplied; behind (C, 3) float32 in [0, 1] -> out (C, P, 3) uint8."""
-    for c in range(cut.shape[0]):
-        for p in prange(cut.shape[1]):
-            through = np.float32(255 - cut[c, p, 3])
-            for q in range(3):
-                value = np.float32(cut[c, p, q]) + through * behind[c, q] + np.float32(0.5)
-                out[c, p, q] = np.uint8(min(value, np.float32(255.0)))
+    @property
+    def behind(self) -> NDArray[np.float32]:
+        return self.pictures.behind
+
+    def shuffle(self, random: np.random.Generator) -> None:
+        self.pictures.shuffle(random)
+
+    def cut(self, index: int) -> NDArray[np.uint8]:
+        return self.pictures.cut(self.index)

@@ -20,19 +20,16 @@ from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.attempt import Attempt
-from facefolds_core.training.explicit.background import first_background
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
-from facefolds_core.training.explicit.silhouettes import silhouettes
-from facefolds_core.training.explicit.state import LossWeights, TextureState, on_one_thread, state_type
-from facefolds_core.training.explicit.targets import CutOuts, all_mattes, change_behind
-from facefolds_core.training.explicit.views import Images, Rays, rays_of
+from facefolds_core.training.explicit.state import TextureState, on_one_thread, state_type
+from facefolds_core.training.explicit.targets import CutOuts
+from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
-from facefolds_core.subject.volume import Volume
 
 
 class Trainer:
@@ -44,12 +41,10 @@ class Trainer:
         keep: called after each step; for checkpoints.
     """
 
-    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, volume: Volume, device: Device) -> None:
-        self.cameras, self.params, self.fit, self.volume, self.device = cameras, params, fit, volume, device
+    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device) -> None:
+        self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
-        self.images = (
-            CutOuts(self.scene, cameras.gains) if all_mattes(self.scene) else Images(self.scene, cameras.gains)
-        )
+        self.pictures = CutOuts(self.scene, cameras.gains)
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -103,7 +98,7 @@ class Trainer:
         """After a level, where it is time: whether the reflection helps."""
         assert self.state is not None and self.views is not None
         rounds = len(self.params.geometry.rounds)
-        found = self.gloss.after(number, rounds, self.state, self.views, self.images)
+        found = self.gloss.after(number, rounds, self.state, self.views, self.pictures)
         if found is not None:
             self.events.append(found)
             bar.write(f"train: {found}")
@@ -118,27 +113,20 @@ class Trainer:
             self._trace(level)
         assert self.views is not None
         if self.state is None:
-            background = self._background()
-            self.state = self._new_state(level.texels, background)
+            self.state = self._new_state(level.texels)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
         if moved:
             self.state.reset_alpha()
         if new_rays:
-            self.gloss.follow(self.state, self.views, self.images, self.middle)
+            self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
-    def _background(self) -> torch.Tensor:
-        """[C, H W, 3] of the first step; of cut-outs what is behind them is drawn anew in each."""
-        if isinstance(self.images, CutOuts):
-            return torch.zeros(len(self.images.cameras), self.scene.height * self.scene.width, 3)
-        return first_background(self.scene, self.images, self.volume, self.params.background)
-
-    def take_up(self, level: Level, background: torch.Tensor) -> TextureState:
+    def take_up(self, level: Level) -> TextureState:
         """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
         self._trace(level)
-        self.state = self._new_state(level.texels, background)
+        self.state = self._new_state(level.texels)
         assert self.views is not None
-        self.gloss.follow(self.state, self.views, self.images, self.middle)
+        self.gloss.follow(self.state, self.views, self.pictures, self.middle)
         return self.state
 
     def _trace(self, level: Level) -> None:
@@ -147,10 +135,10 @@ class Trainer:
         self.geometry, self.stride = level.geometry, level.stride
         self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
 
-    def _new_state(self, texels: tuple[int, int], background: torch.Tensor) -> TextureState:
+    def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
         shape = (self.params.layers, self.scene.num_frames)
-        return state_type(self.device.gpu)(texels, *shape, start, background, self.params)
+        return state_type(self.device.gpu)(texels, *shape, start, self.params)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
@@ -180,28 +168,21 @@ class Trainer:
         stride = self._stride()
         self.state.pace = level.pace
         coarse = at.level < len(self.params.geometry.rounds)
-        weights, divergence = self._weights(coarse), self.params.divergence
+        min_alpha, divergence = 0.0 if coarse else self.params.textures.min_alpha, self.params.divergence
         for i in range(at.step, level.iterations):
             frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             self.gloss.light(self.state, views, frame)
-            change_behind(self.images, self.state, self.random)
+            self.pictures.shuffle(self.random)
             rates = self._rates(level.pace, i / level.iterations if level.last else 0.0)
-            error = self.state.step(
-                views,
-                rays,
-                self.images,
-                frame,
-                weights,
-                rates,
-            )
+            error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
             if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
             if not at.heed(error, divergence.smoothing, divergence.error_ratio):
                 return False
             if self.gloss.due(i, level):
                 done = level.last and i == level.iterations - 1
-                self.gloss.fit(self.state, self.views, self.images, done)
+                self.gloss.fit(self.state, self.views, self.pictures, done)
             self.iteration += 1
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(at.recent, 1e-12)))
@@ -217,13 +198,6 @@ class Trainer:
     def _log(self, live: Live, iteration: int, psnr: float, rows: int) -> None:
         self.logged.append((iteration, psnr, rows))
         log_metrics(live, iteration, {"psnr": psnr, "texel_rows": rows})
-
-    def _weights(self, coarse: bool) -> LossWeights:
-        """Once the rounds have decided what the background explains, opacity is cheap, and half opacity dear."""
-        losses = self.params.losses
-        if coarse:
-            return LossWeights(losses.opacity, 0.0, 0.0)
-        return LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, self.params.textures.min_alpha)
 
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""
@@ -241,7 +215,7 @@ class Trainer:
         """Frames where they lag behind what moves."""
         assert self.state is not None and self.views is not None
         rates = follow_rates(self.params, self.rate)
-        self.usual, share = follow(self.state, self.views, self.images, self._weights(False), rates, self.gloss.light)
+        self.usual, share = follow(self.state, self.views, self.pictures, rates, self.gloss.light)
         self.events.append(fact("followed", share=share))
 
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
@@ -250,11 +224,7 @@ class Trainer:
         state, n = self.state, self.params.layers
         assert self.views is not None
         state.forget_moments()
-        outlines = silhouettes(self.scene, self.volume, self.params)
-        size = self.scene.height, self.scene.width
-        self.events += clear_texels(
-            state, self.views, self.images, self._stride(), self.params, outlines, self.gloss.light, size
-        )
+        self.events += clear_texels(state, self.views, self._stride(), self.params)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
@@ -299,7 +269,7 @@ class Trainer:
             "texels": list(spec.texels),
             "reasons": [reason.to_json() for reason in self.fit.reasons],
             "lost_by_chart": {str(chart): loss for chart, loss in self.fit.losses.items()},
-            "volume_psnr": self.fit.volume_psnr,
+            "start_psnr": self.fit.start_psnr,
             "cameras": self.cameras.summary,
             "events": [event.to_json() for event in self.events],
         }

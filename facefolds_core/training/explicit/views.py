@@ -85,7 +85,7 @@ def _nothing_seen(scene: Scene) -> UserError:
 
 
 def check_images(scene: Scene) -> None:
-    """Refuse a scene in which a training camera lacks a frame: each camera's background is learnt from all of them.
+    """Refuse a scene in which a training camera lacks a frame: steps look at a frame by all of them.
 
     Raises:
         UserError: naming the camera and the frame.
@@ -98,7 +98,7 @@ def check_images(scene: Scene) -> None:
                     "a training image is missing",
                     file=store.path,
                     place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-                    expected="every frame of every camera: the explicit model learns one background each",
+                    expected="every frame of every camera: the explicit model is trained with all of them at once",
                     remedy="run `dvc repro` to make the normalised scene again",
                 )
 
@@ -239,46 +239,12 @@ def rays_of(
     return MovingRays(scene, manifolds, stride, share, params, gpu=gpu)
 
 
-class Pictures(Protocol):
-    """Of the training cameras, by frame."""
-
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        """(C, H W, 3)."""
-        ...
-
-
-@dataclass(frozen=True)
-class Shown:
-    """The pictures of one frame, whichever is asked for."""
-
-    images: NDArray[np.uint8]
-
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        return self.images
-
-
-@dataclass(frozen=True)
-class OneFrame:
-    """The pictures of one frame as they are each time, whichever is asked for."""
-
-    images: Pictures
-    index: int
-
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        return self.images.frame(self.index)
-
-
 class Images:
     """The training images of one frame at a time, from the memory-mapped store; all must be there (`check_images`).
 
     Args:
         gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
-
-    Attributes:
-        changes: whether a frame's pictures are others in each step.
     """
-
-    changes = False
 
     def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
         self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
-from facefolds_core.params import WarningParams
 from facefolds_core.training.explicit.fit import Fit
 
+MIN_START_PSNR = 25.0
+"""Least PSNR of the subject's Gaussians over the training pictures, dB."""
+MAX_LOST = 0.05
+"""Largest share of the visible surface without a place in the chart."""
 
-def warnings_of(scene: Scene, fit: Fit, params: WarningParams) -> tuple[Fact, ...]:
+
+def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:
     """One for each thing that is not well; its words say what to do."""
     found = []
-    if fit.start_psnr < params.min_volume_psnr:
-        found.append(fact("volume_explains_little", psnr=fit.start_psnr, under=params.min_volume_psnr))
+    if fit.start_psnr < MIN_START_PSNR:
+        found.append(fact("start_explains_little", psnr=fit.start_psnr, under=MIN_START_PSNR))
     lost = fit.losses[fit.chart]
-    if lost > params.max_lost:
+    if lost > MAX_LOST:
         found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))
     if any(
         line.kind in ("front_found", "front_guessed") or "no `front` camera" in str(line) for line in scene.left_out

@@ -23,7 +23,7 @@ from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, read_spec
 from facefolds_core.model.tensor_files import read_tensors, write_tensors
-from facefolds_core.params import ExplicitParams, LossParams, ReflectionParams
+from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.explicit.reflection_maps import Maps
@@ -48,7 +48,7 @@ class Base:
         spec: of its model; its frames are the key frames.
         manifolds: the layers.
         textures: what all frames share; without frames, which `frame` reads.
-        surroundings: backgrounds, gains, cameras.
+        surroundings: gains, cameras.
         fingerprint: of what it was made from.
     """
 
@@ -161,12 +161,11 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
             path.replace(temporary / path.name)
         (temporary / "model").rmdir()
         tensors = {
-            "background": torch.from_numpy(found.background),
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
             "usual": torch.from_numpy(found.usual),
         }
         # One entry: safetensors writes several in any order, and equal bases are to be equal files.
-        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate, "losses": found.losses.model_dump()})}
+        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
         write_tensors(temporary / "surroundings.safetensors", tensors, about)
         shutil.copytree(log, temporary / LOG)
 
@@ -190,12 +189,7 @@ def read_base(folder: Path, fingerprint: str) -> Base:
     tensors, metadata = read_tensors(folder / "surroundings.safetensors", _REMEDY)
     about = json.loads(metadata["about"])
     surroundings = Surroundings(
-        tuple(about["splits"]),
-        tensors["gains"].numpy(),
-        tensors["background"].numpy(),
-        about["rate"],
-        LossParams.model_validate(about["losses"]),
-        tensors["usual"].numpy(),
+        tuple(about["splits"]), tensors["gains"].numpy(), about["rate"], tensors["usual"].numpy()
     )
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 

@@ -12,7 +12,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.state import model_bytes
-from facefolds_core.training.few_cameras import for_scene
+from facefolds_core.training.explicit.targets import KEPT_BYTES
 from facefolds_core.training.patience import check_space
 
 TEXEL_BYTES = 300.0
@@ -62,7 +62,7 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
         left: frames that are still to be fitted to a base that is there; None where there is none.
     """
     segments = params.segments
-    side = for_scene(params, scene)[0].textures.pixels_per_texel
+    side = params.textures.pixels_per_texel
     texels = round(TEXELS_PER_PIXEL * scene.width * scene.height / side**2)
     most = int(segments.memory_megabytes * 1e6 / (TEXEL_BYTES * texels))
     frames = scene.num_frames
@@ -70,7 +70,8 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
     keys = frames if at_once else min(max(1, most), frames, len(segments.named) or segments.key_frames)
     trained = keys if left is None else 1
     rays = len(scene.indices("train")) * scene.width * scene.height
-    memory = round(trained * texels * TEXEL_BYTES + rays * _ray_bytes(params) + FLOOR_BYTES)
+    cut_outs = min(KEPT_BYTES, trained * 4 * rays)
+    memory = round(trained * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
     steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
     if not at_once:
         steps += segments.steps * (frames if left is None else left)
@@ -100,9 +101,8 @@ def process_bytes(scene: Scene, params: ExplicitParams, texels: int) -> float:
     """Memory of one of the processes that fit segments; a still head's rays are the parent's, mapped."""
     rays = len(scene.indices("train")) * scene.width * scene.height
     moving = 0 if scene.poses is None else params.moving.cache_megabytes << 20
-    background_and_pictures = rays * (12 + 6)
-    own = FLOOR_BYTES
-    return texels * _frame_bytes(params) + background_and_pictures + moving + own
+    cut_outs_and_pictures = rays * (4 + 3)
+    return texels * _frame_bytes(params) + cut_outs_and_pictures + moving + FLOOR_BYTES
 
 
 def _frame_bytes(params: ExplicitParams) -> int:
@@ -118,9 +118,9 @@ def _seconds(params: ExplicitParams, steps: int, texels: int) -> float:
 
 
 def _ray_bytes(params: ExplicitParams) -> int:
-    """A ray that may meet the subject: codes, camera, pixel, direction; what is reflected, background, and the pictures
-    of a frame."""
-    return 4 * params.layers + 20 + 12 + 12 + 6
+    """A ray that may meet the subject: codes, camera, pixel, direction; what is reflected, and the pictures of a frame
+    while they are cut out."""
+    return 4 * params.layers + 20 + 12 + 6
 
 
 def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) -> None:

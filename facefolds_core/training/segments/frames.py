@@ -19,19 +19,9 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
-from facefolds_core.training.explicit.state import LossWeights, TextureState, state_type
-from facefolds_core.training.explicit.targets import CutOuts, all_mattes, change_behind
-from facefolds_core.training.explicit.views import (
-    Images,
-    MovingRays,
-    OneFrame,
-    Pictures,
-    Rays,
-    Shown,
-    StillRays,
-    Views,
-    trace_views,
-)
+from facefolds_core.training.explicit.state import TextureState, state_type
+from facefolds_core.training.explicit.targets import CutOuts, OneFrame, Pictures
+from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
 
 
@@ -70,15 +60,11 @@ class FrameFitter:
         views: Views | None = None,
         shine: NDArray[np.float32] | None = None,
     ) -> None:
-        self.scene, self.base, self.gpu = scene, base, device.gpu
-        still = params.background.model_copy(update={"rate": 0.0})
-        self.params = params.model_copy(update={"background": still})
-        gains = base.surroundings.gains
-        self.images = CutOuts(scene, gains) if all_mattes(scene) else Images(scene, gains)
+        self.scene, self.base, self.params, self.gpu = scene, base, params, device.gpu
+        self.pictures = CutOuts(scene, base.surroundings.gains, kept_bytes=0)
         h, w = base.spec.texels
-        background = torch.from_numpy(base.surroundings.background)
         shape = (base.spec.num_layers, 1)
-        self.state = state_type(self.gpu)((h, w), *shape, torch.zeros(2, 2, 4), background, self.params)
+        self.state = state_type(self.gpu)((h, w), *shape, torch.zeros(2, 2, 4), self.params)
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
@@ -103,30 +89,29 @@ class FrameFitter:
         views = self._rays(frame, random)
         texels = state.shape[0] * state.shape[1]
         parts = max(1, int(views.count / (params.textures.rays_per_texel * texels)))
-        losses, steps = self.base.surroundings.losses, params.segments.steps
-        weights = LossWeights(losses.opacity * losses.late_opacity, losses.binarisation, params.textures.min_alpha)
+        steps, min_alpha = params.segments.steps, params.textures.min_alpha
         phases: list[int] = []
         rays, errors = 0, []
-        images = OneFrame(self.images, frame) if self.images.changes else Shown(self.images.frame(frame))
+        pictures = OneFrame(self.pictures, frame)
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
             if self.maps is not None and self.scene.poses is not None:
                 state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
-            change_behind(self.images, state, random)
-            errors.append(state.step(seen, which, images, 0, weights, self._rates(i / steps)))
+            pictures.shuffle(random)
+            errors.append(state.step(seen, which, pictures, 0, min_alpha, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
             rays += len(which)
         if not np.isfinite(errors).all():
             raise _diverged(self.scene, frame)
-        self._follow(frame, views, images, weights)
+        self._follow(frame, views, pictures)
         psnr = -10 * float(np.log10(max(float(np.mean(errors[-parts:])), 1e-12)))
         h, w = state.shape
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
         return FittedFrame(colour.half(), alpha.half(), psnr, rays)
 
-    def _follow(self, frame: int, views: Rays, images: Pictures, weights: LossWeights) -> None:
+    def _follow(self, frame: int, views: Rays, pictures: Pictures) -> None:
         """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
@@ -134,9 +119,9 @@ class FrameFitter:
             if self.maps is not None and self.scene.poses is not None:
                 state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
 
-        errors = mean_errors(state, views, images, 0, light)
+        errors = mean_errors(state, views, pictures, 0, light)
         chosen = lagging(errors - found.usual, state.shape, self.params.follow.min_error)
-        follow_frame(state, views, images, 0, chosen, errors, weights, follow_rates(self.params, found.rate), light)
+        follow_frame(state, views, pictures, 0, chosen, errors, follow_rates(self.params, found.rate), light)
 
     def _start(self, shares: NDArray[np.float64]) -> None:
         colour, alpha = self.base.mixed(shares)

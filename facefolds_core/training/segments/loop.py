@@ -26,6 +26,7 @@ from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.loop import fit_explicit
+from facefolds_core.training.explicit.targets import check_mattes
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
@@ -73,6 +74,7 @@ class _Take:
 
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
+        check_mattes(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
         self.device = choose(params.device)
         self.began = time.perf_counter()
