@@ -16,7 +16,6 @@ PARAMS: dict[str, Any] = {
         "preset": "fast",
         "layers": 3,
         "iterations": 60,
-        "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
         "textures": {"steps_per_frame": 8},
         "segments": {"joint_frames": 0, "key_frames": 2, "frames": 2, "steps": 1000, "checkpoint_seconds": 0.2},
     },
