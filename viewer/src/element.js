@@ -31,7 +31,7 @@ export class FacefoldsPlayer extends HTMLElement {
 
   constructor() {
     super();
-    this.attachShadow({ mode: "open" }).adoptedStyleSheets = [STYLE];
+    this.attachShadow({ mode: "open", delegatesFocus: true }).adoptedStyleSheets = [STYLE];
   }
 
   connectedCallback() {

@@ -17,9 +17,8 @@ export function connectControls(element) {
   connectBar(element);
   connectPanel(element);
   connectEmbed(element);
-  connectKeys(element);
   connectGesturesOf(element);
-  const idle = connectIdle(element);
+  const [keys, idle] = [connectKeys(element), connectIdle(element)];
   const resizing = new ResizeObserver(() => {
     // The bar, and on a phone the open sheet of the settings: the head stands above them.
     const sheet = panel.offsetHeight && panel.offsetTop > stage.clientHeight / 3;
@@ -30,6 +29,7 @@ export function connectControls(element) {
   for (const part of [stage, bar, panel]) resizing.observe(part);
   return () => {
     resizing.disconnect();
+    keys();
     idle();
   };
 }

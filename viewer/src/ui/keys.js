@@ -1,4 +1,4 @@
-/** Keys, while the player (or anything in it that does not need the key itself) has the focus. */
+/** Keys, while the player (or anything in it that does not need the key itself) has the focus, or the page is all its. */
 
 import { pullApart } from "./panel.js";
 
@@ -6,7 +6,7 @@ const TURN = 5; // degrees
 const ZOOM = 1.1;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
 
-/** @param {import("../element.js").FacefoldsPlayer} element */
+/** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
 export function connectKeys(element) {
   const { player, shadowRoot: root } = element;
   const act = (name) => () => element.actions[name]();
@@ -32,7 +32,8 @@ export function connectKeys(element) {
     ArrowUp: turn(0, TURN),
     ArrowDown: turn(0, -TURN),
   };
-  root.addEventListener("keydown", (event) => {
+  const listening = new AbortController();
+  const press = (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || !element.ready) return;
     if (event.target.closest("dialog")) return; // it knows Escape by itself
     if (needsKeys(event.target, event.key)) return;
@@ -43,7 +44,10 @@ export function connectKeys(element) {
     if (!action) return;
     event.preventDefault();
     action();
-  });
+  };
+  element.press = press;
+  root.addEventListener("keydown", press, { signal: listening.signal });
+  return () => listening.abort();
 }
 
 /** Controls that use the key themselves. */
