@@ -21,7 +21,8 @@ export interface Camera {
 /** What a link holds; layers and photos by index. */
 export interface ViewState {
   frame?: number;
-  view?: Orbit;
+  /** To set, parts are enough. */
+  view?: Partial<Orbit>;
   level?: string;
   background?: string;
   hidden?: number[];

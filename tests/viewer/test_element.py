@@ -56,6 +56,19 @@ def test_what_is_no_colour_is_refused_and_changes_nothing(new_player: NewPlayer,
     ]
 
 
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_part_of_the_state_changes_that_part(new_player: NewPlayer, rich: Path, when: str) -> None:
+    player = opened(new_player, rich, ONE.format('controls="none"'))
+    if when == "after":
+        player.wait("e.ready")
+    player.run("e.state = {view: {azimuth: 40}}; e.state = {view: {elevation: 5}}")
+    player.wait("e.ready")
+    view, home = player.run("return [e.state.view, e.player.view.home]")  # type: ignore[misc]
+    assert [view["azimuth"], view["elevation"]] == [40, 5]
+    assert [view["distance"], view["target"]] == [pytest.approx(home["distance"]), pytest.approx(home["target"])]
+    assert player.run("try { e.state = {view: {azimuth: 'x'}} } catch (error) { return error.name }") == "TypeError"
+
+
 def test_the_wheel_scrolls_the_page_until_the_player_is_meant(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, ONE.format("") + TALL)
     player.wait("e.ready")

@@ -9,6 +9,7 @@ import { asPng, linkTo } from "./sharing.js";
 import { connectControls } from "./ui/controls.js";
 import { Overlays } from "./ui/overlays.js";
 import { STYLE, TEMPLATE } from "./ui/template.js";
+import { isOrbit } from "./viewstate.js";
 import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
@@ -368,7 +369,7 @@ export class FacefoldsPlayer extends HTMLElement {
     return index === null ? this.comparison?.close() : this.comparison?.open(index);
   }
 
-  /** @returns {import("./viewstate.js").ViewState} */
+  /** To set, parts are enough, also of the view. @returns {import("./viewstate.js").ViewState} */
   get state() {
     const player = this.#player;
     if (!player?.level) return { ...this.#state };
@@ -384,11 +385,13 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   set state(state) {
+    const { frame, view, level, hidden, photo, background } = state;
+    if (view && !isOrbit(view))
+      throw new TypeError("a view has azimuth and elevation in degrees, a distance above 0 and a target of 3 numbers");
     if (!this.ready) {
-      this.#state = { ...this.#state, ...state };
+      this.#state = { ...this.#state, ...state, ...(view && { view: { ...this.#state.view, ...view } }) };
       return;
     }
-    const { frame, view, level, hidden, photo, background } = state;
     if (isColour(background)) this.#paint(background);
     for (const key of [...Object.keys(PLAIN), "speed", "loop"]) if (state[key] !== undefined) this[key] = state[key];
     if (hidden) this.#player.hide(hidden);

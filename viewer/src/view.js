@@ -110,10 +110,11 @@ export class View {
     return { ...this.now, azimuth: unwound(this.now.azimuth, [-Infinity, Infinity]), target: [...this.now.target] };
   }
 
+  /** Goes there at once. @param {Partial<import("./camera.js").Orbit>} orbit */
   set(orbit) {
     this.setExact(null);
     this.touched();
-    this.#aim(orbit);
+    this.#aim({ ...this.goal, ...orbit });
     this.now = { ...this.goal, target: [...this.goal.target] };
     this.onChange();
   }
