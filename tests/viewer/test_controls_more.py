@@ -104,19 +104,44 @@ def test_a_browser_that_cannot_record_says_what_does(new_player: NewPlayer, rich
     player.page.locator(".toast", has_text="facefolds render ASSET --kind turntable").wait_for()
 
 
-def test_the_code_to_embed_plays(player: Player) -> None:
+def embed_code(player: Player) -> tuple[str, str]:
+    """What the dialog offers, as a frame and as an element."""
     player.run("e.player.view.set({azimuth: 12, elevation: 3, distance: 1.1, target: [0, 0, 0]})")
     player.button("Settings")
     player.button("Embed")
-    frame = player.page.get_by_label("As a frame").input_value()
-    element = player.page.get_by_label("As an element").input_value()
+    return player.page.get_by_label("As a frame").input_value(), player.page.get_by_label("As an element").input_value()
+
+
+def test_the_code_to_embed_plays(player: Player) -> None:
+    """From this machine: the code is for what is uploaded as player/ and player/asset/."""
+    frame, element = embed_code(player)
+    assert player.page.get_by_text("Only this machine can reach").is_visible()
+    assert "facefolds export-html data/caps/asset --out caps.html" in player.page.get_by_label("One file").input_value()
     player.page.keyboard.press("Escape")
     assert player.run("return [e.shadowRoot.querySelector('dialog').open]") == [False]
     assert "view=12,3,1.1,0,0,0" in frame
-    page_of_yours(player, element + frame)
+    assert "127.0.0.1" not in frame + element
+    page_of_yours(player, (element + frame).replace("player/", ""))
     player.wait("e.ready")
     player.page.locator("iframe").scroll_into_view_if_needed()
     player.page.frame_locator("iframe").locator("facefolds-player canvas").wait_for()
+
+
+def test_the_code_to_embed_from_a_server_has_its_address_and_what_it_must_allow(
+    new_player: NewPlayer, rich: Path
+) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
+    local, player.address = player.address, "https://faces.example/"
+    player.page.route(
+        "https://faces.example/**",
+        lambda route: route.fulfill(response=route.fetch(url=route.request.url.replace(player.address, local))),
+    )
+    player.open("asset")
+    frame, element = embed_code(player)
+    assert 'src="https://faces.example/index.html?src=%2Fasset%2F#view=12,3,1.1,0,0,0' in frame
+    assert 'src="https://faces.example/facefolds-player.js"' in element
+    assert player.page.get_by_text("frame-ancestors").is_visible()
+    assert not player.page.get_by_label("One file").is_visible()
 
 
 def test_escape_closes_what_is_open(player: Player) -> None:

@@ -41,6 +41,10 @@ const SWATCHES = { "#16181d": "Dark", "#000000": "Black", "#7f7f7f": "Grey", "#f
 
 const MODES = { colour: "Picture", alpha: "Opacity", depth: "Depth", uv: "Texture coordinates" };
 
+/** A text to copy. */
+const field = ([name, label]) =>
+  `<div class="${name}"><label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button></div>`;
+
 export const TEMPLATE = `<div class="stage">
   <canvas tabindex="0" role="img" aria-label="Three-dimensional picture. Drag to turn, wheel (with Ctrl) or pinch to zoom, right button or two fingers to move."></canvas>
   <img class="poster" alt="" hidden>
@@ -87,8 +91,12 @@ export const TEMPLATE = `<div class="stage">
   <div class="drop" aria-hidden="true">Drop the asset's folder or a ZIP of it</div>
   <dialog aria-label="Embed"><form method="dialog">
     <div class="row head"><b>Put it on a page of yours</b>${button("", "Close").replace("<button", "<button data-close").replace("></button>", `>${ICONS.close}</button>`)}</div>
+    <p class="if-own">Only this machine can reach the address of this page, and its server lets no other page show it. Upload one of these to a server of yours.</p>
+    <p class="unless-own">A page of another site can show it where this server lets it: no <code>X-Frame-Options</code> or <code>frame-ancestors</code> against the frame; <code>Access-Control-Allow-Origin</code> for the element, on the player's files and the asset's.</p>
+    ${field(["file", "One file that plays by itself: this command makes it"])}
+    <p class="if-own">Or the folders: what <code>viewer/dist</code> holds as <code>player/</code>, and the asset's folder as <code>player/asset/</code>, beside the page.</p>
     ${[["frame", "As a frame, with this view"], ["element", "As an element"]]
-      .map(([name, label]) => `<label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button>`)
+      .map(field)
       .join("")}
   </form></dialog>
 </div>`; // prettier-ignore
