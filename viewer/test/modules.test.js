@@ -281,16 +281,19 @@ test("a manifest that is wrong is refused, naming the place", () => {
   }
 });
 
-test("movements beyond what was filmed meet resistance, and fade", () => {
+test("movements beyond the middle of what was filmed meet resistance, and fade", () => {
   const range = bounded({ azimuth: [-40, 60], elevation: [-10, 20] });
+  assert.deepEqual(range, { azimuth: [-30, 50], elevation: [-7, 17] });
   assert.equal(resisted(50, range.azimuth), 50);
-  const [little, far] = [resisted(75, range.azimuth), resisted(500, range.azimuth)];
-  assert.ok(little > 64 && little < 75 && far > little && far < 90);
-  assert.equal(strength({ azimuth: 60, elevation: 0 }, range), 1);
+  const [little, far] = [resisted(65, range.azimuth), resisted(500, range.azimuth)];
+  assert.ok(little > 54 && little < 65 && far > little && far < 80);
+  assert.equal(strength({ azimuth: 50, elevation: 0 }, range), 1);
   assert.ok(strength({ azimuth: far, elevation: 0 }, range) < 0.1);
   assert.equal(strength({ azimuth: 170, elevation: 60 }, bounded(null)), 1);
   assert.equal(bounded({ azimuth: [-170, 175], elevation: [0, 0] }).azimuth[1], Infinity); // filmed all round
   assert.equal(unwound(350, range.azimuth), -10);
+  // The front stays where it was filmed, and where one camera stood there is room to move.
+  assert.deepEqual(bounded({ azimuth: [-3, 57], elevation: [7, 7] }), { azimuth: [0, 51], elevation: [3, 11] });
 });
 
 /** What is said while pictures come every `seconds` and take `work`, for `total` seconds. */
