@@ -30,6 +30,7 @@ def test_a_drag_beyond_what_is_good_meets_resistance_fades_and_comes_back(player
     mouse.down()
     mouse.move(100, 200, steps=10)  # far more than the range
     player.wait("e.player.view.strength < 0.3")
+    assert player.notice() == "Cameras saw too little from further round"
     assert player.run("return e.player.view.get().azimuth < 70")
     background = [0x16, 0x18, 0x1D]
     pixel = "return [...e.shadowRoot.querySelector('canvas').getContext('2d').getImageData(380, 200, 1, 1).data]"

@@ -9,6 +9,7 @@ const HALF = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
 const FILLED = 0.92; // of the free part of the canvas, by what there is
 const EASE = 0.07; // s in which most of a movement is done
 const DISTANCES = [0.2, 20];
+const FAINT = 0.9; // strength of the picture below which it is told why
 const SWAY = { degrees: 5, seconds: 9 };
 
 export class View {
@@ -161,6 +162,7 @@ export class View {
     this.pushed.elevation += 250 * dy;
     this.goal.azimuth = resisted(this.pushed.azimuth, this.range.azimuth);
     this.goal.elevation = clamp(resisted(this.pushed.elevation, this.range.elevation), [-89, 89]);
+    if (strength(this.goal, this.range) < FAINT) this.surface.dispatchEvent(new Event("limit"));
     this.onChange();
   }
 

@@ -6,6 +6,7 @@ import { connectIdle } from "./idle.js";
 import { connectKeys } from "./keys.js";
 import { connectPanel } from "./panel.js";
 
+const AGAIN = 1000; // ms without what a word is about, before it is said a second time
 const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
 
 /** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
@@ -39,8 +40,14 @@ function connectGesturesOf(element) {
   const { player, shadowRoot: root } = element;
   const own = () => element.getAttribute("gestures") === "all" || document.fullscreenElement === element;
   player.view.wheels = () => own() || root.activeElement !== null;
-  let told = 0;
-  player.canvas.addEventListener("unwanted-wheel", () => {
-    if (told++ < 2) element.overlays.say("Ctrl + wheel zooms, or click first");
-  });
+  const tell = (name, text) => {
+    let told = 0;
+    let last = 0;
+    player.canvas.addEventListener(name, ({ timeStamp }) => {
+      if (timeStamp - last > AGAIN && told++ < 2) element.overlays.say(text);
+      last = timeStamp;
+    });
+  };
+  tell("unwanted-wheel", "Ctrl + wheel zooms, or click first");
+  tell("limit", "Cameras saw too little from further round");
 }
