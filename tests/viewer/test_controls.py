@@ -220,8 +220,8 @@ def test_full_screen(player: Player) -> None:
 
 def test_the_shared_link_shows_the_same(player: Player) -> None:
     player.run(
-        """e.player.view.set({azimuth: 25, elevation: 8, distance: 0.8, target: [0, 0.02, 0]});
-        e.background = '#104020'; e.spread = 0.2; e.layers = [true, false, true]; e.effects = false; e.speed = 0.5;
+        """e.spread = 0.2; e.player.view.set({azimuth: 25, elevation: 8, distance: 0.8, target: [0, 0.02, 0]});
+        e.background = '#104020'; e.layers = [true, false, true]; e.effects = false; e.speed = 0.5;
         await e.seek(3);"""
     )
     before = player.capture()

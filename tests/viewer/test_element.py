@@ -185,7 +185,7 @@ def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path)
 def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, ONE.format("") + '<div id="other"></div>')
     player.wait("e.level === 'full'")
-    player.run("await e.seek(3); e.spread = 0.5; e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
+    player.run("e.spread = 0.5; await e.seek(3); e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
                "target: [0, 0, 0]})")  # fmt: skip
     count = len(names(player))
     moved = "const b = e.player; document.querySelector('#other').append(e); await 0; return [e.player === b, e.frame]"

@@ -51,7 +51,7 @@ def test_a_link_beyond_what_is_good_shows_the_nearest_that_is(player: Player) ->
 def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) -> None:
     player.page.locator("canvas").focus()
     player.page.keyboard.press("p")
-    player.wait("e.player.view.get().azimuth > 54 && e.player.view.strength === 1")
+    player.wait("e.player.view.get().azimuth > 41 && e.player.view.strength === 1")
     player.page.keyboard.press("p")
     player.wait("Math.abs(e.player.view.get().azimuth) < 1")
 

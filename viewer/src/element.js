@@ -128,7 +128,7 @@ export class FacefoldsPlayer extends HTMLElement {
     const state = this.#state;
     this.#state = {};
     this.#paint(this.background);
-    for (const name of Object.keys(PLAIN)) this.#player.set(name, this.#settings[name]);
+    for (const name of Object.keys(PLAIN)) this[name] = this.#settings[name];
     this.state = { ...state, level: undefined };
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const rests = state.frame !== undefined || state.photo !== undefined;
@@ -241,8 +241,10 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#settings.spread;
   }
 
+  /** Pulls the layers apart; the view turns aside, so that all are seen. */
   set spread(amount) {
-    this.#set("spread", Math.max(0, Math.min(1, Number(amount) || 0)));
+    this.#settings.spread = Math.max(0, Math.min(1, Number(amount) || 0));
+    this.#player?.pullApart(this.#settings.spread);
   }
 
   get wireframe() {

@@ -17,9 +17,10 @@ import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
 const SMOOTH = 1 / 30; // s that a picture may take while anything moves
+const ASIDE = { azimuth: 42, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
+const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 const RATE_OVER = 1000; // ms that the frames a second are counted over
 const SETTERS = {
-  spread: "setSpread",
   wireframe: "setWireframe",
   effects: "setEffects",
   background: "setBackground",
@@ -48,6 +49,7 @@ export class Player extends EventTarget {
     this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
+    this.together = null; // the view before the layers were pulled apart
     this.size = [0, 0];
     this.haste = new Adaptation();
     this.late = false; // pictures came late: what moves is drawn with one ray a pixel
@@ -109,6 +111,7 @@ export class Player extends EventTarget {
     this.#showLayers();
     this.#show(frame, picture);
     if (!old && !this.home) this.#settle(this.renderer.bounds());
+    if (this.view.framed) this.pullApart(this.renderer.spread);
     this.draw();
     old?.dispose();
     if (!old) this.say("ready");
@@ -174,10 +177,25 @@ export class Player extends EventTarget {
     this.renderer.setVisible(this.visible);
   }
 
-  /** @param {"spread" | "wireframe" | "effects" | "background" | "mode"} name */
+  /** @param {"wireframe" | "effects" | "background" | "mode"} name */
   set(name, value) {
     this.renderer[SETTERS[name]](value);
-    if (name === "spread" && this.view.free !== value > 0) this.view.setFree(value > 0);
+    this.#changed();
+  }
+
+  /** Pulls the layers apart, and turns aside so that all are seen and fill the canvas; at 0 goes back. */
+  pullApart(amount) {
+    if (!this.level) return;
+    const { view, renderer } = this;
+    if (amount && !this.together) this.together = { orbit: view.get(), atHome: view.atHome };
+    renderer.setSpread(amount);
+    if (view.free !== amount > 0) view.setFree(amount > 0);
+    if (amount) view.frame(renderer.bounds(), this.size[0] > this.size[1] ? ASIDE : ACROSS);
+    else if (this.together) {
+      view.glide(this.together.orbit);
+      view.atHome = this.together.atHome;
+      this.together = null;
+    }
     this.#changed();
   }
 

@@ -12,7 +12,7 @@ import { Upload } from "./gl/upload.js";
 import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
-const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
+const SPREAD = { step: 0.4, all: 4 }; // heights of the head from layer to layer when fully pulled apart, and at most in all
 
 export class LayerRenderer {
   /** @param {HTMLCanvasElement} canvas that is looked at @throws {PlayerError} if there is no WebGL 2 */
@@ -46,6 +46,8 @@ export class LayerRenderer {
   setLevel(level) {
     this.upload?.dispose();
     this.level = level;
+    const ends = level.geometries.flatMap(({ box }) => [box.low[2], box.high[2]]);
+    this.tall = Math.max(...ends) - Math.min(...ends);
     this.upload = new Upload(this.graphics.gl, level);
   }
 
@@ -99,7 +101,7 @@ export class LayerRenderer {
 
   #shift(index) {
     const middle = (this.level.geometries.length - 1) / 2;
-    return this.spread * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
+    return this.spread * this.tall * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
   }
 
   /**

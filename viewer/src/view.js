@@ -23,6 +23,7 @@ export class View {
     this.exact = null;
     this.home = null;
     this.atHome = true; // nobody has moved it: it is fitted again when the canvas changes
+    this.framed = null; // arguments of `frame`
     this.range = bounded(null);
     this.filmed = null; // of the manifest
     this.free = false; // limits are off: the layers are pulled apart
@@ -89,16 +90,40 @@ export class View {
    * asset's poster shows the same. @param {{low: number[], high: number[], centre: number[]}} box */
   setHome({ low, high, centre }) {
     this.shape = [high[1] - low[1], high[2] - low[2]];
-    const away = this.distanceFor(...this.shape);
+    const away = this.#distanceFor(...this.shape);
     const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
     this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
     if (this.atHome && !this.exact) this.reset();
   }
 
   /** From how far something of that width and height fills the free part of the canvas. */
-  distanceFor(across, tall) {
+  #distanceFor(across, tall) {
     const [width, height] = this.#room();
     return (this.#side() * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
+  }
+
+  /**
+   * Turns to a direction, from where the canvas holds all of a box and no more. Until somebody moves the view, it does so
+   * again when the canvas changes.
+   * @param {{low: number[], high: number[]}} box @param {{azimuth: number, elevation: number}} direction
+   */
+  frame({ low, high }, direction) {
+    const { right, up, back } = axesOf(direction);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => ((k >> i) & 1 ? high[i] : low[i])));
+    const along = (axis) => corners.map((corner) => corner.reduce((sum, v, i) => sum + v * axis[i], 0));
+    const towards = along(back);
+    const middle = (Math.min(...towards) + Math.max(...towards)) / 2;
+    // A corner at r along the picture and b towards the eye is inside where |r - t| <= slope * (distance - b).
+    const fit = (axis, pixels) => {
+      const slope = (HALF * FILLED * pixels) / this.#side();
+      const end = (sign) => Math.max(...along(axis).map((r, i) => sign * r + slope * (towards[i] - middle)));
+      return { at: (end(1) - end(-1)) / 2, distance: (end(1) + end(-1)) / 2 / slope };
+    };
+    const [width, height] = this.#room();
+    const [across, tall] = [fit(right, width), fit(up, height)];
+    const target = back.map((v, i) => middle * v + across.at * right[i] + tall.at * up[i]);
+    this.glide({ ...direction, distance: Math.max(across.distance, tall.distance), target });
+    this.framed = [{ low, high }, direction];
   }
 
   reset() {
@@ -140,6 +165,7 @@ export class View {
   touched() {
     this.#stopSway();
     this.atHome = false;
+    this.framed = null;
   }
 
   /** Moves by angles in degrees and a factor of the distance (keyboard). */
@@ -260,6 +286,7 @@ export class View {
   resize(width, height, inset) {
     this.size = [width, height];
     this.inset = inset;
+    if (this.framed) this.frame(...this.framed);
   }
 
   dispose() {

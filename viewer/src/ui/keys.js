@@ -1,7 +1,5 @@
 /** Keys, while the player (or anything in it that does not need the key itself) has the focus, or the page is all its. */
 
-import { pullApart } from "./panel.js";
-
 const TURN = 5; // degrees
 const ZOOM = 1.1;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
@@ -21,7 +19,7 @@ export function connectKeys(element) {
     " ": act("play"), k: act("play"), ArrowLeft: act("back"), ArrowRight: act("next"), ",": act("back"), ".": act("next"),
     Home: () => element.seek(0), End: () => element.seek(element.frames - 1), "<": faster(-1), ">": faster(1), l: act("loop"),
     "+": zoom(1 / ZOOM), "=": zoom(1 / ZOOM), "-": zoom(ZOOM), 0: act("reset"), w: flip("wireframe"), e: flip("effects"),
-    p: () => pullApart(element, element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
+    p: () => (element.spread = element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
     c: () => player.manifest?.photos.length && element.actions.compare(),
     s: () => element.overlays.showStatistics(!element.overlays.statistics),
     Escape: act("dismiss"), i: act("picture"),
