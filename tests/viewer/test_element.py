@@ -182,6 +182,25 @@ def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path)
     player.wait("e.level === 'full' && e.player.detail.auto")
 
 
+@pytest.mark.parametrize("how", ["e.style.width = '300px'", "e.player.view.zoom(0.1)", "e.level = 'full'"])
+def test_a_small_canvas_needs_no_fine_level(new_player: NewPlayer, rich: Path, how: str) -> None:
+    """In pixels of the device: a texel for a pixel is enough. A larger canvas, or a nearer view, needs more."""
+    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
+    player = opened(new_player, rich, small)
+    player.wait("e.ready")
+    player.page.wait_for_timeout(500)
+    assert player.run("return [e.level, e.player.detail.auto]") == ["coarse", True]
+    assert "full.mp4" not in names(player)
+    player.run(how)
+    player.wait("e.level === 'full'")
+
+
+def test_a_dense_screen_needs_a_fine_level(new_player: NewPlayer, rich: Path) -> None:
+    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
+    player = opened(new_player, rich, small, device_scale_factor=2)
+    player.wait("e.level === 'full'")
+
+
 def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, ONE.format("") + '<div id="other"></div>')
     player.wait("e.level === 'full'")

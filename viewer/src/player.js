@@ -61,7 +61,7 @@ export class Player extends EventTarget {
 
   /**
    * @param {import("./files.js").Files | import("./files.js").MemoryFiles} files of the asset
-   * @param {string} [want] name of a level, or "auto": the finest that this machine can take
+   * @param {string} [want] name of a level, or "auto": as fine as the canvas shows and this machine can take
    */
   async load(files, want = "auto") {
     this.files = files;

@@ -225,6 +225,11 @@ export class View {
     return (2 * HALF * this.goal.distance) / (this.#side() * scale);
   }
 
+  /** Pixels of the canvas that a unit of the scene takes, at the target; an exact camera may come as near as it likes. */
+  get pixelsAUnit() {
+    return this.exact ? Infinity : this.#side() / (2 * HALF * this.goal.distance);
+  }
+
   /** Of the square, in pixels, that the field of view is of: one that holds what there is fits the canvas just so. */
   #side() {
     const [[width, height], [across, tall]] = [this.#room(), this.shape];
