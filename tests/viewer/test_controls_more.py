@@ -40,6 +40,8 @@ def test_opacity_depth_and_texture_coordinates(player: Player, rich: Path) -> No
     rows, columns = np.nonzero(solid)
     middle = np.hypot(rows - rows.mean(), columns - columns.mean())
     assert depth[solid][middle < 8].mean() > depth[solid][middle > 0.8 * middle.max()].mean()  # nearer is brighter
+    found = depth[alpha > 0.5]
+    assert np.quantile(found, 0.02) < 0.25 and np.quantile(found, 0.98) > 0.75  # all greys, for what is seen
     show.select_option("Texture coordinates")
     uv = player.capture(camera)
     assert np.abs(uv[..., 2][solid] - 0.35).max() < 0.02
