@@ -110,8 +110,16 @@ export class FacefoldsPlayer extends HTMLElement {
   capture(camera?: Camera): ImageData;
   /** A PNG. */
   screenshot(camera?: Camera): Promise<Blob>;
-  /** A film of one turn from side to side, MP4 or WebM: 8 s and 40 degrees unless told otherwise; the signal ends it early. */
-  record(options?: { seconds?: number; degrees?: number; signal?: AbortSignal }): Promise<Blob>;
+  /**
+   * A film of one turn from side to side, MP4 or WebM, with the asset's sound: 8 s and 40 degrees unless told otherwise. The
+   * signal ends it early; `onPart` hears how much there is, 0 to 1.
+   */
+  record(options?: {
+    seconds?: number;
+    degrees?: number;
+    signal?: AbortSignal;
+    onPart?: (part: number) => void;
+  }): Promise<Blob>;
   compare(photo: number | null): void;
   /** Plays an asset that is at hand: name -> content, manifest.json among them. */
   openFiles(files: Map<string, Blob>): void;

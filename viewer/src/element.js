@@ -357,7 +357,7 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   /**
-   * Records one turn from side to side. @param {{seconds?: number, degrees?: number, signal?: AbortSignal}} [options]
+   * Makes a film of one turn from side to side. @param {import("./recording.js").Wanted} [options]
    * @returns {Promise<Blob>} MP4 or WebM
    */
   async record(options) {

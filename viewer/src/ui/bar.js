@@ -132,9 +132,11 @@ async function saveTurn(element, button) {
   if (!element.ready) return;
   element.recording = new AbortController();
   button.setAttribute("aria-pressed", "true");
-  element.overlays.say("Recording. Press again to end it early.", 8000);
+  const onPart = (part) =>
+    element.overlays.say(`Recording, ${Math.round(100 * part)} %. Press again to end it early.`, 8000);
+  onPart(0);
   try {
-    const film = await element.record({ signal: element.recording.signal });
+    const film = await element.record({ signal: element.recording.signal, onPart });
     save(film, `${fileName(element)}-turn.${film.type.split("/")[1]}`);
     element.overlays.say("Saved");
   } catch (error) {
