@@ -56,6 +56,19 @@ def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) 
     player.wait("Math.abs(e.player.view.get().azimuth) < 1")
 
 
+def test_zoom_ends_where_detail_ends(player: Player) -> None:
+    """By the wheel and in links: at six pixels a texel, or twice as near as the first view."""
+    player.page.locator("canvas").click(position={"x": 300, "y": 200})
+    for _ in range(12):
+        player.page.mouse.wheel(0, -400)
+    closest = """const { view } = e.player; const focal = view.pixelsAUnit * view.goal.distance;
+        return Math.min(view.front + focal / (6 * view.detail), view.home.distance / 2);"""
+    assert player.run("return e.player.view.goal.distance") == pytest.approx(player.run(closest))
+    nearest = player.run("return e.player.view.goal.distance")
+    player.run("e.state = { view: { distance: 0.01 } }")
+    assert player.run("return e.player.view.get().distance") == pytest.approx(nearest)
+
+
 def test_an_exact_camera_is_never_bounded(player: Player) -> None:
     player.run(
         "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"

@@ -23,9 +23,8 @@ export class LevelChoice {
 
   /** Names of the levels up to the coarsest that has a texel for every pixel of the canvas, coarsest first. */
   #useful() {
-    const { level, manifest, view } = this.player;
+    const { manifest, view } = this.player;
     const levels = manifest.levels.filter(({ name }) => this.choices.includes(name));
-    this.density ??= texelsAUnit(level) / fineness(level.info);
     const enough = levels.findIndex((info) => this.density * fineness(info) >= view.pixelsAUnit);
     return this.choices.slice(0, enough < 0 ? this.choices.length : enough + 1);
   }
@@ -51,6 +50,9 @@ export class LevelChoice {
     this.auto = !this.choices.includes(want);
     const first = this.auto ? this.choices : this.#nearest(want);
     await this.#firstOf(first);
+    const { level, view } = this.player;
+    this.density = texelsAUnit(level) / fineness(level.info);
+    view.detail = this.density * Math.max(...fitting.map(fineness));
     onFirst();
     if (!this.auto || this.player.closed) return;
     await this.#improve();

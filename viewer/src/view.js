@@ -10,6 +10,7 @@ const FILLED = 0.92; // of the free part of the canvas, by what there is
 const EASE = 0.07; // s in which most of a movement is done
 const DISTANCES = [0.2, 20];
 const FAINT = 0.9; // strength of the picture below which it is told why
+const LARGEST = 6; // pixels of the canvas that a texel takes when one has come as near as one can
 const SWAY = { degrees: 5, seconds: 9 };
 
 export class View {
@@ -26,6 +27,8 @@ export class View {
     this.framed = null; // arguments of `frame`
     this.range = bounded(null);
     this.filmed = null; // of the manifest
+    this.front = 0; // units from the middle of what there is to its front
+    this.detail = Infinity; // texels that a unit of the scene has at most
     this.free = false; // limits are off: the layers are pulled apart
     this.inset = 0; // part of the height that the controls take, from below
     this.size = [1, 1];
@@ -90,6 +93,7 @@ export class View {
    * asset's poster shows the same. @param {{low: number[], high: number[], centre: number[]}} box */
   setHome({ low, high, centre }) {
     this.shape = [high[1] - low[1], high[2] - low[2]];
+    this.front = high[0] - centre[0];
     const away = this.#distanceFor(...this.shape);
     const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
     this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
@@ -155,10 +159,16 @@ export class View {
   #aim(orbit) {
     const azimuth = clamp(unwound(orbit.azimuth, this.range.azimuth), this.range.azimuth);
     const elevation = clamp(orbit.elevation, this.range.elevation);
-    const distance = clamp(orbit.distance, DISTANCES);
+    const distance = clamp(orbit.distance, this.#distances());
     this.goal = { azimuth, elevation, distance, target: [...orbit.target] };
     if (Math.abs(azimuth - this.now.azimuth) > 180)
       this.now.azimuth = unwound(this.now.azimuth, [azimuth - 180, azimuth + 180]);
+  }
+
+  /** As near as there is detail to be seen, but twice as near as the first view at least. */
+  #distances() {
+    const detailed = this.front + this.#side() / (2 * HALF * LARGEST * this.detail);
+    return [Math.max(DISTANCES[0], Math.min(detailed, (this.home?.distance ?? Infinity) / 2)), DISTANCES[1]];
   }
 
   /** Somebody has moved the view: it stays as it is from now on. */
@@ -212,7 +222,7 @@ export class View {
   zoom(factor, x = 0, y = 0) {
     this.touched();
     const before = this.#unit();
-    this.goal.distance = clamp(this.goal.distance * factor, DISTANCES);
+    this.goal.distance = clamp(this.goal.distance * factor, this.#distances());
     const change = before - this.#unit();
     const { right, up } = axesOf(this.goal);
     this.goal.target = this.goal.target.map((v, i) => v + change * (x * right[i] - y * up[i]));
