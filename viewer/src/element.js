@@ -7,7 +7,7 @@ import { Recovery } from "./recovery.js";
 import { KINDS } from "./shaders.js";
 import { asPng, linkTo } from "./sharing.js";
 import { connectControls } from "./ui/controls.js";
-import { Overlays } from "./ui/overlays.js";
+import { Overlays, showOwnPoster } from "./ui/overlays.js";
 import { STYLE, TEMPLATE } from "./ui/template.js";
 import { isOrbit } from "./viewstate.js";
 import { watchSight, whenNear } from "./watch.js";
@@ -70,6 +70,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#stop();
     if (this.getAttribute("loading") !== "lazy") return this.#start();
     this.shadowRoot.innerHTML = TEMPLATE;
+    showOwnPoster(this);
     this.#paint(this.getAttribute("background") ?? BACKGROUND);
     this.#ends.push(whenNear(this, () => this.#start()));
   }
@@ -79,6 +80,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#stop();
     this.shadowRoot.innerHTML = TEMPLATE;
     this.overlays = new Overlays(this);
+    showOwnPoster(this);
     this.shadowRoot.querySelector('[data-do="again"]').addEventListener("click", () => this.#start());
     if (!this.#given && !this.hasAttribute("src"))
       return this.overlays.fail(
@@ -90,7 +92,8 @@ export class FacefoldsPlayer extends HTMLElement {
     try {
       this.#player = new Player(this.shadowRoot.querySelector("canvas"));
     } catch (error) {
-      return this.#failed(error);
+      this.#failed(error);
+      return this.overlays.standIn(this.#files());
     }
     const player = this.#player;
     this.#connect(player);
