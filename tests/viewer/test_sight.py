@@ -43,13 +43,47 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
 
 
 @pytest.mark.parametrize("behind", [(0, 0, 0), (255, 255, 255)], ids=["dark picture", "white picture"])
-def test_all_words_have_the_contrast_that_wcag_asks_for(player: Player, behind: tuple[int, int, int]) -> None:
-    """4.5 to 1, whatever the picture behind half-transparent panels is."""
+@pytest.mark.parametrize("ground", ["#16181d", "#ffffff"])
+def test_all_words_have_the_contrast_that_wcag_asks_for(
+    player: Player, behind: tuple[int, int, int], ground: str
+) -> None:
+    """4.5 to 1, whatever the picture behind half-transparent panels is, and in both sets of colours."""
+    player.run("e.background = v", ground)
     player.button("Settings")
     player.page.get_by_text("Keys").click()
     found: list[tuple[str, float]] = player.run(CONTRAST, list(behind))  # type: ignore[assignment]
     assert len(found) > 30
     assert [(words, round(ratio, 1)) for words, ratio in found if ratio < 4.5] == []
+
+
+@pytest.mark.parametrize(
+    ("page", "background", "light"),
+    [
+        ("#fff", "transparent", True),
+        ("#fff", "#203040", False),
+        ("#111", "transparent", False),
+        ("#111", "#ffe", True),
+        ("", "transparent", True),
+    ],
+)
+def test_the_controls_have_the_colours_of_what_is_behind(
+    new_player: NewPlayer, rich: Path, page: str, background: str, light: bool
+) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 384, "height": 300})
+    body = f'<facefolds-player src="asset/" background="{background}" style="height: 300px"></facefolds-player>'
+    style = f"<style>html {{ background: {page} }} facefolds-player {{ --facefolds-accent: rgb(1, 2, 3) }}</style>"
+    page_of_yours(player, style + body)
+    player.wait("e.ready")
+    words = "return getComputedStyle(e.shadowRoot.querySelector('.title')).color.match(/\\d+/g).map(Number)"
+    assert (max(player.run(words)) < 100) is light  # type: ignore[call-overload]
+    bar = player.page.locator(".bar").bounding_box()
+    assert bar and 300 - bar["y"] < 45  # of 300 pixels
+    track = "return getComputedStyle(e.shadowRoot.querySelector('[data-do=settings]')).accentColor"
+    assert player.run(track) == "rgb(1, 2, 3)"
+    player.run("document.documentElement.style.colorScheme = 'light dark'")
+    player.page.emulate_media(color_scheme="dark")
+    changed = False if not page else light  # where nothing is painted behind, the browser's own ground is dark now
+    player.wait(f"e.shadowRoot.querySelector('.stage').classList.contains('light') === {str(changed).lower()}")
 
 
 @pytest.mark.parametrize("how", ["settings", "property", "before it is there"])

@@ -1,5 +1,5 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
-import { isColour, painted } from "./colours.js";
+import { isColour, isLight, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
@@ -116,6 +116,9 @@ export class FacefoldsPlayer extends HTMLElement {
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isColour(asked) ? asked : BACKGROUND);
+    const repaint = () => this.#paint(this.background);
+    prefersDark.addEventListener("change", repaint);
+    this.#ends.push(() => prefersDark.removeEventListener("change", repaint));
     this.#ends.push(watchSight(this, (seen) => player.setOnScreen(seen)));
     this.overlays.connect(player);
     this.#ends.push(connectControls(this));
@@ -237,6 +240,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#settings.background = colour;
     if (!stage) return;
     this.paint = painted(colour, stage);
+    stage.classList.toggle("light", isLight(this.paint, this));
     this.#player?.set("background", this.paint);
   }
 
