@@ -64,6 +64,13 @@ export interface PlayerEvents {
   frame: CustomEvent<null>;
   play: CustomEvent<null>;
   pause: CustomEvent<null>;
+  /** The end, where it does not loop. */
+  ended: CustomEvent<null>;
+  /** All that was to be loaded is there. */
+  load: CustomEvent<null>;
+  /** Of the level that is being loaded: `totalProgress` from 0 to 1. */
+  progress: CustomEvent<{ totalProgress: number; level: string }>;
+  "camera-change": CustomEvent<null>;
   change: CustomEvent<null>;
   error: CustomEvent<PlayerError | Error>;
 }
@@ -85,6 +92,11 @@ export class FacefoldsPlayer extends HTMLElement {
   readonly shareable: boolean;
   loop: boolean;
   speed: number;
+  /** The sound is off until somebody asks for it. */
+  muted: boolean;
+  /** Seconds, at the sequence's own speed. */
+  readonly duration: number;
+  currentTime: number;
   /** A head that turns is held still. */
   still: boolean;
   /** Any colour of CSS. */
@@ -110,6 +122,8 @@ export class FacefoldsPlayer extends HTMLElement {
   capture(camera?: Camera): ImageData;
   /** A PNG. */
   screenshot(camera?: Camera): Promise<Blob>;
+  /** What is seen, by default as a PNG. */
+  toBlob(options?: { mimeType?: string; qualityArgument?: number }): Promise<Blob>;
   /**
    * A film of one turn from side to side, MP4 or WebM, with the asset's sound: 8 s and 40 degrees unless told otherwise. The
    * signal ends it early; `onPart` hears how much there is, 0 to 1.

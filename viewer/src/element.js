@@ -1,23 +1,25 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
+import { fieldOfView, orbitOf } from "./attributes.js";
 import { isColour, isLight, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
 import { Recovery } from "./recovery.js";
 import { KINDS } from "./shaders.js";
-import { asPng, linkTo } from "./sharing.js";
+import { asFile, linkTo } from "./sharing.js";
 import { connectControls } from "./ui/controls.js";
 import { Overlays, showOwnPoster } from "./ui/overlays.js";
-import { STYLE, TEMPLATE } from "./ui/template.js";
+import { PICTURE, STYLE, TEMPLATE } from "./ui/template.js";
 import { isOrbit } from "./viewstate.js";
 import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
-const FORWARDED = ["ready", "level", "frame", "play", "pause", "change", "error"];
+const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
+const OF_THE_VIEW = ["camera-orbit", "field-of-view", "auto-rotate", "disable-zoom"];
 
 export class FacefoldsPlayer extends HTMLElement {
-  static observedAttributes = ["src", "background", "loop", "speed", "level", "still"];
+  static observedAttributes = ["src", "background", "loop", "speed", "level", "still", "alt", "muted", ...OF_THE_VIEW];
 
   #player = null;
   #given = null; // files that came without an address
@@ -62,7 +64,31 @@ export class FacefoldsPlayer extends HTMLElement {
     if (name === "loop") this.loop = now !== "false";
     if (name === "still") this.still = now !== null;
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
+    if (name === "alt") this.#describe();
+    if (name === "muted") this.muted = now !== "false";
+    if (OF_THE_VIEW.includes(name)) this.#turn(name);
     if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
+  }
+
+  #describe() {
+    const canvas = this.shadowRoot.querySelector("canvas");
+    const alt = this.getAttribute("alt");
+    if (canvas) canvas.ariaLabel = alt ?? PICTURE;
+    if (canvas) canvas.ariaDescription = alt === null ? null : PICTURE;
+  }
+
+  /** What attributes say of the view. @param {string} [changed] one of them; all otherwise */
+  #turn(changed) {
+    const { view } = this.#player ?? {};
+    if (!view) return;
+    const concerns = (...names) => !changed || names.includes(changed);
+    view.zooms = !this.hasAttribute("disable-zoom");
+    if (concerns("auto-rotate")) view.setRotation(this.hasAttribute("auto-rotate"));
+    if (concerns("camera-orbit", "field-of-view"))
+      this.#player.setFirst(
+        orbitOf(this.getAttribute("camera-orbit")),
+        fieldOfView(this.getAttribute("field-of-view")),
+      );
   }
 
   /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen. */
@@ -71,6 +97,7 @@ export class FacefoldsPlayer extends HTMLElement {
     if (this.getAttribute("loading") !== "lazy") return this.#start();
     this.shadowRoot.innerHTML = TEMPLATE;
     showOwnPoster(this);
+    this.#describe();
     this.#paint(this.getAttribute("background") ?? BACKGROUND);
     this.#ends.push(whenNear(this, () => this.#start()));
   }
@@ -99,7 +126,9 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#connect(player);
     try {
       await player.load(this.#files(), this.#state.level ?? this.getAttribute("level") ?? "auto");
-      if (player === this.#player) this.overlays.loaded();
+      if (player !== this.#player) return;
+      this.overlays.loaded();
+      this.dispatchEvent(new CustomEvent("load"));
     } catch (error) {
       if (player === this.#player) this.#failed(error);
     }
@@ -113,6 +142,9 @@ export class FacefoldsPlayer extends HTMLElement {
   #connect(player) {
     player.playback.loop = this.getAttribute("loop") !== "false";
     player.still = this.hasAttribute("still");
+    player.mute(this.getAttribute("muted") !== "false");
+    this.#describe();
+    this.#turn();
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isColour(asked) ? asked : BACKGROUND);
@@ -209,6 +241,29 @@ export class FacefoldsPlayer extends HTMLElement {
 
   set still(on) {
     if (this.#player) this.#player.still = Boolean(on);
+  }
+
+  /** Whether the asset's sound is off; it is until somebody asks for it. */
+  get muted() {
+    return this.#player?.muted ?? this.getAttribute("muted") !== "false";
+  }
+
+  set muted(on) {
+    this.#player?.mute(Boolean(on));
+  }
+
+  /** Seconds of the sequence, at its own speed. */
+  get duration() {
+    return this.fps && this.frames / this.fps;
+  }
+
+  /** Seconds from the beginning to the frame shown; to set: shows the frame that is due then. */
+  get currentTime() {
+    return this.fps && Math.max(0, this.frame) / this.fps;
+  }
+
+  set currentTime(seconds) {
+    this.seek(Math.floor(seconds * this.fps + 1e-6));
   }
 
   get speed() {
@@ -360,7 +415,12 @@ export class FacefoldsPlayer extends HTMLElement {
 
   /** @param {object} [camera] as for `setCamera` @returns {Promise<Blob>} the same as a PNG */
   async screenshot(camera) {
-    return asPng(this.capture(camera));
+    return asFile(this.capture(camera));
+  }
+
+  /** What is seen, as a file. @param {{mimeType?: string, qualityArgument?: number}} [options] by default a PNG */
+  async toBlob({ mimeType: type, qualityArgument: quality } = {}) {
+    return asFile(this.capture(), { type, quality });
   }
 
   /**

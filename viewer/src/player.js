@@ -1,7 +1,8 @@
 /**
  * Plays an asset on a canvas: loads it (coarse level first), keeps time, draws. Knows nothing of buttons.
  *
- * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "change" (any setting), "error".
+ * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "ended", "change" (any setting),
+ * "camera-change", "error".
  */
 import { Adaptation } from "./adapt.js";
 import { startDecoder, weight } from "./draco/decoder.js";
@@ -41,6 +42,7 @@ export class Player extends EventTarget {
     this.files = null;
     this.level = null;
     this.sound = null;
+    this.muted = true; // until somebody asks for sound: browsers refuse it before a click
     this.shown = -1; // the frame in the texture
     this.stale = false; // the canvas needs drawing
     this.lost = false; // the graphics context
@@ -86,10 +88,22 @@ export class Player extends EventTarget {
     try {
       const address = this.manifest.levels[0].videos[0].segments && this.files.addressFor?.(entry);
       this.sound = address ? new Sound(address) : Sound.of(await this.files.bytes(entry), entry.mime);
-      this.say("change");
+      this.mute(this.muted);
     } catch (error) {
       this.fail(error);
     }
+  }
+
+  mute(on) {
+    this.muted = on;
+    if (this.sound) this.sound.muted = on;
+    this.say("change");
+  }
+
+  /** Where the first view is from. @param {object} orbit @param {number} field see `View.setFirst` */
+  setFirst(orbit, field) {
+    this.view.setFirst(orbit, field);
+    if (this.home) this.view.setHome(this.home);
   }
 
   /** The first view fits what there is. */
@@ -285,7 +299,7 @@ export class Player extends EventTarget {
   /** Asks for an animation frame, if anything moves and anybody sees it. */
   wake() {
     if (this.request || this.closed || this.lost || !this.level || !this.onScreen || this.immersed) return;
-    if (!this.playing && !this.stale) return;
+    if (!this.playing && !this.stale && !(this.view.rotates && this.view.swaying)) return;
     this.request = requestAnimationFrame((now) => this.#tick(now));
   }
 
@@ -344,7 +358,7 @@ export class Player extends EventTarget {
     source.want(playback.frame, seconds * playback.fps * playback.speed);
     this.#showIfThere(playback.frame);
     this.detail.measure(seconds, there);
-    if (ended) this.say("pause");
+    if (ended) this.#end();
   }
 
   /** A video element keeps its own time; the clock goes by it. */
@@ -357,8 +371,13 @@ export class Player extends EventTarget {
     this.#showIfThere(source.shown);
     if (ended && !playback.loop) {
       playback.playing = false;
-      this.say("pause");
+      this.#end();
     }
+  }
+
+  #end() {
+    this.say("pause");
+    this.say("ended");
   }
 
   #showIfThere(frame) {
@@ -383,6 +402,9 @@ export class Player extends EventTarget {
     this.stale = false;
     this.drawn.push(performance.now());
     this.say("draw");
+    if (view.every((v, i) => v === this.seen?.[i])) return;
+    this.seen = view;
+    this.say("camera-change");
   }
 
   /** The head where it stood in the frame shown, or at rest. */

@@ -35,8 +35,11 @@ export function embedCode(element) {
   };
 }
 
-/** A picture as a file. @param {ImageData} picture premultiplied, as `capture` gives it @returns {Promise<Blob>} PNG */
-export async function asPng({ data, width, height }) {
+/**
+ * A picture as a file. @param {ImageData} picture premultiplied, as `capture` gives it
+ * @param {{type?: string, quality?: number}} [options] of the browser's encoders @returns {Promise<Blob>} by default a PNG
+ */
+export async function asFile({ data, width, height }, { type = "image/png", quality } = {}) {
   const straight = new ImageData(width, height);
   for (let i = 0; i < data.length; i += 4) {
     const alpha = data[i + 3];
@@ -45,7 +48,7 @@ export async function asPng({ data, width, height }) {
   }
   const canvas = new OffscreenCanvas(width, height);
   canvas.getContext("2d").putImageData(straight, 0, 0);
-  return canvas.convertToBlob({ type: "image/png" });
+  return canvas.convertToBlob({ type, quality });
 }
 
 /** Offers a file for download. */

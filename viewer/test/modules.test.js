@@ -3,6 +3,7 @@ import { test } from "node:test";
 import { Matrix4, Vector3, Vector4 } from "three";
 import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/camera.js";
 import { eyeOf, transformed } from "../src/matrices.js";
+import { fieldOfView, orbitOf } from "../src/attributes.js";
 import { Adaptation } from "../src/adapt.js";
 import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
@@ -70,6 +71,13 @@ test("a view survives its way through the address", () => {
   const state = { frame: 7, view, level: "full", background: "#102030", hidden: [0, 3], spread: 0.25, speed: 0.5 };
   const flags = { wireframe: true, effects: false, loop: false, mode: "depth" };
   assert.deepEqual(decode(`#${encode({ ...state, ...flags })}`), { ...state, ...flags });
+});
+
+test("an orbit in the words of model-viewer", () => {
+  assert.deepEqual(orbitOf("30deg 80deg 120%"), { azimuth: 30, elevation: 10, share: 1.2 });
+  assert.deepEqual(orbitOf("-0.5rad auto 1.5m"), { azimuth: -0.5 * (180 / Math.PI), distance: 1.5 });
+  for (const nothing of [null, "", "auto auto auto", "30 80 1"]) assert.deepEqual(orbitOf(nothing), {});
+  assert.deepEqual(["20deg", "auto", null, "500deg", "0deg"].map(fieldOfView), [20, 30, 30, 90, 5]);
 });
 
 test("any colour survives its way through the address", () => {

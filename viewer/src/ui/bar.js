@@ -19,7 +19,7 @@ export function connectBar(element) {
     back: () => element.step(-1),
     next: () => element.step(1),
     loop: () => (element.loop = !element.loop),
-    sound: () => toggleSound(player),
+    sound: () => player.sound && (element.muted = !element.muted),
     compare: () => (element.comparison.index === null ? element.compare(0) : element.compare(null)),
     settings: () => {
       panel.hidden = !panel.hidden;
@@ -152,10 +152,4 @@ function dismiss(element) {
   const panel = element.shadowRoot.querySelector(".panel");
   if (!panel.hidden) element.actions.settings();
   else element.compare(null);
-}
-
-function toggleSound(player) {
-  if (!player.sound) return;
-  player.sound.muted = !player.sound.muted;
-  player.dispatchEvent(new Event("change"));
 }

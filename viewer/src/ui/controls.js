@@ -7,6 +7,7 @@ import { connectKeys } from "./keys.js";
 import { connectPanel } from "./panel.js";
 
 const AGAIN = 1000; // ms without what a word is about, before it is said a second time
+const PROMPT = 3000; // ms until it is said what one can do
 const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
 
 /** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
@@ -49,5 +50,15 @@ function connectGesturesOf(element) {
     });
   };
   tell("unwanted-wheel", "Ctrl + wheel zooms, or click first");
+  if (element.getAttribute("interaction-prompt") === "auto") prompt(element);
   tell("limit", "Cameras saw too little from further round");
+}
+
+/** Says what one can do, where nobody has done it yet. */
+function prompt({ player, overlays }) {
+  let done = false;
+  player.canvas.addEventListener("pointerdown", () => (done = true), { once: true });
+  player.addEventListener("ready", () =>
+    setTimeout(() => done || player.closed || overlays.say("Drag to turn"), PROMPT),
+  );
 }

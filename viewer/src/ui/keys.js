@@ -9,8 +9,9 @@ export function connectKeys(element) {
   const { player, shadowRoot: root } = element;
   const act = (name) => () => element.actions[name]();
   const flip = (name) => () => (element[name] = !element[name]);
-  const turn = (azimuth, elevation) => () => player.view.exact || player.view.move(azimuth, elevation);
-  const zoom = (factor) => () => player.view.exact || player.view.move(0, 0, factor);
+  const held = () => player.view.exact || element.getAttribute("camera-controls") === "none";
+  const turn = (azimuth, elevation) => () => held() || player.view.move(azimuth, elevation);
+  const zoom = (factor) => () => held() || !player.view.zooms || player.view.move(0, 0, factor);
   const faster = (by) => () => {
     const next = SPEEDS.findIndex((speed) => speed >= element.speed) + by;
     element.speed = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, next))];

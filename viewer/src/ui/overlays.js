@@ -51,6 +51,8 @@ export class Overlays {
     if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
     const [decoder, all] = player.level ? [0, 0] : [weight.loaded, weight.total]; // before the first picture it comes too
     const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.first + all));
+    const detail = { totalProgress: part, level: wanted.name };
+    this.element.dispatchEvent(new CustomEvent("progress", { detail }));
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
     this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded + decoder)}`;
