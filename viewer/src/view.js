@@ -154,15 +154,24 @@ export class View {
     const towards = along(back);
     const middle = (Math.min(...towards) + Math.max(...towards)) / 2;
     // A corner at r along the picture and b towards the eye is inside where |r - t| <= slope * (distance - b).
-    const fit = (axis, pixels) => {
+    const distanceOf = (axis, pixels) => {
       const slope = (this.half * FILLED * pixels) / this.#side();
       const end = (sign) => Math.max(...along(axis).map((r, i) => sign * r + slope * (towards[i] - middle)));
-      return { at: (end(1) - end(-1)) / 2, distance: (end(1) + end(-1)) / 2 / slope };
+      return (end(1) + end(-1)) / 2 / slope;
     };
     const [width, height] = this.#room();
-    const [across, tall] = [fit(right, width), fit(up, height)];
-    const target = back.map((v, i) => middle * v + across.at * right[i] + tall.at * up[i]);
-    this.glide({ ...direction, distance: Math.max(across.distance, tall.distance), target });
+    const distance = Math.max(distanceOf(right, width), distanceOf(up, height));
+    const centred = (axis) => {
+      let t = 0;
+      for (let k = 0; k < 8; ++k) {
+        const seen = along(axis).map((r, i) => (r - t) / (distance + middle - towards[i]));
+        t += ((Math.min(...seen) + Math.max(...seen)) / 2) * distance;
+      }
+      return t;
+    };
+    const [x, y] = [centred(right), centred(up)];
+    const target = back.map((v, i) => middle * v + x * right[i] + y * up[i]);
+    this.glide({ ...direction, distance, target });
     this.framed = [{ low, high }, direction];
   }
 
