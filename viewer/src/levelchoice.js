@@ -51,6 +51,7 @@ export class LevelChoice {
     const first = this.auto ? this.choices : this.#nearest(want);
     await this.#firstOf(first);
     const { level, view } = this.player;
+    if (!level) return; // closed meanwhile
     this.density = texelsAUnit(level) / fineness(level.info);
     view.detail = this.density * Math.max(...fitting.map(fineness));
     onFirst();
