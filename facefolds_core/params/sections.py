@@ -102,7 +102,7 @@ def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | No
     owner = f" of the model `{model}`" if model else ""
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
     stage = next((stage for stage, kinds in SECTIONS.items() if kind in kinds), "")
-    path = ".".join([stage, *names])
+    path = ".".join([stage, *names] if stage else names)
     if path not in RENAMED or kind is ExplicitParams:
         mending = remedy_for(path)
         if mending is not None:

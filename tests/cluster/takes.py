@@ -12,11 +12,11 @@ PARAMS: dict[str, Any] = {
     "subjects": {"take": {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}},
     "capture": {"cameras": 8, "frames": 6, "height": 48, "width": 32, "mattes": True},
     "normalize": {},
+    "subject": {"iterations": 100},
     "train": {
         "preset": "fast",
         "layers": 3,
         "iterations": 60,
-        "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
         "textures": {"steps_per_frame": 8},
         "segments": {"joint_frames": 0, "key_frames": 2, "frames": 2, "steps": 1000, "checkpoint_seconds": 0.2},
     },

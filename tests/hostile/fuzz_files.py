@@ -142,7 +142,7 @@ KINDS = (
     Kind(("meshes/meshes.npz",), _meshes),
     Kind(("model/model.safetensors", "model/model.json"), _quiet(lambda folder: load_model(folder / "model"))),
     Kind(("config/train.json",), _quiet(lambda folder: read_train(folder / "config"))),
-    Kind(("config/subject.json",), _quiet(lambda folder: read_subject(folder / "config"))),
+    Kind(("config/entry.json",), _quiet(lambda folder: read_subject(folder / "config"))),
     Kind(
         ("evaluation/per_image.parquet",), _quiet(lambda folder: read_images(folder / "evaluation/per_image.parquet"))
     ),

@@ -25,7 +25,7 @@ from tests.pipeline.tiny import TinyProject
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "kept"
 STAGES = (
-    *("configure", "capture", "normalize", "matte", "train", "sample", "reconstruct"),
+    *("configure", "capture", "normalize", "subject", "train", "sample", "reconstruct"),
     *("decimate", "texture", "bake", "compress", "evaluate"),
 )
 SHORT = 5

@@ -58,7 +58,6 @@ TRAIN = {
     "iterations": 190,
     "layers": 6,
     "geometry": {"nodes": 48, "round_iterations": 20},
-    "volume": {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]},
 }
 EXPORT = pipeline.ExportParams(
     sample=SampleParams(resolution=96), decimate=DecimateParams(resolution=24), texture=TextureParams(resolution=96)
