@@ -99,7 +99,7 @@ def test_keys_of_the_perceptrons_are_refused_by_the_explicit_model(key: str) -> 
     assert "`mlp`" in str(caught.value.remedy)
 
 
-@pytest.mark.parametrize("key", ["mesh", "geometry", "lr_texture"])
+@pytest.mark.parametrize("key", ["mesh", "geometry", "textures"])
 def test_keys_of_the_explicit_model_are_refused_by_the_perceptrons(key: str) -> None:
     with pytest.raises(UserError) as caught:
         train_params({"preset": "paper", key: {}})

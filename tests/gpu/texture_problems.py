@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from facefolds_core.adam import decays
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import adam_kernel, kernels_gpu, shading_kernel, smoothing
 from tests.gpu.problem import Problem
 
