@@ -14,11 +14,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.found_scene import GAUSSIANS
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, Split, write_scene
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_directions
+from facefolds_core.subject.cameras import CameraFit
+from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, TURN, Splats
+from facefolds_core.subject.storage import FoundSubject, write_found
 
 Array = NDArray[np.float64]
 CENTRE = np.array(SPHERE_CENTRE)
@@ -96,6 +100,26 @@ def _sphere_mesh(radius: float, resolution: int = 24) -> tuple[Array, NDArray[np
     return CENTRE + radius * uv_to_directions(uv), np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])
 
 
+def gaussians(layers: tuple[SphereLayer, ...], count: int = 3000) -> Splats:
+    """Flat Gaussians, evenly spread over the front halves of the spheres."""
+    rows = []
+    for layer in layers:
+        x = (np.arange(count) + 0.5) / count
+        turn = math.pi * (3 - math.sqrt(5)) * np.arange(count)
+        around = np.sqrt(1 - x**2)
+        normals = np.stack([x, around * np.cos(turn), around * np.sin(turn)], -1)
+        values = np.zeros((count, COLUMNS), np.float32)
+        values[:, MEAN] = CENTRE + layer.radius * normals
+        apart = layer.radius * math.sqrt(2 * math.pi / count)
+        values[:, SCALE] = np.log([0.1 * apart, 0.7 * apart, 0.7 * apart])
+        # The shortest axis, x, turned to the normal.
+        values[:, TURN] = np.stack([1 + x, np.zeros(count), -normals[:, 2], normals[:, 1]], -1)
+        values[:, OPACITY] = math.log(0.9 / 0.1) if layer.alpha == 1 else math.log(layer.alpha / (2 - layer.alpha))
+        values[:, COLOUR] = layer.colour(directions_to_uv(normals), 0)
+        rows.append(values)
+    return Splats(np.concatenate(rows), np.zeros(3, np.float32))
+
+
 def make_scene(
     folder: Path,
     layers: tuple[SphereLayer, ...] = OPAQUE,
@@ -108,7 +132,7 @@ def make_scene(
     """Write a scene of spheres as `normalize` would, with one held-out camera (the middle one) and its masks.
 
     Args:
-        mattes: whether the true opacity of all training pictures is there, too.
+        mattes: whether the true opacity of all training pictures is there, too, and the subject as Gaussians.
         surface_radius: writes a tracked mesh of this radius; None leaves it out.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -140,6 +164,8 @@ def make_scene(
     write_frames(folder / "masks.arrow", (size, size, 1), opacities("holdout"))
     if mattes:
         write_frames(folder / "mattes.arrow", (size, size, 1), opacities("train"))
+        cameras_alike = CameraFit.alike(len(scene.indices("train")))
+        write_found(folder / GAUSSIANS, FoundSubject(gaussians(layers), 40.0, cameras_alike))
     if surface_radius is not None:
         vertices, faces = _sphere_mesh(surface_radius)
         stacked = np.repeat(vertices[None], frames, 0).astype(np.float32)

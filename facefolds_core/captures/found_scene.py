@@ -8,13 +8,13 @@ from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reading import is_there
 
-START, MATTES = "gaussians.npz", "mattes.arrow"
+GAUSSIANS, MATTES = "gaussians.npz", "mattes.arrow"
 """In `data/SUBJECT/subject`."""
 
 
 def found_scene(folders: SubjectFolders) -> Scene:
     """With what was found; where `subject` has not run, the scene alone."""
-    scene, start, mattes = read_scene(folders.scene), folders.subject / START, folders.subject / MATTES
-    if is_there(start):
-        scene = replace(scene, start=start)
+    scene, gaussians, mattes = read_scene(folders.scene), folders.subject / GAUSSIANS, folders.subject / MATTES
+    if is_there(gaussians):
+        scene = replace(scene, gaussians=gaussians)
     return replace(scene, mattes=mattes) if is_there(mattes) else scene

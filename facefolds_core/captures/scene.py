@@ -67,7 +67,7 @@ class Scene:
         poses: the head's own frame -> world in each of the K frames; None where the head is taken to stand still.
         radius: of the ball about the origin that holds the subject, units; None where it is to be found.
         mattes: file of mattes in place of the scene's own, none at all if it is not there; None: the scene's own.
-        start: file of the subject's Gaussians; None until it has been found.
+        gaussians: file of the subject's Gaussians in place of the scene's own; None: the scene's own.
     """
 
     subject: str
@@ -82,7 +82,7 @@ class Scene:
     poses: Track | None = None
     radius: float | None = None
     mattes: Path | None = None
-    start: Path | None = None
+    gaussians: Path | None = None
 
     @property
     def width(self) -> int:
@@ -148,6 +148,11 @@ class Scene:
         """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""
         path = self.folder / "mattes.arrow" if self.mattes is None else self.mattes
         return FrameStore(path) if is_there(path) else None
+
+    def found_gaussians(self) -> Path | None:
+        """File of the subject's Gaussians (subject/storage.py); None until it has been found."""
+        path = self.folder / "gaussians.npz" if self.gaussians is None else self.gaussians
+        return path if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
         """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many.

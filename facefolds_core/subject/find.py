@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.cutout import foreground
-from facefolds_core.captures.found_scene import MATTES, START
+from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_folder
@@ -160,17 +160,17 @@ def found_in(scene: Scene, params: SubjectParams, folder: Path) -> Scene:
     Args:
         folder: there while the scene is used.
     """
-    if scene.start is not None and all_mattes(scene):
+    if scene.found_gaussians() is not None and all_mattes(scene):
         return scene
     found, mattes = find_subject(scene, params)
     with atomic_folder(folder) as temporary:
-        write_found(temporary / START, found)
+        write_found(temporary / GAUSSIANS, found)
         if not all_mattes(scene):
             keys = sorted(key for key in scene.open_frames() if scene.splits[key[0]] == "train")
             rows = ((*key, mattes.of(key).opacity[..., None]) for key in keys)
             write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
     made = folder / MATTES
-    return replace(scene, start=folder / START, mattes=made if made.exists() else scene.mattes)
+    return replace(scene, gaussians=folder / GAUSSIANS, mattes=made if made.exists() else scene.mattes)
 
 
 def all_mattes(scene: Scene) -> bool:
@@ -181,8 +181,9 @@ def all_mattes(scene: Scene) -> bool:
 
 def subject_in(scene: Scene) -> FoundSubject:
     """Of a scene whose subject was found."""
-    assert scene.start is not None
-    return read_found(scene.start, len(scene.indices("train")))
+    path = scene.found_gaussians()
+    assert path is not None
+    return read_found(path, len(scene.indices("train")))
 
 
 def _check(body: Body, scene: Scene) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from PIL import Image as Pillow
 
-from facefolds_core.captures.found_scene import MATTES, START
+from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.given_mattes import given_mattes
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files import atomic_folder, write_json
@@ -60,7 +60,7 @@ def make_folder(
     by_hand = {} if named is None else {(c, k): image for c, k, image in given_mattes(named, scene)}
     found, mattes = find_subject(scene, params, by_hand, start)
     with atomic_folder(folder) as temporary:
-        write_found(temporary / START, found)
+        write_found(temporary / GAUSSIANS, found)
         told, tiles = list[Told](), dict[Key, Image]()
         rows = _rows(scene, mattes, temporary, told, tiles)
         write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)

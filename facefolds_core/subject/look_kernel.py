@@ -16,11 +16,6 @@ CLEAR, OPAQUE = 1e-4, 1e-3
 
 
 @inlined
-def softplus(x):  # type: ignore[no-untyped-def]
-    return x if x > 15.0 else math.log1p(math.exp(x))
-
-
-@inlined
 def span(o, d, lower, voxel, grid):  # type: ignore[no-untyped-def]
     """Distances at which a ray enters and leaves the box of voxel centres; empty if the second is smaller."""
     near, far = 0.0, 1e30
@@ -68,7 +63,7 @@ def render_ray(
         y = (o[1] + s * d[1] - lower[1]) / voxel
         z = (o[2] + s * d[2] - lower[2]) / voxel
         v0, v1, v2, v3 = sample(grid, x, y, z)
-        a = np.float32(1 - math.exp(-softplus(v0) * step / voxel))
+        a = np.float32(1 - math.exp(-v0 * step / voxel))
         red += t * a * v1
         green += t * a * v2
         blue += t * a * v3
@@ -103,7 +98,7 @@ def profile(grid, lower, voxel, origins, directions, farthest, step, shares):  #
             inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
             if inside and t >= OPAQUE:
                 v0, v1, v2, v3 = sample(grid, x, y, z)
-                a = np.float32(1 - math.exp(-softplus(v0) * step / voxel))
+                a = np.float32(1 - math.exp(-v0 * step / voxel))
                 rgb[r, 0] += t * a * v1
                 rgb[r, 1] += t * a * v2
                 rgb[r, 2] += t * a * v3

@@ -49,7 +49,7 @@ def value(grid, i, j, k, w, q):  # type: ignore[no-untyped-def]
 
 @inlined
 def sample(grid, x, y, z):  # type: ignore[no-untyped-def]
-    """Raw density and rgb at voxel coordinates (x, y, z)."""
+    """Optical depth and rgb at voxel coordinates (x, y, z)."""
     i, j, k, fx, fy, fz = cell(grid, x, y, z)
     w = weights(fx, fy, fz)
     return (

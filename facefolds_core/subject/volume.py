@@ -13,8 +13,6 @@ from facefolds_core.subject.voxels_kernel import deposit
 
 Array = NDArray[np.float32]
 
-LIMIT = 12.0
-"""Raw density of what is clear, negative: its optical depth is exp(-LIMIT)."""
 STEP = 0.7
 """Between samples on a ray, voxels."""
 CELLS = 160
@@ -36,7 +34,7 @@ class Volume:
     """Density and colour on a grid.
 
     Attributes:
-        grid: (X, Y, Z, 4) raw density and rgb; the optical depth of a voxel is softplus(raw).
+        grid: (X, Y, Z, 4) optical depth of a voxel and rgb, linear between voxels.
         lower: (3,) position of voxel (0, 0, 0), units.
         voxel: its side, units.
     """
@@ -75,8 +73,5 @@ def volume_of(splats: Splats, cells: int = CELLS) -> Volume:
     turns, colours = splats.values[:, TURN].astype(np.float64), np.clip(splats.colours, 0, 1).astype(np.float64)
     deposit(splats.means.astype(np.float64), sizes, turns, mass, colours, low, voxel, BLUR * voxel, REACH, grid)
     grid[..., 1:] /= np.maximum(grid[..., :1], np.float32(1e-12))
-    depth = voxel * grid[..., 0].astype(np.float64)
-    # The inverse of softplus, which is the identity for all that is opaque.
-    thin = np.log(np.expm1(np.clip(depth, np.log1p(np.exp(-LIMIT)), 30)))
-    grid[..., 0] = np.where(depth > 30, depth, thin)
+    grid[..., 0] *= np.float32(voxel)
     return Volume(grid, low, voxel)

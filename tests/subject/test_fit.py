@@ -13,11 +13,12 @@ from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import rotation
 from facefolds_core.subject.drawing import render
-from facefolds_core.subject.fit import fit_pictures, fit_start, pictures_of
+from facefolds_core.subject.find import fit_room, pictures_of
+from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
 from facefolds_core.subject.found import background, subject_of
-from facefolds_core.subject.mattes import find_mattes
-from facefolds_core.subject.params import StartParams
+from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.mattes import Body, Mattes, body_among
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.sweep import depth_maps
@@ -25,7 +26,7 @@ from tests.scenes import OPAQUE, first_hit, look_at_origin
 from tests.scenes import render as true_picture
 
 SIZE, CAMERAS, HELD = 48, 8, 3
-PARAMS = StartParams(fewest=1200, most=1200, iterations=800, every=50)
+PARAMS = GaussianParams(fewest=1200, most=1200, iterations=800, every=50)
 
 
 def wall(camera):  # type: ignore[no-untyped-def]
@@ -60,7 +61,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def splats(scene: Scene) -> Splats:
-    return fit_start(scene, 0, PARAMS)
+    return fit_room(scene, 0, PARAMS)
 
 
 def psnr(picture: np.ndarray, truth: np.ndarray) -> float:
@@ -91,7 +92,7 @@ def test_a_view_that_was_left_out(scene: Scene, splats: Splats) -> None:
 
 
 def test_the_same_again(scene: Scene) -> None:
-    few = StartParams(fewest=200, most=200, iterations=12, every=4)
+    few = GaussianParams(fewest=200, most=200, iterations=12, every=4)
     cameras, pictures = pictures_of(scene, 0, scene.indices("train"))
     one, two = (fit_pictures(cameras, pictures, few, seed=3) for _ in range(2))
     np.testing.assert_array_equal(one.values, two.values)
@@ -100,14 +101,47 @@ def test_the_same_again(scene: Scene) -> None:
 def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> None:
     subject = subject_of(splats, scene)
     assert 0.1 < subject.mean() < 0.95
+    body = body_among(scene, splats, 0)
+    assert (body.subject <= (np.linalg.norm(splats.means, axis=1) < 0.45)).all()
     masks = scene.open_masks()
     assert masks is not None
     true = masks.image(HELD, 0)[..., 0] > 127
-    matte = find_mattes(scene, splats, 0, [HELD])[HELD] > 127
+    found = Mattes(scene, body=body).of((HELD, 0))
+    matte = found.opacity > 127
+    assert found.source == "picture" and found.agreement is not None and found.agreement > 0.7
     assert (matte & true).sum() / (matte | true).sum() > 0.9
     behind = background(splats, subject, scene.cameras[HELD])
     beside = ~true
     assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
+
+
+def test_a_picture_that_contradicts_the_others_is_not_believed(scene: Scene, splats: Splats) -> None:
+    """What the Gaussians show takes its place."""
+    nobody = Body(splats, np.zeros(len(splats), bool), 0)
+    nobody.subject[np.linalg.norm(splats.means - np.array([-0.2, 0.3, 0.3]), axis=1) < 0.12] = True
+    found = Mattes(scene, body=nobody).of((HELD, 0))
+    assert found.agreement is not None
+    assert (found.source == "gaussians") == (found.agreement < 0.65)
+
+
+def cut_outs(scene: Scene) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Of all cameras, colours times opacity and opacity."""
+    pairs = [true_picture(camera, OPAQUE, 0) for camera in scene.cameras]
+    return [rgb.astype(np.float32) for rgb, _ in pairs], [alpha.astype(np.float32) for _, alpha in pairs]
+
+
+def test_of_a_subject_that_is_cut_out_nothing_else_is_explained(scene: Scene) -> None:
+    colours, opacities = cut_outs(scene)
+    kept = [i for i in range(CAMERAS) if i != HELD]
+    found = fit_pictures(
+        [scene.cameras[i] for i in kept], [colours[i] for i in kept], PARAMS, 0, [opacities[i] for i in kept]
+    )
+    assert not found.background.any()
+    rgb, alpha, _ = render(found, scene.cameras[HELD])
+    assert np.abs(alpha - opacities[HELD]).mean() < 0.05
+    assert psnr(rgb, 255 * colours[HELD]) > 20
+    few = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities, begun=found)  # trained on, and no more of them
+    assert len(few) <= len(found) and psnr(render(few, scene.cameras[HELD])[0], 255 * colours[HELD]) > 21
 
 
 def test_a_file_of_another_program(scene: Scene, splats: Splats, tmp_path: Path) -> None:

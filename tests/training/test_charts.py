@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
+from facefolds_core.subject import outline
+from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.fit import fit_window
-from facefolds_core.training.volume import kernel, outline
-from facefolds_core.training.volume.cameras import CameraFit
-from facefolds_core.training.volume.fit import Volume
-from facefolds_core.training.volume.room import Room
 
 PARAMS = ExplicitParams()
 START = PARAMS.start.model_copy(update={"centres": (-0.15, -0.2, -0.25), "belts": (10.0,)})
@@ -30,10 +28,8 @@ Array = NDArray[np.float64]
 def volume_of(inside: Array) -> Volume:
     """From depths below the surface, units, on a grid over +-0.45."""
     grid = np.zeros((*inside.shape, 4), np.float32)
-    grid[..., 0] = (inside / VOXEL * 10).clip(-kernel.LIMIT, kernel.LIMIT)
-    room = Room(np.zeros(3, np.float32), 1.0, 0.45, PARAMS.room, PARAMS.environment)
-    cameras = CameraFit.alike(1, PARAMS.cameras)
-    return Volume(grid, np.full(3, -0.45), VOXEL, PARAMS.volume.step, room, 0, 30.0, cameras)
+    grid[..., 0] = np.logaddexp(0, (inside / VOXEL * 10).clip(-12, 12))
+    return Volume(grid, np.full(3, -0.45), VOXEL)
 
 
 def nodes() -> tuple[Array, Array]:

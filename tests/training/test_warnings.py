@@ -9,7 +9,6 @@ import numpy as np
 
 from facefolds_core.facts import fact
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.warnings import warnings_of
 from tests.scenes import make_scene
@@ -28,16 +27,16 @@ WELL = Fit(
     reasons=(),
     notes=(),
     losses={BACK: 0.02, FARTHER: 0.3},
-    volume_psnr=30.0,
+    start_psnr=30.0,
 )
 
 
 def test_what_is_not_well_is_said_with_a_remedy(tmp_path: Path) -> None:
-    scene, params = make_scene(tmp_path, size=16), ExplicitParams().warnings
-    assert warnings_of(scene, WELL, params) == ()
-    (low,) = warnings_of(scene, replace(WELL, volume_psnr=20.1), params)
-    assert low.kind == "volume_explains_little" and "20.1 dB" in str(low) and "plates" in str(low)
-    (lost,) = warnings_of(scene, replace(WELL, chart=FARTHER), params)
+    scene = make_scene(tmp_path, size=16)
+    assert warnings_of(scene, WELL) == ()
+    (low,) = warnings_of(scene, replace(WELL, start_psnr=20.1))
+    assert low.kind == "start_explains_little" and "20.1 dB" in str(low) and "sheet.png" in str(low)
+    (lost,) = warnings_of(scene, replace(WELL, chart=FARTHER))
     assert "30%" in str(lost) and "train.start.centres" in str(lost)
     guessed = replace(scene, left_out=(fact("front_guessed"),))
-    assert "`front`" in str(warnings_of(guessed, WELL, params)[0])
+    assert "`front`" in str(warnings_of(guessed, WELL)[0])

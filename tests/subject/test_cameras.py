@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.params import CameraParams
+from facefolds_core.subject.cameras import CameraFit, CameraParams, camera_errors, camera_gains
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.views import Images
-from facefolds_core.training.volume.cameras import CameraFit, camera_errors, camera_gains
 from tests.scenes import OPAQUE, make_scene
 
 COUNT, EACH = 6, 400
@@ -60,7 +59,7 @@ def test_a_camera_that_sees_nothing_is_believed() -> None:
 def test_small_differences_are_left_alone() -> None:
     shown, alpha, camera = rays()
     gains = 1 + PARAMS.min_gain_spread * 0.5 * np.repeat([[1.0], [-1.0]], 3, 0).repeat(3, 1)
-    fit = CameraFit.alike(COUNT, PARAMS).refined(shown, alpha, shown * gains.astype(np.float32)[camera], camera)
+    fit = CameraFit.alike(COUNT).refined(shown, alpha, shown * gains.astype(np.float32)[camera], camera)
     assert np.array_equal(fit.gains, np.ones((COUNT, 3))) and fit.measured == pytest.approx(gains, rel=1e-2)
 
 
@@ -77,7 +76,7 @@ def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
     errors = np.full(COUNT, 0.05)
     errors[3] = 0.05 * PARAMS.max_error_ratio * 1.1
-    choice = choose_cameras(scene, replace(CameraFit.alike(COUNT, PARAMS), errors=errors))
+    choice = choose_cameras(scene, replace(CameraFit.alike(COUNT), errors=errors))
     # Training cameras are 0, 1, 2, 4, 5, 6.
     assert choice.scene.indices("train") == [0, 1, 2, 5, 6] and choice.scene.indices("holdout") == [3]
     assert [(n.kind, n.camera) for n in choice.notes] == [("camera_contradicts", "cam4")] and choice.gains.shape == (
@@ -90,7 +89,7 @@ def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:
 
 def test_cameras_alike_change_nothing(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
-    choice = choose_cameras(scene, CameraFit.alike(COUNT, PARAMS))
+    choice = choose_cameras(scene, CameraFit.alike(COUNT))
     assert choice.scene.splits == scene.splits and choice.notes == ()
     assert Images(scene, choice.gains).tables is None
 

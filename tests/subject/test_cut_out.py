@@ -1,0 +1,141 @@
+"""Mattes of single pictures: cut out, and beside plates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from facefolds_core.subject.cut_out import EdgeParams, agreement, cut_out
+from facefolds_core.subject.known_background import PlateParams
+from facefolds_core.subject.plates import from_plate
+from tests.scenes import look_at_origin
+
+
+def cut(image: np.ndarray, rough: np.ndarray) -> np.ndarray:
+    """A silhouette, bool."""
+    return cut_out(image, rough, look_at_origin("c", 0, 0, len(image)), EdgeParams())
+
+
+def test_a_cut_out_has_the_pictures_outline_not_the_volumes() -> None:
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:64, :64]
+    disc = np.hypot(x - 32, y - 32) < 18
+    image = np.where(disc[..., None], (200, 150, 120), (40, 60, 90)) + rng.integers(-8, 9, (64, 64, 3))
+    rough = np.clip(1.2 - np.hypot(x - 34, y - 32) / 24, 0, 1).astype(np.float32)  # blurred, off, of another size
+    found = cut(image.astype(np.uint8), rough)
+    assert (found & disc).sum() / (found | disc).sum() > 0.98
+    coarse = rough > 0.5
+    assert (coarse & disc).sum() / (coarse | disc).sum() < 0.85
+
+
+@pytest.mark.parametrize("size", [96, 384])
+def test_of_a_lamp_of_the_subjects_colour_only_what_is_near_the_volume_is_cut_out(size: int) -> None:
+    rng, (y, x) = np.random.default_rng(1), np.mgrid[:size, :size] / size * 96
+    away = np.hypot(x - 48, y - 48)
+    shown = (away < 30) | ((abs(y - 48) < 4) & (x > 48))
+    image = np.where(shown[..., None], (110, 75, 55), (60, 90, 140)) + rng.integers(-8, 9, (size, size, 1))
+    volume = np.clip(0.5 + (30 - away) / 4, 0, 1).astype(np.float32)
+    found = cut(image.astype(np.uint8), volume)
+    assert found[away < 28].all() and not found[away > 33].any()
+
+
+def test_a_picture_that_is_all_subject_or_all_room_is_left_alone() -> None:
+    image = np.zeros((16, 16, 3), np.uint8)
+    assert cut(image, np.ones((16, 16), np.float32)).all()
+    assert not cut(image, np.zeros((16, 16), np.float32)).any()
+
+
+def _before_a_plate(opacity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A skin-coloured thing before a noisy, tiled room: picture and plate."""
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[: opacity.shape[0], : opacity.shape[1]]
+    room = np.where((x // 7 + y // 5)[..., None] % 2, (90, 140, 60), (40, 60, 120))
+    image = opacity[..., None] * np.array((200, 150, 120)) + (1 - opacity[..., None]) * room
+    noisy = [one + rng.integers(-3, 4, one.shape) for one in (image, room)]
+    return noisy[0].astype(np.uint8), noisy[1].astype(np.uint8)
+
+
+def test_beside_a_plate_opacity_is_found_along_the_outline() -> None:
+    y, x = np.mgrid[:64, :64]
+    opacity = np.clip((20 - np.hypot(x - 32, y - 32)) / 4 + 0.5, 0, 1)
+    found = from_plate(*_before_a_plate(opacity), PlateParams())
+    assert np.abs(found - opacity).max() < 0.15  # seen: 0.07
+
+
+@pytest.mark.parametrize("given", [{"outline": 0}, {"deviation": 0.0, "noise": 0.0}, {"beyond": 0}])
+def test_beside_a_plate_no_limit_is_too_low(given: dict[str, Any]) -> None:
+    """A black square before a grey room that has a black thing beside it."""
+    plate = np.full((40, 40, 3), 100, np.uint8)
+    plate[12:16, 31:] = 0
+    image = plate.copy()
+    image[10:30, 10:30] = 0
+    opacity = np.rint(255 * from_plate(image, plate, PlateParams(**given))) / 255
+    assert opacity[10:30, 10:30].min() == 1 and opacity[:, 31:].max() == 0
+
+
+def _before_a_post(hair: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Dark, streaked hair, fringed with single strands, before a bright wall with a post of the hair's colour."""
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:96, :96]
+    depth = 30 - np.hypot(x - 48, y - 48)
+    opacity = np.where(depth > 0, 1.0, (depth > -6) * (rng.random(depth.shape) < 0.3))
+    plate = np.where((abs(x - 20) < 5)[..., None], (45, 40, 38), (220, 210, 190)) + rng.integers(-2, 3, (96, 96, 3))
+    colour = hair + rng.integers(-20, 21, (96, 96, 1))
+    image = opacity[..., None] * colour + (1 - opacity[..., None]) * plate + rng.integers(-2, 3, (96, 96, 3))
+    return image.clip(0, 255).astype(np.uint8), plate.clip(0, 255).astype(np.uint8), opacity
+
+
+def test_loose_hair_before_a_plate_is_strands_even_before_a_post_of_its_colour() -> None:
+    image, plate, opacity = _before_a_post(np.array((60, 48, 40)))
+    found, true = from_plate(image, plate, PlateParams()) > 0.5, opacity > 0.5
+    assert (found & true).sum() / (found | true).sum() > 0.97
+
+
+def test_opacity_before_a_plate_is_on_average_right() -> None:
+    image, plate, opacity = _before_a_post(np.array((60, 48, 40)))
+    loose = (opacity < 1) & (np.hypot(*(np.mgrid[:96, :96] - 48)) < 36)
+    assert abs(from_plate(image, plate, PlateParams())[loose].mean() - opacity[loose].mean()) < 0.1
+
+
+def test_a_thin_subject_before_a_plate_is_opaque_inside() -> None:
+    opacity = np.zeros((64, 64))
+    opacity[10:54, 30:35] = 1
+    found = from_plate(*_before_a_plate(opacity), PlateParams())
+    assert found[14:50, 31:34].min() > 0.9 and found[:, :26].max() < 0.1
+
+
+def test_a_hand_of_another_colour_beside_a_body_is_opaque() -> None:
+    """Its inside is its own: judged by the body's colours alone it would be half transparent."""
+    image, plate = np.full((96, 96, 3), 235.0), np.full((96, 96, 3), 235.0)
+    image[10:90, 8:60] = (50, 40, 35)
+    image[30:80, 74:88] = (200, 150, 120)
+    rng = np.random.default_rng(0)
+    noisy = [(one + rng.normal(0, 2, one.shape)).clip(0, 255).astype(np.uint8) for one in (image, plate)]
+    assert from_plate(noisy[0], noisy[1], PlateParams())[34:76, 76:86].min() > 0.9
+
+
+def test_what_the_picture_cuts_off_is_opaque_up_to_its_border() -> None:
+    image, plate = _before_a_plate(np.ones((64, 64)))
+    image[:, :20], image[:, 44:], image[:20] = plate[:, :20], plate[:, 44:], plate[:20]
+    image[40::4], image[41::4] = (230, 230, 230), (30, 30, 60)
+    image[40:, :20], image[40:, 44:] = plate[40:, :20], plate[40:, 44:]
+    assert from_plate(image, plate, PlateParams())[48:, 26:38].min() > 0.95
+
+
+def test_shadows_and_holes_beside_a_plate_are_none() -> None:
+    """A hole where the subject has the room's colour; a small thing that moved in the room."""
+    y, x = np.mgrid[:64, :64]
+    disc = np.hypot(x - 32, y - 32) < 20
+    image, plate = _before_a_plate((disc & (np.hypot(x - 32, y - 32) > 4) | (np.hypot(x - 5, y - 5) < 3)).astype(float))
+    found = from_plate(image, plate, PlateParams()) > 0.5
+    assert (found & disc).sum() / (found | disc).sum() > 0.97
+
+
+def test_a_picture_of_the_empty_room_has_no_subject() -> None:
+    assert not from_plate(*_before_a_plate(np.zeros((32, 32))), PlateParams()).any()
+
+
+def test_agreement_is_the_share_that_both_have_of_what_either_has() -> None:
+    one, other = np.zeros((4, 4), bool), np.zeros((4, 4), bool)
+    assert agreement(one, other) == 1
+    one[:2], other[1:3] = True, True
+    assert agreement(one, other) == pytest.approx(1 / 3)

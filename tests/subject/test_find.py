@@ -1,0 +1,156 @@
+"""The stage `subject`: whose mattes are found where, what is written, what is refused."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from facefolds_core.captures.found_scene import found_scene
+from facefolds_core.captures.scene import Scene
+from facefolds_core.errors import UserError
+from facefolds_core.frame_store import write_frames
+from facefolds_core.geometry.track import Track
+from facefolds_core.params import SubjectParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
+from facefolds_core.subject.folder import make_folder
+from facefolds_core.subject.mattes import Matte, Mattes
+from facefolds_core.subject.sheet import RED, tile
+from facefolds_core.subject.storage import read_found, write_found
+from tests.scenes import OPAQUE, make_scene, render
+
+SIZE = 24
+PARAMS = SubjectParams(iterations=60, fewest=300, most=300)
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> SubjectFolders:
+    return SubjectFolders(tmp_path / "me")
+
+
+def black_plates(scene: Scene) -> None:
+    """Of all cameras, as the room is black."""
+    black = np.zeros((scene.height, scene.width, 3), np.uint8)
+    write_frames(scene.folder / "plates.arrow", black.shape, [(c, 0, black) for c in range(len(scene.cameras))])
+
+
+@pytest.fixture
+def scene(folders: SubjectFolders) -> Scene:
+    """With plates, and a matte of 50 of the first camera's first frame."""
+    made = make_scene(folders.scene, size=SIZE)
+    black_plates(made)
+    write_frames(made.folder / "mattes.arrow", (SIZE, SIZE, 1), [(0, 0, np.full((SIZE, SIZE, 1), 50, np.uint8))])
+    return made
+
+
+def put(folder: Path, scene: Scene, camera: int, frame: int | None, value: int, shape: tuple[int, int]) -> Path:
+    """A matte of the user's."""
+    name = scene.cameras[camera].name
+    path = folder / (f"{name}.png" if frame is None else f"{name}/{scene.frame_ids[frame]}.png")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.full(shape, value, np.uint8)).save(path)
+    return folder
+
+
+def test_each_picture_has_a_matte_named_ones_first_then_the_captures_then_beside_plates(
+    scene: Scene, folders: SubjectFolders, tmp_path: Path
+) -> None:
+    named = put(tmp_path / "named", scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # of all frames, of another size
+    found, told = make_folder(scene, folders.subject, PARAMS, named)
+    assert Counter(one.source for one in told) == {"capture": 1, "named": 2, "plate": 11}
+    whole = found_scene(folders)
+    store = whole.open_mattes()
+    assert store is not None and all_mattes(whole) and len(list(store)) == 14
+    assert int(store.image(0, 0)[5, 5, 0]) == 50 and int(store.image(2, 1)[5, 5, 0]) == 150
+    true = render(scene.cameras[1], OPAQUE, 0)[1] > 0.5
+    assert ((store.image(1, 0)[..., 0] > 127) == true).mean() > 0.96
+    assert len(subject_in(whole).splats) == len(found.splats)
+
+
+def test_what_is_written_can_be_looked_at_and_corrected(scene: Scene, folders: SubjectFolders) -> None:
+    make_folder(scene, folders.subject, PARAMS)
+    pictures = [path.relative_to(folders.subject).as_posix() for path in folders.subject.glob("*/*.png")]
+    told = json.loads((folders.subject / "mattes.json").read_text())
+    own = [one for one in told["pictures"] if one["source"] != "capture"]
+    assert sorted(pictures) == sorted(f"{one['camera']}/{one['frame']}.png" for one in own)
+    assert told["version"] == 2 and told["iou"] > 0.93 and told["start"]["gaussians"] <= 300
+    assert (folders.subject / "sheet.png").is_file()
+
+
+@pytest.mark.parametrize("place", ["nowhere", "empty"])
+def test_a_folder_without_mattes_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path, place: str) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match="no mattes"):
+        make_folder(scene, folders.subject, PARAMS, tmp_path / place)
+    assert not folders.subject.exists()
+
+
+def test_a_named_one_of_another_shape_is_refused(scene: Scene, folders: SubjectFolders, tmp_path: Path) -> None:
+    named = put(tmp_path / "named", scene, 2, None, 0, (SIZE, SIZE // 2))
+    with pytest.raises(UserError, match="another shape") as caught:
+        make_folder(scene, folders.subject, PARAMS, named)
+    assert scene.cameras[2].name in str(caught.value)
+
+
+def test_an_empty_room_has_no_subject(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, (), size=SIZE)
+    black_plates(scene)
+    with pytest.raises(UserError, match="no subject was found"):
+        find_subject(scene, PARAMS)
+
+
+def test_a_scene_that_has_all_is_left_alone_and_one_without_is_given_what_it_lacks(tmp_path: Path) -> None:
+    whole = make_scene(tmp_path / "whole", size=SIZE, mattes=True)
+    assert found_in(whole, PARAMS, tmp_path / "made") is whole and not (tmp_path / "made").exists()
+    (whole.folder / "gaussians.npz").unlink()
+    found = found_in(whole, PARAMS, tmp_path / "made")
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["gaussians.npz"]
+    assert found.mattes is None and len(subject_in(found).splats) <= 300
+
+
+def test_few_cameras_before_a_head_that_turns_look_at_several_frames(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, size=8, frames=9)
+    assert frames_looked_at(scene) == [4]
+    still = np.zeros((9, 4))
+    still[:, 0] = 1
+    turning = replace(scene, poses=Track(still, np.linspace(-0.1, 0.1, 27).reshape(9, 3)))
+    assert frames_looked_at(turning) == [4, 0, 8]  # six cameras: four times six pictures
+
+
+def test_a_doubtful_picture_has_a_red_frame_on_the_sheet(tmp_path: Path) -> None:
+    scene = make_scene(tmp_path, size=16)
+    grey, matte = np.full((16, 16, 3), 99, np.uint8), np.full((16, 16), 255, np.uint8)
+
+    def red(one: Matte) -> bool:
+        return bool((np.abs(tile(scene, (0, 0), grey, one).astype(int) - np.array(RED)).sum(-1) < 30).any())
+
+    assert red(Matte(matte, "gaussians", 0.3)) and not red(Matte(matte, "picture", 0.9))
+
+
+def test_a_matte_is_known_without_gaussians_beside_a_plate_only(scene: Scene, tmp_path: Path) -> None:
+    assert Mattes(scene).known((1, 0))
+    bare = make_scene(tmp_path / "bare", size=8)
+    assert not Mattes(bare).known((1, 0)) and Mattes(bare, {(1, 0): np.zeros((8, 8, 1), np.uint8)}).known((1, 0))
+
+
+@pytest.mark.parametrize("fault", ["cut", "cameras", "infinite", "missing"])
+def test_damaged_gaussians_are_refused_by_name(tmp_path: Path, fault: str) -> None:
+    scene = make_scene(tmp_path, size=8, mattes=True)
+    path = tmp_path / "gaussians.npz"
+    found = subject_in(scene)
+    if fault == "cut":
+        path.write_bytes(path.read_bytes()[:1000])
+    elif fault == "infinite":
+        found.splats.values[3, 4] = np.inf
+        write_found(path, found)
+    elif fault == "missing":
+        np.savez(path, values=found.splats.values)
+    with pytest.raises(UserError, match="Gaussians are damaged") as caught:
+        read_found(path, 5 if fault == "cameras" else 6)
+    assert str(path) in str(caught.value)
