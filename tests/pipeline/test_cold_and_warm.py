@@ -93,7 +93,11 @@ print(digest.hexdigest())
 
 
 @pytest.mark.parametrize(
-    "stage", [*("bake", "decimate"), *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "train"))]
+    "stage",
+    [
+        *("bake", "decimate"),
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "subject", "train")),
+    ],
 )
 def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path, project_root: Path) -> None:
     code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))
