@@ -15,8 +15,8 @@ Array = NDArray[np.float32]
 
 STEP = 0.7
 """Between samples on a ray, voxels."""
-CELLS = 160
-"""Voxels along the longest side."""
+CELLS, COARSE = 160, 96
+"""Voxels along the longest side; and where a chart is chosen, which many are asked for."""
 OUTSIDE = 0.002
 """Share of the Gaussians that may lie outside of the box on each side."""
 MARGIN = 0.02
@@ -56,8 +56,8 @@ class Volume:
         return rgb, alpha, depth
 
 
-def volume_of(splats: Splats, cells: int = CELLS) -> Volume:
-    """Gaussians as a grid with so many voxels along its longest side.
+def volume_of(splats: Splats, cells: int = CELLS, finest: float = 0.0) -> Volume:
+    """Gaussians as a grid with so many voxels along its longest side, fewer where they would be smaller than `finest`.
 
     A Gaussian of largest opacity o has an optical depth of -log(1 - o) along a ray through its middle and across its
     face. Spread over its volume this is a density of -log(1 - o) 2 pi s1 s2 N(x; S + (BLUR voxel)^2 I), s1 and s2 its
@@ -65,7 +65,7 @@ def volume_of(splats: Splats, cells: int = CELLS) -> Volume:
     """
     low, high = (edge.astype(np.float64) for edge in np.quantile(splats.means, [OUTSIDE, 1 - OUTSIDE], axis=0))
     low, high = low - MARGIN, high + MARGIN
-    voxel = float((high - low).max()) / (cells - 1)
+    voxel = max(finest, float((high - low).max()) / (cells - 1))
     shape = tuple(int(n) for n in np.ceil((high - low) / voxel) + 1)
     sizes, opacities = splats.sizes.astype(np.float64), np.minimum(splats.opacities.astype(np.float64), WIDEST)
     mass = -np.log1p(-opacities) * 2 * np.pi * np.prod(np.sort(sizes, 1)[:, 1:], 1)

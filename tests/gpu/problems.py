@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tests.gpu import crossing_problems, texture_problems
+from tests.gpu import texture_problems, tracing_problems
 from tests.gpu.problem import Problem
 
-PROBLEMS: dict[str, Callable[[], Problem]] = {**texture_problems.PROBLEMS, **crossing_problems.PROBLEMS}
+PROBLEMS: dict[str, Callable[[], Problem]] = {**texture_problems.PROBLEMS, **tracing_problems.PROBLEMS}
 
 if __name__ == "__main__":
     found = {f"{name}: {key}": value for name, make in PROBLEMS.items() for key, value in make().on_gpu().items()}

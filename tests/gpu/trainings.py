@@ -1,7 +1,6 @@
 """`python -m tests.gpu.trainings FOLDER`: a tiny scene trained on the CPU and on a GPU, or in the simulator of one.
 
-Writes FOLDER/cpu.npz and FOLDER/cuda.npz: the model, with the PSNR of its training rays. Both begin with the same
-Gaussians of the subject."""
+Writes FOLDER/cpu.npz and FOLDER/cuda.npz: the models, with the PSNR of their training rays."""
 
 from __future__ import annotations
 

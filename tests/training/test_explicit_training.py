@@ -18,11 +18,11 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
+from facefolds_core.subject.outline import Profile
 from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.volume.outline import Profile
 from tests.scenes import OPAQUE, make_scene
 
 pytestmark = pytest.mark.slow
@@ -30,13 +30,8 @@ pytestmark = pytest.mark.slow
 GEOMETRY = ExplicitParams().geometry
 
 
-ROUGH = {"levels": [{"resolution": 24, "iterations": 60}, {"resolution": 48, "iterations": 60}]}
-"""The starting volume takes most of the time: a tenth of what it is by default."""
-ROUGHER = {"levels": [{"resolution": 24, "iterations": 40}]}
-
-
 def _params(**values: object) -> ExplicitParams:
-    given = {"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, "volume": ROUGH, **values}
+    given = {"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values}
     params = train_params(given)
     assert isinstance(params, ExplicitParams)
     return params
@@ -67,12 +62,6 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
 
 def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]) -> None:
     assert _held_out_psnr(*trained) > 22
-
-
-@pytest.mark.nightly
-def test_it_is_after_the_default_volume(trained: tuple[Scene, Path], tmp_path: Path) -> None:
-    train_explicit(trained[0], _params(volume={}), tmp_path / "model", tmp_path / "log")
-    assert _held_out_psnr(trained[0], tmp_path / "model") > 22
 
 
 def test_a_matte_sphere_has_no_reflection(trained: tuple[Scene, Path], tmp_path: Path) -> None:
@@ -129,7 +118,7 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
     np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
 
 
-def test_layers_are_as_thin_as_asked_for_where_the_volume_is_sharp() -> None:
+def test_layers_are_as_thin_as_asked_for_where_the_subject_is_sharp() -> None:
     radius = np.full((30, 30), 0.3)
     seen = Profile(
         radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
@@ -170,7 +159,7 @@ def test_plan_spends_all_iterations() -> None:
 def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TextureState, "step", lambda self, *args: float("nan"))
     with pytest.raises(UserError, match="diverged"):
-        train_explicit(trained[0], _params(iterations=60, volume=ROUGHER), tmp_path / "model", tmp_path / "log")
+        train_explicit(trained[0], _params(iterations=60), tmp_path / "model", tmp_path / "log")
     assert not (tmp_path / "model").exists()
 
 
@@ -184,7 +173,7 @@ def test_divergence_is_rolled_back(
         return float("nan") if len(calls) == 30 else real(self, *args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(TextureState, "step", fail_once)
-    train_explicit(trained[0], _params(iterations=60, volume=ROUGHER), tmp_path / "model", tmp_path / "log")
+    train_explicit(trained[0], _params(iterations=60), tmp_path / "model", tmp_path / "log")
     assert "diverged" in (tmp_path / "model" / "fit.json").read_text()
 
 
@@ -193,8 +182,7 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
 ) -> None:
     """Thin hair does that: the search for crossings needs a radius to step along."""
     monkeypatch.setattr(trainer, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
-    few = {"levels": [{"resolution": 32, "iterations": 30}]}
-    train_explicit(trained[0], _params(iterations=40, volume=few), tmp_path / "model", tmp_path / "log")
+    train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
     assert GEOMETRY.min_radius <= model.manifolds.radii().min().item() < GEOMETRY.min_radius + 0.05
@@ -216,11 +204,6 @@ def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: 
     assert "dvc repro" in str(caught.value.remedy)
 
 
-def test_a_missing_matte_is_said_at_once(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="no matte"):
-        train_explicit(make_scene(tmp_path / "scene", size=8), _params(), tmp_path / "model", tmp_path / "log")
-
-
 @pytest.mark.parametrize("grey", [0, 90])
 def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> None:
     scene = make_scene(tmp_path / "scene", size=24)
@@ -228,9 +211,8 @@ def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> No
     pairs = [(i, k) for i in range(len(scene.cameras)) for k in range(scene.num_frames)]
     write_frames(scene.folder / "frames.arrow", image.shape, [(*pair, image) for pair in pairs])
     write_frames(scene.folder / "mattes.arrow", (24, 24, 1), [(*pair, 0 * image[..., :1]) for pair in pairs])
-    few = {"levels": [{"resolution": 24, "iterations": 20}]}
     with pytest.raises(UserError, match="no subject was found"):
-        train_explicit(scene, _params(volume=few), tmp_path / "model", tmp_path / "log")
+        train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
 
 
 def test_a_tracked_mesh_of_another_size_is_left_out_and_said(

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 
 from facefolds_core import hit_codes
+from facefolds_core.adam import decays
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.adam import decays
 from facefolds_core.training.explicit import follow_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
 from facefolds_core.training.explicit.state import TextureState

@@ -37,7 +37,6 @@ def params(**segments: object) -> ExplicitParams:
         "device": "cpu",
         "layers": 3,
         "iterations": 30,
-        "volume": {"levels": [{"resolution": 16, "iterations": 20}]},
         "geometry": {"rounds": [1.0], "round_iterations": 10},
         "reflection": {"enabled": False},
         "textures": {"steps_per_frame": 4},

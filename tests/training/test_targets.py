@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
-from facefolds_core.training.explicit.targets import CutOuts, OneFrame, check_mattes, without_matte
+from facefolds_core.training.explicit.targets import CutOuts, OneFrame
 from tests.scenes import make_scene
 
 SIZE = 24
@@ -87,17 +86,3 @@ def test_without_plates_half_covered_pixels_get_the_colours_of_the_subject(scene
     edge = (disc().ravel() > 80) & (disc().ravel() < 250)
     straight = 255 * cut[edge, :3] / cut[edge, 3:]
     assert np.abs(straight - [200, 120, 60]).mean() < 25
-
-
-def test_a_picture_without_a_matte_is_named(scene: Scene, tmp_path: Path) -> None:
-    check_mattes(scene)
-    assert without_matte(scene) == []
-    none = replace(scene, mattes=tmp_path / "none.arrow")
-    assert len(without_matte(none)) == len(scene.indices("train")) * scene.num_frames
-    last = scene.indices("train")[-1]
-    rest = [key for key in scene.open_frames() if key != (last, 1)]
-    write_frames(tmp_path / "some.arrow", (SIZE, SIZE, 1), ((*key, disc()) for key in rest))
-    with pytest.raises(UserError, match="no matte") as caught:
-        check_mattes(replace(scene, mattes=tmp_path / "some.arrow"))
-    assert caught.value.place == f"camera {scene.cameras[last].name}, frame {scene.frame_ids[1]}"
-    assert "`subject`" in str(caught.value.remedy)

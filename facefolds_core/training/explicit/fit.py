@@ -26,11 +26,14 @@ from facefolds_core.subject.outline import (
     window_uv,
 )
 from facefolds_core.subject.sight import seen_share
-from facefolds_core.subject.volume import Volume
+from facefolds_core.subject.storage import FoundSubject
+from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.tracked import blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
 
+FINEST = 0.7
+"""Voxels are no smaller than so many pixels of the median camera."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 
@@ -67,20 +70,20 @@ class Fit:
     start_psnr: float
 
 
-def fit_scene(scene: Scene, volume: Volume, psnr: float, params: ExplicitParams) -> Fit:
+def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
 
     Args:
-        volume: of the subject.
-        psnr: of its Gaussians, dB.
+        subject: as it was found.
     """
-    start, geometry = params.start, params.geometry
+    start, geometry, finest = params.start, params.geometry, FINEST * pixel_size(scene)
+    volume, coarse = (volume_of(subject.splats, cells, finest) for cells in (CELLS, COARSE))
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
-    visible = visible_points(volume, cameras)
-    chart, losses = choose_chart(volume, visible, start)
-    surface, notes = trusted_surface(scene, volume, chart, params)
+    visible = visible_points(coarse, cameras)
+    chart, losses = choose_chart(coarse, visible, start)
+    surface, notes = trusted_surface(scene, coarse, chart, params)
     vertices = None if surface is None else surface[0].astype(np.float64)
-    window = fit_window(volume, chart, visible, vertices, start)
+    window = fit_window(coarse, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
     uv = window_uv(window, rows, columns)
     seen = profile(volume, chart, uv, start.subject_opacity)
@@ -114,7 +117,7 @@ def fit_scene(scene: Scene, volume: Volume, psnr: float, params: ExplicitParams)
         reasons=(*_reasons(params, losses[chart], source, most), *notes),
         notes=notes,
         losses=losses,
-        start_psnr=psnr,
+        start_psnr=subject.psnr,
     )
 
 

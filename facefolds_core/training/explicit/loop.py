@@ -16,7 +16,6 @@ from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in, subject_in
-from facefolds_core.subject.volume import volume_of
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.cameras import choose_cameras
@@ -25,7 +24,6 @@ from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import model_bytes
-from facefolds_core.training.explicit.targets import check_mattes
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
@@ -91,7 +89,6 @@ def _fit(
     scene: Scene, params: ExplicitParams, log: Path, place: Path | None, kept: Path | None
 ) -> tuple[Trained, Surroundings]:
     """The same of a scene whose subject was found."""
-    check_mattes(scene)
     device = choose(params.device)
     checkpoints = None if kept is None else Checkpoints(kept, params.segments)
     began = time.perf_counter()
@@ -101,7 +98,7 @@ def _fit(
         cameras = choose_cameras(scene, subject.cameras)
         for note in cameras.notes:
             bar.write(f"train: {note}")
-        fit = fit_scene(cameras.scene, volume_of(subject.splats), subject.psnr, params)
+        fit = fit_scene(cameras.scene, subject, params)
         warnings = warnings_of(scene, fit)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")

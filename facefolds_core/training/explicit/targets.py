@@ -17,37 +17,11 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.cutout import foreground
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.training.explicit.views import Images
 
 KEPT_BYTES = 2 << 30
 """Of cut-outs that a training keeps in memory; others are made again when their frame's turn comes."""
-
-
-def without_matte(scene: Scene) -> list[tuple[int, int]]:
-    """(camera, frame) of the training pictures in which the subject's opacity is not known."""
-    mattes, training = scene.open_mattes(), set(scene.indices("train"))
-    return [key for key in scene.open_frames() if key[0] in training and (mattes is None or key not in mattes)]
-
-
-def check_mattes(scene: Scene) -> None:
-    """Refuse a scene in which a training picture has no matte.
-
-    Raises:
-        UserError: naming the camera and the frame.
-    """
-    missing = without_matte(scene)
-    if missing:
-        camera, frame = missing[0]
-        raise UserError(
-            "a training picture has no matte",
-            file=scene.folder / "mattes.arrow" if scene.mattes is None else scene.mattes,
-            place=f"camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}",
-            expected="the subject's opacity in every training picture: the explicit model is trained with it alone",
-            found=f"{len(missing)} training pictures without",
-            remedy="run the stage `subject`, which finds them",
-        )
 
 
 class Pictures(Protocol):

@@ -81,7 +81,7 @@ def digest_of_training(params: ExplicitParams) -> bytes:
     left_out = {"device", "preset", "segments"}
     values = params.model_dump(mode="json", exclude=left_out)
     digest.update(json.dumps(values, sort_keys=True).encode())
-    digest.update(digest_of_packages("training", "model", "geometry", "spacing").encode())
+    digest.update(digest_of_packages("training", "subject", "model", "geometry", "spacing").encode())
     return digest.digest()
 
 
@@ -120,6 +120,8 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
             digest.update(camera.K.tobytes() + camera.w2c.tobytes())
     plates = scene.open_plates()
     digest.update(repr(scene.radius).encode())
+    found = scene.found_gaussians()
+    digest.update(b"" if found is None else found.read_bytes())
     for camera_index, _ in () if plates is None else plates:
         digest.update(f"{camera_index}".encode())
         digest.update(np.ascontiguousarray(plates.image(camera_index, 0)).data)  # type: ignore[union-attr]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numba
@@ -21,12 +22,12 @@ from facefolds_core.files import read_json
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
-from facefolds_core.params import ExplicitParams
+from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
+from facefolds_core.subject.find import found_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.targets import check_mattes
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
@@ -66,7 +67,9 @@ def fit_take(scene: Scene, params: ExplicitParams, checkpoints: Path, log: Path,
     tqdm.write(f"train: {scene.num_frames} frames {told}")
     if told.key_frames is None:
         return fit_explicit(scene, params, log, place)
-    return _Take(scene, params, checkpoints / "take", log, told).run()
+    with TemporaryDirectory() as found:
+        whole = found_in(scene, SubjectParams(seed=params.seed), Path(found) / "subject")
+        return _Take(whole, params, checkpoints / "take", log, told).run()
 
 
 class _Take:
@@ -74,7 +77,6 @@ class _Take:
 
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
-        check_mattes(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
         self.device = choose(params.device)
         self.began = time.perf_counter()
