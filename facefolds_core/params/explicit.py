@@ -162,7 +162,7 @@ class ExplicitParams(Section):
     them."""
 
     start: StartParams = StartParams()
-    """What the layers take from the volume."""
+    """What the layers take from the subject as it was found."""
 
     mesh: MeshParams = MeshParams()
     """How far a tracked mesh is believed."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 RENAMED: dict[str, str] = {
     "train.level_halfwidth": "train.geometry.halfwidth",
     "train.lr_texture": "train.textures.learning_rate",
-    "train.lr_volume": "train.volume.learning_rate",
-    "train.mattes": "matte",
 }
-"""Old key -> new key or section; until 0.1 the names of the model `explicit`."""
+"""Old key -> new key of the same section; until 0.1 the names of the model `explicit`."""
 
 FIXED: dict[str, str] = {
     "capture.seed": "captures/actor/render.py",
@@ -68,15 +66,31 @@ FIXED: dict[str, str] = {
 """Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
 
 CUT_OUT = "the subject is cut out of all training pictures, over changing colours: no background is learnt"
+FOUND = "the stage `subject` fits Gaussians; its section `subject` has the keys `iterations`, `fewest`, `most`, `seed`"
+MATTES = (
+    "the stage `subject` finds mattes of all pictures, and its section is called `subject`; `subjects.NAME.mattes` "
+    "names corrected ones"
+)
 
 GONE: dict[str, str] = {
+    "matte": MATTES,
     "capture.fps": "she plays as fast as she was filmed; `subjects.NAME.fps` sets another rate",
+    "train.mattes": MATTES,
+    "train.outlines": MATTES,
+    "train.volume": FOUND,
+    "train.lr_volume": FOUND,
+    "train.moving.volume_frames": FOUND,
+    "train.room": f"{FOUND}; Gaussians show the room, too",
+    "train.environment": f"{FOUND}; Gaussians show what is far, too",
+    "train.subject": f"{FOUND}. `subjects.NAME.centre` and `subjects.NAME.radius` say where the subject is",
+    "train.warnings": f"{FOUND}, and tells which pictures contradict the others",
+    "train.cameras": f"{FOUND}, and tells what single cameras do differently",
+    **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
     "train.moving.background_rate": CUT_OUT,
     "train.losses": f"{CUT_OUT}, and opacity needs no price",
     "train.lambda_veil": f"{CUT_OUT}, and opacity needs no price",
     "train.lambda_solid": f"{CUT_OUT}, and opacity needs no price",
-    "train.outlines": f"{CUT_OUT}; `matte` has the keys of how it is found",
     **{
         f"train.pruning.{key}": f"{CUT_OUT}, and no room is painted"
         for key in (
@@ -93,16 +107,13 @@ GONE: dict[str, str] = {
     "compress.stream.megabytes": "segments are encoded one after another",
     "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
 }
-"""Old key -> why nothing took its place."""
+"""Old key or section -> why nothing of its name took its place."""
 
 
 def remedy_for(path: str) -> str | None:
-    """What to do about a key that is no more: "train.lr_texture"; None if there never was one."""
+    """What to do about a key, or a section, that is no more: "train.lr_texture"; None if there never was one."""
     if path in RENAMED:
-        new = RENAMED[path]
-        section, _, inner = new.partition(".")
-        if section != path.partition(".")[0]:
-            return f"it is a section of its own now: write `{new}: {{...}}` beside `{path.partition('.')[0]}`"
+        inner = RENAMED[path].partition(".")[2]
         return f"it is called `{inner}` now: write `{_yaml(inner)}`"
     if path in FIXED:
         return f"remove it: its value is fixed now, in facefolds_core/{FIXED[path]}"
