@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
+from facefolds_core.params.renamed import remedy_for
 from facefolds_core.parsing import brief, parse_yaml
 from facefolds_core.paths import check_path_text, check_subject_name
 
@@ -79,14 +80,15 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             expected="a mapping with a `subjects` section",
             remedy="see docs/guide/subjects.md",
         )
-    unknown = [brief(name) for name in value if name not in ("subjects", *STAGE_SECTIONS)]
+    unknown = [name for name in value if name not in ("subjects", *STAGE_SECTIONS)]
     if unknown:
+        known = [f"`{name}`: {remedy}" for name in unknown if (remedy := remedy_for(str(name))) is not None]
         raise UserError(
             "unknown sections",
             file=path,
-            place=brief(", ".join(unknown), 200),
+            place=brief(", ".join(brief(name) for name in unknown), 200),
             expected=", ".join(["subjects", *STAGE_SECTIONS]),
-            remedy="remove or rename them",
+            remedy="; ".join(known) or "remove or rename them",
         )
     sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
     for name, section in sections.items():

@@ -77,7 +77,7 @@ def merged(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, An
 
 
 def value_at(section: Section, path: str) -> Any:
-    """The value of a key within sections: "volume.learning_rate"."""
+    """The value of a key within sections: "textures.learning_rate"."""
     value: Any = section
     for name in path.split("."):
         value = getattr(value, name)
@@ -85,6 +85,6 @@ def value_at(section: Section, path: str) -> Any:
 
 
 def nested(path: str, value: Any) -> dict[str, Any]:
-    """ "volume.learning_rate" and 0.1 -> {"volume": {"learning_rate": 0.1}}."""
+    """ "textures.learning_rate" and 0.1 -> {"textures": {"learning_rate": 0.1}}."""
     first, _, rest = path.partition(".")
     return {first: nested(rest, value) if rest else value}

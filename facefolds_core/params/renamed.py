@@ -5,10 +5,30 @@ from __future__ import annotations
 RENAMED: dict[str, str] = {
     "train.level_halfwidth": "train.geometry.halfwidth",
     "train.lr_texture": "train.textures.learning_rate",
-    "train.lr_volume": "train.volume.learning_rate",
-    "train.mattes": "matte",
 }
-"""Old key -> new key or section; until 0.1 the names of the model `explicit`."""
+"""Old key -> new key of the same section; until 0.1 the names of the model `explicit`."""
+
+OF_THE_TRAINER: dict[str, str] = {
+    "params/surfaces.py": "start.centre_tie start.centre_nodes start.window_limit start.column_limit "
+    "start.azimuth_limit start.subject_opacity",
+    "training/explicit/attempt.py": "divergence",
+    "training/explicit/clearing.py": "start.beside_opacity pruning.speck_opacity pruning.speck_reach",
+    "training/explicit/fit.py": "start.window_margin geometry.max_halfwidth_pixels geometry.min_radius geometry.blur "
+    "textures.radius_quantile",
+    "training/explicit/plan.py": "geometry.round_stride geometry.round_rays textures.half_share",
+    "training/explicit/rates.py": "textures.final_rate textures.betas textures.layer_rate textures.alpha_rate "
+    "textures.frame_rate",
+    "training/explicit/reflection.py": "reflection.normal_blur reflection.normals reflection.normal_smoothness "
+    "reflection.max_tilt reflection.gloss_smoothness reflection.environment_smoothness reflection.frames "
+    "reflection.moving_frames reflection.rays reflection.rounds reflection.first_rounds reflection.min_opacity "
+    "reflection.max_residual reflection.folds reflection.asked_smoothness reflection.smoother reflection.sure_gain "
+    "reflection.min_gain",
+    "training/explicit/state.py": "start.min_opacity start.max_opacity textures.min_light textures.min_alpha",
+    "training/explicit/tracked.py": "mesh",
+    "training/explicit/trainer.py": "pruning.layer_alpha",
+    "training/explicit/views.py": "moving.shares moving.sample moving.sample_frames",
+}
+"""File of facefolds_core -> keys of `train` whose values stand there now."""
 
 FIXED: dict[str, str] = {
     "capture.seed": "captures/actor/render.py",
@@ -64,19 +84,36 @@ FIXED: dict[str, str] = {
     "evaluate.film_crf": "params/evaluate.py",
     "evaluate.cvvdp_frames": "params/evaluate.py",
     "evaluate.warnings": "params/evaluate.py",
+    **{f"train.{key}": file for file, keys in OF_THE_TRAINER.items() for key in keys.split()},
 }
 """Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
 
 CUT_OUT = "the subject is cut out of all training pictures, over changing colours: no background is learnt"
+FOUND = "the stage `subject` fits Gaussians; its section `subject` has the keys `iterations`, `fewest`, `most`, `seed`"
+MATTES = (
+    "the stage `subject` finds mattes of all pictures, and its section is called `subject`; `subjects.NAME.mattes` "
+    "names corrected ones"
+)
 
 GONE: dict[str, str] = {
+    "matte": MATTES,
     "capture.fps": "she plays as fast as she was filmed; `subjects.NAME.fps` sets another rate",
+    "train.mattes": MATTES,
+    "train.outlines": MATTES,
+    "train.volume": FOUND,
+    "train.lr_volume": FOUND,
+    "train.moving.volume_frames": FOUND,
+    "train.room": f"{FOUND}; Gaussians show the room, too",
+    "train.environment": f"{FOUND}; Gaussians show what is far, too",
+    "train.subject": f"{FOUND}. `subjects.NAME.centre` and `subjects.NAME.radius` say where the subject is",
+    "train.warnings": f"{FOUND}, and tells which pictures contradict the others",
+    "train.cameras": f"{FOUND}, and tells what single cameras do differently",
+    **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
     "train.moving.background_rate": CUT_OUT,
     "train.losses": f"{CUT_OUT}, and opacity needs no price",
     "train.lambda_veil": f"{CUT_OUT}, and opacity needs no price",
     "train.lambda_solid": f"{CUT_OUT}, and opacity needs no price",
-    "train.outlines": f"{CUT_OUT}; `matte` has the keys of how it is found",
     **{
         f"train.pruning.{key}": f"{CUT_OUT}, and no room is painted"
         for key in (
@@ -84,8 +121,8 @@ GONE: dict[str, str] = {
             *("beside_layers_gain", "beside_layers_opacity", "beside_gain", "beside_share", "beside_cameras"),
         )
     },
-    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel`, `geometry.max_halfwidth` "
-    "and `geometry.blur` can be set",
+    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel` and "
+    "`geometry.max_halfwidth` can be set",
     "train.segments.rate": "frames are fitted at the base's rate",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.between": "an asset has the capture's frames",
@@ -93,16 +130,13 @@ GONE: dict[str, str] = {
     "compress.stream.megabytes": "segments are encoded one after another",
     "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
 }
-"""Old key -> why nothing took its place."""
+"""Old key or section -> why nothing of its name took its place."""
 
 
 def remedy_for(path: str) -> str | None:
-    """What to do about a key that is no more: "train.lr_texture"; None if there never was one."""
+    """What to do about a key, or a section, that is no more: "train.lr_texture"; None if there never was one."""
     if path in RENAMED:
-        new = RENAMED[path]
-        section, _, inner = new.partition(".")
-        if section != path.partition(".")[0]:
-            return f"it is a section of its own now: write `{new}: {{...}}` beside `{path.partition('.')[0]}`"
+        inner = RENAMED[path].partition(".")[2]
         return f"it is called `{inner}` now: write `{_yaml(inner)}`"
     if path in FIXED:
         return f"remove it: its value is fixed now, in facefolds_core/{FIXED[path]}"

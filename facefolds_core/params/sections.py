@@ -13,10 +13,9 @@ from facefolds_core.params.base import Section
 from facefolds_core.params.capture import CaptureParams, NormalizeParams
 from facefolds_core.params.compress import CompressParams
 from facefolds_core.params.evaluate import EvaluateParams
-from facefolds_core.params.explicit import ExplicitParams
 from facefolds_core.params.export import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
 from facefolds_core.params.gaussians import SubjectParams
-from facefolds_core.params.renamed import RENAMED, remedy_for
+from facefolds_core.params.renamed import remedy_for
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
 from facefolds_core.parsing import brief
 
@@ -102,13 +101,12 @@ def _unknown_key(kind: type[BaseModel], names: list[str]) -> tuple[str, str | No
     owner = f" of the model `{model}`" if model else ""
     expected = f"a key{owner}{' in `' + '.'.join(folders) + '`' if folders else ''}: {keys}"
     stage = next((stage for stage, kinds in SECTIONS.items() if kind in kinds), "")
-    path = ".".join([stage, *names])
-    if path not in RENAMED or kind is ExplicitParams:
-        mending = remedy_for(path)
-        if mending is not None:
-            return expected, mending
+    path = ".".join([stage, *names] if stage else names)
+    mending = remedy_for(path)
+    if mending is not None:
+        return expected, mending
     for other in SECTIONS["train"] if model and not folders else ():
-        if key in other.model_fields or (other is ExplicitParams and path in RENAMED):
+        if key in other.model_fields:
             name = other.model_fields["model"].default
             presets = [preset for preset, one in PRESETS.items() if one.model == name]
             whose = f"preset{'s' * (len(presets) > 1)} {', '.join(presets)}"

@@ -48,7 +48,7 @@ class GeometryParams(Section):
     """Nodes along the longer side of the radius maps."""
 
     halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
-    """The layers lie within this distance of their middle, units, where the volume is sharp."""
+    """The layers lie within this distance of their middle, units, where the start is sharp."""
 
     max_halfwidth: Length = 0.015
     """Largest distance of a layer from the middle, units."""

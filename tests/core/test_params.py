@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.config import read_level_resolutions, read_stage, read_subject, read_train, read_volume_source
+from facefolds_core.config import read_level_resolutions, read_stage, read_subject, read_train
 from facefolds_core.errors import UserError
 from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
 from facefolds_core.params_file import load_params, write_configs
@@ -68,34 +68,6 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "changed"),
-    [("none", ["train.json"]), ("plates", ["train.json"]), ("auto", ["train.json", "volume.json"])],
-)
-def test_training_parameters_reach_mattes_only_where_they_are_needed(
-    tmp_path: Path, method: str, changed: list[str]
-) -> None:
-    written = []
-    for layers in (4, 5):
-        text = MINIMAL + f"train: {{layers: {layers}}}\nmatte: {{method: {method}}}\n"
-        params = load_params(params_file(tmp_path, text))
-        written.append({path.name: path.read_bytes() for path in write_configs(params, "a", tmp_path)})
-    assert [name for name in written[0] if written[0][name] != written[1][name]] == changed
-    assert read_volume_source(tmp_path).layers == (5 if "volume.json" in changed else 12)
-
-
-@pytest.mark.parametrize("method", ["auto", "plates", "pictures"])
-@pytest.mark.parametrize("preset", ["fast", "paper"])
-def test_mattes_are_found_of_the_frames_that_train(tmp_path: Path, method: str, preset: str) -> None:
-    """A starting volume is fitted to some frames, of long takes to those of key frames."""
-    own = "moving: {volume_frames: 9}, segments: {key_frames: 7}" if preset == "fast" else "seed: 3"
-    text = MINIMAL + f"train: {{preset: {preset}, {own}}}\nmatte: {{method: {method}}}\n"
-    write_configs(load_params(params_file(tmp_path, text)), "a", tmp_path)
-    start = read_volume_source(tmp_path)
-    found = (start.moving.volume_frames, start.segments.key_frames, start.seed)
-    assert found == ((9, 7, 0) if preset == "fast" else (5, 24, 3))
-
-
-@pytest.mark.parametrize(
     ("text", "says"),
     [
         ("subjects:\n  a: [\n", "line 3"),
@@ -105,10 +77,17 @@ def test_mattes_are_found_of_the_frames_that_train(tmp_path: Path, method: str, 
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
-        (MINIMAL + "train: {lambda_veil: 0}\n", "needs no price"),
+        (MINIMAL + "train: {lambda_veil: 0}\n", "opacity needs no price"),
+        (MINIMAL + "matte: {method: auto}\n", "its section is called `subject`"),
+        (MINIMAL + "matte: {}\nroom: {}\n", "`matte`: remove it"),
+        ("subjects:\n  a: {source: actor, path: x, matte: {train: all}}\n", "its section is called `subject`"),
+        (MINIMAL + "train: {start: {fog_gain: 1}}\n", "no fog is left"),
         ("subjects:\n  a: {source: actor, path: x, mattes: ~/mine}\n", "subjects.a.mattes"),
-        (MINIMAL + "train: {mattes: {vote: {share: 0.9}}}\n", "`matte: {...}` beside `train`"),
-        ("subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {volume: {}}\n", "to the subjects"),
+        (MINIMAL + "train: {mattes: {vote: {share: 0.9}}}\n", "its section is called `subject`"),
+        (
+            "subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {geometry: {}}\n",
+            "to the subjects",
+        ),
         (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
         (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),
         (MINIMAL + "capture: {fps: 1.0e+300}\n", "capture.fps"),

@@ -17,8 +17,8 @@ from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
 from facefolds_core.training.explicit.reflection import (
-    FIT,
-    FitParams,
+    GLOSS,
+    GlossParams,
     centred,
     fit_maps,
     gain_on_cameras,
@@ -45,7 +45,7 @@ class GlossFit:
     """
 
     def __init__(
-        self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None, how: FitParams = FIT
+        self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None, how: GlossParams = GLOSS
     ) -> None:
         self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0

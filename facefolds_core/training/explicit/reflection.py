@@ -26,7 +26,7 @@ TILT_STEP = 0.01
 
 
 @dataclass(frozen=True)
-class FitParams:
+class GlossParams:
     """How the reflection is fitted, and how it is asked whether there is one.
 
     Attributes:
@@ -70,10 +70,10 @@ class FitParams:
     min_gain: float = 0.05
 
 
-FIT = FitParams()
+GLOSS = GlossParams()
 
 
-def fit_maps(seen: Seen, start: Maps, rounds: int, params: FitParams) -> Maps:
+def fit_maps(seen: Seen, start: Maps, rounds: int, params: GlossParams) -> Maps:
     """Gloss, offset, environment and the tilt of the normals that explain the residuals; the surface is that of
     `start`."""
     o, clip = seen.opacity, params.max_residual
@@ -102,7 +102,7 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: FitParams) -> Maps:
     return maps
 
 
-def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: FitParams) -> Maps:
+def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: GlossParams) -> Maps:
     """The same with another tilt along one tangent: a Gauss-Newton step, kept within `max_tilt`."""
     step = np.zeros((1, 1, 2), np.float32)
     step[..., axis] = TILT_STEP
@@ -123,7 +123,7 @@ def grounded(maps: Maps) -> Maps:
     return replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
 
 
-def centred(maps: Maps, seen: Seen, params: FitParams) -> Maps:
+def centred(maps: Maps, seen: Seen, params: GlossParams) -> Maps:
     """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
     light = values_at(maps.environment, maps.positions(seen)) * values_at(maps.gloss[..., None], seen.st)
     weight = seen.opacity**2
@@ -131,7 +131,7 @@ def centred(maps: Maps, seen: Seen, params: FitParams) -> Maps:
     return replace(maps, offset=offset)
 
 
-def gain_on_cameras(seen: Seen, start: Maps, params: FitParams) -> float:
+def gain_on_cameras(seen: Seen, start: Maps, params: GlossParams) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
     params = smoothed(params, params.asked_smoothness)
     before = after = 0.0
@@ -148,7 +148,7 @@ def gain_on_cameras(seen: Seen, start: Maps, params: FitParams) -> float:
     return 10 * float(np.log10(before / after)) if after > 0 and before > 0 else 0.0
 
 
-def smoothed(params: FitParams, factor: float) -> FitParams:
+def smoothed(params: GlossParams, factor: float) -> GlossParams:
     """With the smoothnesses of gloss, offset and environment times `factor`."""
     return replace(
         params,
