@@ -28,7 +28,7 @@ from facefolds_core.subject.outline import (
 from facefolds_core.subject.sight import seen_share
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
-from facefolds_core.training.explicit.tracked import MESH, MeshParams, blend, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
 
@@ -81,19 +81,18 @@ class Fit:
     start_psnr: float
 
 
-def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, believed: MeshParams = MESH) -> Fit:
+def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
 
     Args:
         subject: as it was found.
-        believed: how far the mesh is.
     """
     start, geometry, finest = params.start, params.geometry, FINEST * pixel_size(scene)
     volume, coarse = (volume_of(subject.splats, cells, finest) for cells in (CELLS, COARSE))
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
     visible = visible_points(coarse, cameras)
     chart, losses = choose_chart(coarse, visible, start)
-    surface, notes = trusted_surface(scene, coarse, chart, start, believed)
+    surface, notes = trusted_surface(scene, coarse, chart, start)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
@@ -108,9 +107,9 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, belie
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_share(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
-        known, kept = blend(mesh, seen.radius, believed.reach)
-        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, believed.opacity), opacity)
-        source = fact("middle_from_mesh", reach=believed.reach)
+        known, kept = blend(mesh, seen.radius, MESH.reach)
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH.opacity), opacity)
+        source = fact("middle_from_mesh", reach=MESH.reach)
     middle = extrapolate(known).clip(MIN_RADIUS)
     most = greatest_halfwidth(geometry, pixel_size(scene))
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
@@ -122,7 +121,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, belie
         window=window,
         middle=middle,
         halfwidth=widths,
-        trust=believed.trust * kept,
+        trust=MESH.trust * kept,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
