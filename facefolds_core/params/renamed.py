@@ -13,7 +13,7 @@ OF_THE_TRAINER: dict[str, str] = {
     "start.azimuth_limit start.subject_opacity",
     "training/explicit/attempt.py": "divergence",
     "training/explicit/clearing.py": "start.beside_opacity pruning.speck_opacity pruning.speck_reach",
-    "training/explicit/fit.py": "start.window_margin geometry.max_halfwidth_pixels geometry.min_radius geometry.blur "
+    "training/explicit/fit.py": "start.window_margin geometry.max_halfwidth_pixels geometry.min_radius "
     "textures.radius_quantile",
     "training/explicit/plan.py": "geometry.round_stride geometry.round_rays textures.half_share",
     "training/explicit/rates.py": "textures.final_rate textures.betas textures.layer_rate textures.alpha_rate "
@@ -121,8 +121,8 @@ GONE: dict[str, str] = {
             *("beside_layers_gain", "beside_layers_opacity", "beside_gain", "beside_share", "beside_cameras"),
         )
     },
-    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel` and "
-    "`geometry.max_halfwidth` can be set",
+    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel`, `geometry.max_halfwidth` "
+    "and `geometry.blur` can be set",
     "train.segments.rate": "frames are fitted at the base's rate",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.between": "an asset has the capture's frames",

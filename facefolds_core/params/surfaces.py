@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Length, Many, Section
+from facefolds_core.params.base import Count, Length, Many, Pixels, Section
 
 
 class StartParams(Section):
@@ -62,3 +62,7 @@ class GeometryParams(Section):
 
     round_iterations: Count = 60
     """Adam steps of each round."""
+
+    blur: Pixels = 6.0
+    """Smoothing of the layers' motion between rounds, standard deviation, nodes. With eight cameras 12 gained,
+    with thinner layers."""

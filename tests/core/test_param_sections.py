@@ -183,3 +183,10 @@ def test_every_key_is_described() -> None:
                 yield from undescribed(field.annotation, f"{path}.{name}")
 
     assert [key for stage, kinds in SECTIONS.items() for kind in kinds for key in undescribed(kind, stage)] == []
+
+
+def test_there_are_few_keys() -> None:
+    """A key needs a user who would turn it; what nobody turns is a constant beside the code that uses it."""
+    counts = {section: len(list(leaves(section))) for _, section in sections()}
+    assert sum(counts.values()) <= 120
+    assert counts[ExplicitParams()] <= 60

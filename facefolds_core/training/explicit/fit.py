@@ -42,8 +42,6 @@ MAX_HALFWIDTH_PIXELS = 8.0
 """Largest distance of a layer from the middle, pixels of the median camera; `geometry.halfwidth` is always allowed."""
 MIN_RADIUS = 0.08
 """Least radius of a layer's middle, units: at c the search for crossings ends."""
-BLUR = 6.0
-"""Smoothing of the layers' motion between rounds, standard deviation, nodes."""
 RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""
@@ -228,7 +226,7 @@ def pixel_size(scene: Scene) -> float:
     return float(np.median([np.linalg.norm(c.centre) / c.K[0, 0] for c in cameras]))
 
 
-def recentre(radii: Array, alpha: NDArray[np.float32], blur: float = BLUR) -> Array:
+def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
     """How far the layers should move to lie around the opacity found, along the rays, from outside inwards.
 
     With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - middle) / sum_i w_i. It is

@@ -157,7 +157,8 @@ class Trainer:
         with on_one_thread():
             nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
         radii = self.manifolds().radii().detach().double().numpy()
-        moved = self.middle + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy())).float()
+        offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
+        moved = self.middle + torch.from_numpy(offsets).float()
         start = torch.from_numpy(self.fit.middle).float()
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
         moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
