@@ -62,9 +62,9 @@ Kinds of values: a *share* is a number from 0 to 1, a *part* the same but not 0;
 Each key can be set for one run, and for sweeps, by its path; `++` adds it where params.yaml does not write it:
 
 ```
-dvc exp run -S '++train.textures.frame_rate=0.4'                 # of a section
-dvc exp run -S '++subjects.actor.train.textures.frame_rate=0.4'  # of one subject
-dvc exp run --queue -S '++train.textures.frame_rate=0.4,0.5,0.6'  # a sweep: one experiment each
+dvc exp run -S '++train.textures.smooth_every=5'                 # of a section
+dvc exp run -S '++subjects.actor.train.textures.smooth_every=5'  # of one subject
+dvc exp run --queue -S '++train.textures.smooth_every=3,4,5'     # a sweep: one experiment each
 ```
 """
 

@@ -15,9 +15,8 @@ from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging import rate
 from facefolds_core.packaging.attention import regions_of
-from facefolds_core.packaging.meshbits import resolved
+from facefolds_core.packaging.settings import LevelSetting, VideoSetting
 from facefolds_core.packaging.views import FRAMES, ViewMeter
-from facefolds_core.params import CompressParams, VideoCodec
 from facefolds_core.spacing import spread
 
 
@@ -34,7 +33,7 @@ def coded_level(
     folder: Path,
     name: str,
     content: LevelContent,
-    params: CompressParams,
+    setting: LevelSetting,
     meter: ViewMeter | None,
     cameras: Sequence[Camera],
     shared: Level | None = None,
@@ -45,13 +44,13 @@ def coded_level(
         cameras: that see it, for the bits of the meshes and of the video.
         shared: a level whose meshes are this one's, too.
     """
-    params = params.model_copy(update={"mesh": resolved(params.mesh, content.layers, cameras)})
-    video, crfs = params.video, None
-    regions = nowhere if video.lossless else regions_of(content, cameras, params.attention)
+    setting = setting.fitted(content.layers, cameras)
+    video, crfs = setting.video, None
+    regions = nowhere if video.lossless else regions_of(content, cameras, setting.attention)
     if meter is not None and video.target_psnr is not None and not video.lossless:
         target = video.target_psnr
         crfs = {codec: _crf(folder, content, regions, CODECS[codec], video, meter, target) for codec in video.codec}
-    level = write_level(folder, name, content, params, crfs, shared, regions)
+    level = write_level(folder, name, content, setting, crfs, shared, regions)
     if meter is None:
         return level
     shown = read_level(folder, level)
@@ -65,7 +64,7 @@ def _crf(
     content: LevelContent,
     regions: Regions,
     codec: Codec,
-    video: VideoCodec,
+    video: VideoSetting,
     meter: ViewMeter,
     target: float,
 ) -> int:

@@ -13,7 +13,7 @@ from facefolds_core.asset.writer import LevelContent
 from facefolds_core.export.textures import resample
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import CompressParams, LevelParams
+from facefolds_core.params import LevelParams
 
 MOST_KEPT = 768
 """Textures: of 64 frames of 12 layers, so that a long take takes no more memory than a short one."""
@@ -58,14 +58,3 @@ def coarse_content(
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
     return LevelContent(layers, textures, full.frames, full.fps, parts=full.parts, originals=full.textures)
-
-
-def level_params(params: CompressParams, level: LevelParams) -> CompressParams:
-    """The codecs' settings of a coarser level."""
-    video = params.video.model_copy(update={"crf": level.crf, "target_psnr": None, "lossless": False})
-    mesh = params.mesh
-    if level.max_error_pixels is not None:
-        mesh = mesh.model_copy(
-            update={"max_error_pixels": level.max_error_pixels, "compression_level": max(mesh.compression_level, 7)}
-        )
-    return params.model_copy(update={"video": video, "mesh": mesh})

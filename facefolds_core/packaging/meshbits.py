@@ -9,19 +9,9 @@ import numpy as np
 
 from facefolds_core.asset.cropping import CroppedLayer
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import MeshCodec
 
 MOST = 20
 """Bits, at most."""
-
-
-def resolved(codec: MeshCodec, layers: Sequence[CroppedLayer], cameras: Sequence[Camera]) -> MeshCodec:
-    """The codec with numbers of bits that keep `max_error_pixels`; as it is where none is asked for."""
-    if codec.max_error_pixels is None or not cameras:
-        return codec
-    bits = position_bits(layers, cameras, codec.max_error_pixels)
-    st_bits = texture_coordinate_bits(layers, codec.max_error_pixels)
-    return codec.model_copy(update={"quantization_bits": bits, "texture_coordinate_bits": st_bits})
 
 
 def position_bits(layers: Sequence[CroppedLayer], cameras: Sequence[Camera], pixels: float) -> int:

@@ -39,9 +39,10 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
-from facefolds_core.packaging.levels import coarse_content, level_params
+from facefolds_core.packaging.levels import coarse_content
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
+from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.packaging.views import training_cameras
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.source_code import digest_of_packages
@@ -112,9 +113,9 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
         else:
             for coarse in params.levels:
                 content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
-                coded = coded_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras)
+                coded = coded_level(temporary, coarse.name, content, LevelSetting.of(params, coarse), meter, cameras)
                 levels.append(coded)
-            level = coded_level(temporary, FULL, full, params, meter, cameras)
+            level = coded_level(temporary, FULL, full, LevelSetting.of(params), meter, cameras)
         if export.reflection is not None:
             picture = ReflectionPicture.of(export.reflection)
             levels = [_with_reflection(temporary, one, picture) for one in levels]

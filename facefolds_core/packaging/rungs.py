@@ -14,7 +14,8 @@ from facefolds_core.asset.manifest import Level
 from facefolds_core.asset.writer import FULL, LevelContent
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging.coding import coded_level
-from facefolds_core.packaging.levels import Resampled, level_params
+from facefolds_core.packaging.levels import Resampled
+from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.packaging.views import ViewMeter
 from facefolds_core.params import CompressParams, LevelParams, StreamParams
 
@@ -47,14 +48,14 @@ def write_rungs(
 ) -> list[Level]:
     """Write the levels of a stream, coarsest first, the full one last; their key frames are `segment_seconds` apart."""
     interval = max(1, round(params.stream.segment_seconds * full.rate))
-    params = params.model_copy(update={"video": params.video.model_copy(update={"keyframe_interval": interval})})
     full = replace(full, part_frames=interval)
-    finest = coded_level(folder, FULL, full, params, meter, cameras)
+    finest = coded_level(folder, FULL, full, LevelSetting.of(params, interval=interval), meter, cameras)
     resolution = full.textures.image(full.layers[0].source, 0).shape[0]
     levels = []
     for level in params.levels:
         content = _smaller(full, _factor(level, resolution), resolution)
-        levels.append(coded_level(folder, level.name, content, level_params(params, level), meter, cameras, finest))
+        setting = LevelSetting.of(params, level, interval)
+        levels.append(coded_level(folder, level.name, content, setting, meter, cameras, finest))
     together = [*levels, finest]
     return [level.model_copy(update={"switchable": FULL}) for level in together] if levels else together
 

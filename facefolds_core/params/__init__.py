@@ -18,7 +18,6 @@ from facefolds_core.params.compress import (
 )
 from facefolds_core.params.evaluate import EvaluateParams, ScoreWarningParams
 from facefolds_core.params.explicit import (
-    DivergenceParams,
     ExplicitParams,
     FollowParams,
     GridTextureParams,
@@ -38,7 +37,7 @@ from facefolds_core.params.reflection import ReflectionParams
 from facefolds_core.params.sections import SECTIONS, STAGE_SECTIONS, section_of, train_params, user_error
 from facefolds_core.params.segments import SegmentParams
 from facefolds_core.params.subject import FrameRange, HoldoutEvery, Overrides, Subject
-from facefolds_core.params.surfaces import GeometryParams, MeshParams, StartParams
+from facefolds_core.params.surfaces import GeometryParams, StartParams
 from facefolds_core.params.train import PRESETS, Preset, TrainParams, TrainSection
 
 __all__ = [
@@ -51,7 +50,6 @@ __all__ = [
     "CodecName",
     "CompressParams",
     "DecimateParams",
-    "DivergenceParams",
     "EvaluateParams",
     "ExplicitParams",
     "FollowParams",
@@ -62,7 +60,6 @@ __all__ = [
     "HoldoutEvery",
     "LevelParams",
     "MeshCodec",
-    "MeshParams",
     "MlpParams",
     "MovingParams",
     "NormalizeParams",

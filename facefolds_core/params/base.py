@@ -48,9 +48,6 @@ Length = Annotated[float, Field(gt=0, le=10)]
 Rate = Annotated[float, Field(gt=0, le=1000)]
 """A learning rate, or a factor on one."""
 
-Betas = Pair[Annotated[float, Field(ge=0, lt=1)]]
-"""Adam's: what a step keeps of the moments, of gradients and of their squares."""
-
 Weight = Annotated[float, Field(ge=0, le=1e6)]
 """Of a term of a loss; 0 leaves it out."""
 

@@ -49,11 +49,11 @@ class VideoCodec(Section):
     quality."""
 
     target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = None
-    """Quality of rendered training views against those of the uncoded textures, dB; takes the place of `crf`, which is
-    searched for."""
+    """Quality of rendered training views against those of the uncoded textures, dB; takes the place of the full
+    level's `crf`, which is searched for."""
 
     lossless: bool = False
-    """No loss beyond 8 bits and 4:2:0. Few hardware decoders know H.264's profile for it."""
+    """No loss in the full level beyond 8 bits and 4:2:0. Few hardware decoders know H.264's profile for it."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
         "slow"
@@ -61,7 +61,8 @@ class VideoCodec(Section):
     """Preset of libx264: slower ones make smaller files."""
 
     keyframe_interval: Count = 30
-    """Frames between key frames: more make smaller files, fewer make scrubbing faster."""
+    """Frames between key frames: more make smaller files, fewer make scrubbing faster. A stream has one a segment
+    (`stream.segment_seconds`)."""
 
     @field_validator("codec")
     @classmethod

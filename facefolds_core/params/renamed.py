@@ -8,6 +8,28 @@ RENAMED: dict[str, str] = {
 }
 """Old key -> new key of the same section; until 0.1 the names of the model `explicit`."""
 
+OF_THE_TRAINER: dict[str, str] = {
+    "params/surfaces.py": "start.centre_tie start.centre_nodes start.window_limit start.column_limit "
+    "start.azimuth_limit start.subject_opacity",
+    "training/explicit/attempt.py": "divergence",
+    "training/explicit/clearing.py": "start.beside_opacity pruning.speck_opacity pruning.speck_reach",
+    "training/explicit/fit.py": "start.window_margin geometry.max_halfwidth_pixels geometry.min_radius "
+    "textures.radius_quantile",
+    "training/explicit/plan.py": "geometry.round_stride geometry.round_rays textures.half_share",
+    "training/explicit/rates.py": "textures.final_rate textures.betas textures.layer_rate textures.alpha_rate "
+    "textures.frame_rate",
+    "training/explicit/reflection.py": "reflection.normal_blur reflection.normals reflection.normal_smoothness "
+    "reflection.max_tilt reflection.gloss_smoothness reflection.environment_smoothness reflection.frames "
+    "reflection.moving_frames reflection.rays reflection.rounds reflection.first_rounds reflection.min_opacity "
+    "reflection.max_residual reflection.folds reflection.asked_smoothness reflection.smoother reflection.sure_gain "
+    "reflection.min_gain",
+    "training/explicit/state.py": "start.min_opacity start.max_opacity textures.min_light textures.min_alpha",
+    "training/explicit/tracked.py": "mesh",
+    "training/explicit/trainer.py": "pruning.layer_alpha",
+    "training/explicit/views.py": "moving.shares moving.sample moving.sample_frames",
+}
+"""File of facefolds_core -> keys of `train` whose values stand there now."""
+
 FIXED: dict[str, str] = {
     "capture.seed": "captures/actor/render.py",
     "normalize.motion": "captures/motion.py",
@@ -62,6 +84,7 @@ FIXED: dict[str, str] = {
     "evaluate.film_crf": "params/evaluate.py",
     "evaluate.cvvdp_frames": "params/evaluate.py",
     "evaluate.warnings": "params/evaluate.py",
+    **{f"train.{key}": file for file, keys in OF_THE_TRAINER.items() for key in keys.split()},
 }
 """Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
 

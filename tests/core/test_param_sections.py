@@ -85,9 +85,9 @@ def test_absurd_frame_rates_are_refused(tmp_path: Path, fps: str) -> None:
 
 
 def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
-    made = train_params({"mesh": {"trust": 1}, "geometry": {"rounds": [3, 1]}})
+    made = train_params({"follow": {"min_error": 1}, "geometry": {"rounds": [3, 1]}})
     assert isinstance(made, ExplicitParams)
-    assert made.mesh.trust == 1.0 and made.geometry.rounds == (3.0, 1.0)
+    assert made.follow.min_error == 1.0 and made.geometry.rounds == (3.0, 1.0)
 
 
 @pytest.mark.parametrize("key", sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD))
@@ -99,7 +99,7 @@ def test_keys_of_the_perceptrons_are_refused_by_the_explicit_model(key: str) -> 
     assert "`mlp`" in str(caught.value.remedy)
 
 
-@pytest.mark.parametrize("key", ["mesh", "geometry", "textures"])
+@pytest.mark.parametrize("key", ["follow", "geometry", "textures"])
 def test_keys_of_the_explicit_model_are_refused_by_the_perceptrons(key: str) -> None:
     with pytest.raises(UserError) as caught:
         train_params({"preset": "paper", key: {}})
@@ -183,3 +183,10 @@ def test_every_key_is_described() -> None:
                 yield from undescribed(field.annotation, f"{path}.{name}")
 
     assert [key for stage, kinds in SECTIONS.items() for kind in kinds for key in undescribed(kind, stage)] == []
+
+
+def test_there_are_few_keys() -> None:
+    """A key needs a user who would turn it; what nobody turns is a constant beside the code that uses it."""
+    counts = {section: len(list(leaves(section))) for _, section in sections()}
+    assert sum(counts.values()) <= 120
+    assert counts[ExplicitParams()] <= 60

@@ -9,6 +9,8 @@ import numpy as np
 from facefolds_core.adam import decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, kernels_gpu, shading_kernel, smoothing
+from facefolds_core.training.explicit.rates import BETAS
+from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
 from tests.gpu.problem import Problem
 
 FAST = ExplicitParams()
@@ -19,12 +21,11 @@ TEXELS = SHAPE[0] * SHAPE[1]
 def shading(late: bool, shining: bool) -> Problem:
     """A step of the rounds of geometry, or one of those after them; a third of the alphas is faint."""
     rng = np.random.default_rng(0)
-    textures = FAST.textures
     codes = rng.integers(1, 65536, (RAYS, LAYERS, 2)).astype(np.uint16)
     codes[rng.random((RAYS, LAYERS)) < 0.2] = 0
     texture = rng.random((*SHAPE, LAYERS, 4), np.float32)
     texture[..., 3] *= rng.choice(np.array([0.002, 0.2, 0.9], np.float32), (*SHAPE, LAYERS))
-    faint = np.float32(textures.min_alpha if late else 0.0)
+    faint = np.float32(MIN_ALPHA if late else 0.0)
     opacity = rng.integers(0, 256, (2, RAYS, 1))
     arguments = {
         "codes": codes,
@@ -36,7 +37,7 @@ def shading(late: bool, shining: bool) -> Problem:
         "texture": texture,
         "shine": rng.random((RAYS if shining else 0, 3), np.float32) * 0.4 - 0.2,
         "gradient": np.zeros((LAYERS, *SHAPE, 4), np.float32),
-        "terms": (faint, textures.min_light, False),
+        "terms": (faint, MIN_LIGHT, False),
         "squares": np.zeros(4),
     }
 
@@ -55,7 +56,7 @@ def shading(late: bool, shining: bool) -> Problem:
 def contributions() -> Problem:
     given = shading(True, False).arguments
     arguments = {name: given[name] for name in ("codes", "rays", "texture")}
-    arguments |= {"peak": np.zeros((LAYERS, *SHAPE), np.float32), "min_light": FAST.textures.min_light}
+    arguments |= {"peak": np.zeros((LAYERS, *SHAPE), np.float32), "min_light": MIN_LIGHT}
     constants = {"LAYERS": LAYERS}
 
     def on_cpu(given: dict[str, Any]) -> None:
@@ -96,7 +97,7 @@ def adam() -> Problem:
         "rates": np.array([0.02, 0.006, 0.3, 0.01, 0.15], np.float32),
         "keep": np.float32(FAST.textures.frame_decay),
         "correct": np.array([1.5, 2.0, 4.0, 6.0], np.float32),
-        "decay": decays(FAST.textures.betas),
+        "decay": decays(BETAS),
     }
 
     def on_cpu(given: dict[str, Any]) -> None:

@@ -18,7 +18,7 @@ TINY = {
     "preset": "fast",
     "layers": 3,
     "iterations": 8,
-    "geometry": {"rounds": [1.0, 0.5], "round_iterations": 2, "round_stride": 2},
+    "geometry": {"rounds": [1.0, 0.5], "round_iterations": 2},
     "reflection": {"enabled": False},
     "textures": {"rays_per_texel": 0.3, "steps_per_frame": 1, "full_rate_iterations": 6},
 }

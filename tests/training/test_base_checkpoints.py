@@ -20,6 +20,7 @@ from facefolds_core.model.tensor_files import write_tensors
 from facefolds_core.params import ReflectionParams, SegmentParams
 from facefolds_core.training import patience
 from facefolds_core.training.explicit.checkpoints import STATE
+from facefolds_core.training.explicit.reflection import GlossParams
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.segments.loop import base_of
 from facefolds_core.training.segments.plan import TakePlan, plan_take
@@ -107,8 +108,8 @@ def test_a_base_with_a_reflection_goes_on_where_it_was(
         assert made.textures.reflection is not None
         return (made.folder / "model.safetensors").read_bytes()
 
-    def gain(_: object, __: object, asked: ReflectionParams) -> float:
-        return float(not turns or asked.gloss_smoothness > lit.reflection.gloss_smoothness)
+    def gain(_: object, __: object, asked: GlossParams) -> float:
+        return float(not turns or asked.gloss_smoothness > GlossParams().gloss_smoothness)
 
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
         expected = base(tmp_path / "whole")

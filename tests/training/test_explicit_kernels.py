@@ -11,9 +11,10 @@ from facefolds_core import scatter
 from facefolds_core.adam import decays
 from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.model.grids import GridTextures
-from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel
+from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.smoothing import smooth, smooth_reference
+from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
 
@@ -42,9 +43,7 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
     }
 
 
-FAST = ExplicitParams()
-LIGHT = FAST.textures.min_light
-SETTINGS = {"rounds of geometry": (0.0, LIGHT), "textures": (FAST.textures.min_alpha, LIGHT), "stronger": (0.05, 0.1)}
+SETTINGS = {"rounds of geometry": (0.0, MIN_LIGHT), "textures": (MIN_ALPHA, MIN_LIGHT), "stronger": (0.05, 0.1)}
 """What is faint, what is hidden: as in production, and one that shows."""
 
 
@@ -62,7 +61,7 @@ def test_shading_matches_autograd(rays: int, layers: int, shape: tuple[int, int]
     assert squares == pytest.approx(float(total), rel=1e-5)  # seen: 4e-7
 
 
-@pytest.mark.parametrize("least", [LIGHT, 0.3])
+@pytest.mark.parametrize("least", [MIN_LIGHT, 0.3])
 def test_errors_by_texel_match_autograd(least: float) -> None:
     p = _problem(600, 4, (9, 7))
     sums = np.zeros((4, 9, 7, 4), np.float32)
@@ -76,7 +75,7 @@ def test_what_is_cut_out_needs_no_layers_where_it_is_clear() -> None:
     p = _problem(50, 3, (6, 6))
     p["cut"][:], p["texture"][..., 3] = 0, 0
     gradient = np.zeros((3, 6, 6, 4), np.float32)
-    assert shading_kernel.shade(*p.values(), gradient, 0.0, LIGHT, False) == pytest.approx(0, abs=1e-9)
+    assert shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False) == pytest.approx(0, abs=1e-9)
     assert np.abs(gradient).max() < 1e-5
 
 
@@ -91,9 +90,9 @@ def test_contributions_match_the_reference() -> None:
     p = _problem(500, 5, (9, 7))
     p["texture"][..., 3] *= 1.9
     peak = np.zeros((5, 9, 7), np.float32)
-    shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, LIGHT)
+    shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, MIN_LIGHT)
     expected = reference.contributions(
-        torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]), LIGHT
+        torch.from_numpy(p["codes"].astype(np.int32)), torch.from_numpy(p["texture"]), MIN_LIGHT
     )
     torch.testing.assert_close(torch.from_numpy(peak), expected, atol=1e-6, rtol=0)  # seen: 2.7e-7
 
@@ -103,7 +102,7 @@ def test_shading_at_extreme_alphas(alpha: float) -> None:
     p = _problem(50, 4, (6, 6))
     p["texture"][..., 3] = alpha
     gradient = np.zeros((4, 6, 6, 4), np.float32)
-    assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.0, LIGHT, False))
+    assert np.isfinite(shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False))
     assert np.isfinite(gradient).all()
 
 
@@ -113,9 +112,9 @@ def test_shading_does_not_depend_on_the_number_of_threads() -> None:
         numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
         p = _problem(2 * scatter.CHUNK + 1000, 6, (9, 9))
         gradient = np.zeros((6, 9, 9, 4), np.float32)
-        squares = shading_kernel.shade(*p.values(), gradient, 0.0, LIGHT, False)
+        squares = shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False)
         peak = np.zeros((6, 9, 9), np.float32)
-        shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, LIGHT)
+        shading_kernel.contributions(p["codes"], p["rays"], p["texture"], peak, MIN_LIGHT)
         results.append((gradient, peak, squares))
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     for other in results[1:]:
@@ -128,7 +127,7 @@ def test_every_layer_is_somebodys_task(layers: int) -> None:
     assert sorted(scatter.spread(task, layers) for task in range(layers)) == list(range(layers))
 
 
-@pytest.mark.parametrize("betas", [FAST.textures.betas, (0.5, 0.7)])
+@pytest.mark.parametrize("betas", [BETAS, (0.5, 0.7)])
 def test_adam_step_matches_the_reference(betas: tuple[float, float]) -> None:
     torch.manual_seed(0)
     m, n = 40, 5

@@ -129,11 +129,13 @@ def test_layers_are_as_thin_as_asked_for_where_the_subject_is_sharp() -> None:
 
 
 @pytest.mark.parametrize(("pixel", "most"), [(0.001, 0.008), (0.002, 0.015), (0.0002, 0.006)])
-def test_layers_are_no_more_than_so_many_pixels_wide(pixel: float, most: float) -> None:
-    params = GEOMETRY.model_copy(update={"halfwidth": 0.006, "max_halfwidth": 0.015, "max_halfwidth_pixels": 8.0})
+def test_layers_are_no_more_than_so_many_pixels_wide(
+    pixel: float, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    params = GEOMETRY.model_copy(update={"halfwidth": 0.006, "max_halfwidth": 0.015})
     assert fit.greatest_halfwidth(params, pixel) == pytest.approx(most)
-    anyhow = params.model_copy(update={"max_halfwidth_pixels": math.inf})
-    assert fit.greatest_halfwidth(anyhow, pixel) == pytest.approx(0.015)
+    monkeypatch.setattr(fit, "MAX_HALFWIDTH_PIXELS", math.inf)
+    assert fit.greatest_halfwidth(params, pixel) == pytest.approx(0.015)
 
 
 def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camera(
@@ -185,14 +187,12 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
     train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
-    assert GEOMETRY.min_radius <= model.manifolds.radii().min().item() < GEOMETRY.min_radius + 0.05
+    assert fit.MIN_RADIUS <= model.manifolds.radii().min().item() < fit.MIN_RADIUS + 0.05
 
 
 def test_wide_layers_keep_their_distance_from_the_centre() -> None:
     halfwidth = np.array([0.006, 0.03, 0.2])
-    assert (
-        fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= GEOMETRY.min_radius - 1e-12
-    ).all()
+    assert (fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= fit.MIN_RADIUS - 1e-12).all()
 
 
 def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:

@@ -11,13 +11,13 @@ from facefolds_core.adam import decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import follow_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors
-from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS
+from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.views import StillRays, Views
 
 PARAMS = ExplicitParams()
-LIGHT = PARAMS.textures.min_light
 LAYERS, SHAPE, RAYS = 4, (9, 7), 600
-RATES = np.array([PARAMS.follow.rate, PARAMS.follow.rate * PARAMS.textures.alpha_rate], np.float32)
+RATES = np.array([PARAMS.follow.rate, PARAMS.follow.rate * ALPHA_RATE], np.float32)
 
 
 def random_views(rays: int = RAYS) -> Views:
@@ -34,9 +34,9 @@ def random_texture() -> np.ndarray:
 def test_shares_match_the_reference() -> None:
     views, texture = random_views(), random_texture()
     chosen = np.random.default_rng(3).random(SHAPE) < 0.5
-    found = follow_kernel.share_on(views.codes, texture, chosen, LIGHT)
+    found = follow_kernel.share_on(views.codes, texture, chosen, MIN_LIGHT)
     given = torch.from_numpy(views.codes.astype(np.int32)), torch.from_numpy(texture), torch.from_numpy(chosen)
-    torch.testing.assert_close(torch.from_numpy(found), reference.share_on(*given, LIGHT), atol=1e-6, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(found), reference.share_on(*given, MIN_LIGHT), atol=1e-6, rtol=0)
 
 
 def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
@@ -52,11 +52,10 @@ def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
     rates, correct = torch.tensor([0.02, 0.3]), torch.tensor([1.5, 2.0])
     compiled = [x.clone().numpy() for x in (*values, *moments, texture)]
     pushed = gradient.permute(1, 0, 2).contiguous().numpy()
-    betas = PARAMS.textures.betas
-    tail = rates.numpy(), correct.numpy(), decays(betas)
+    tail = rates.numpy(), correct.numpy(), decays(BETAS)
     follow_kernel.follow_step(own, near, *(x.numpy() for x in static), *compiled, pushed, *tail)
     expected = [x.clone() for x in (*values, *moments, texture)]
-    reference.follow_step(torch.from_numpy(own), static, *expected, gradient, rates, correct, betas)
+    reference.follow_step(torch.from_numpy(own), static, *expected, gradient, rates, correct, BETAS)
     for a, b in zip(compiled, expected, strict=True):
         torch.testing.assert_close(torch.from_numpy(a), b, atol=1e-5, rtol=1e-4)
     others = np.setdiff1d(np.arange(m), own)

@@ -13,7 +13,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.track import Track
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import MovingParams
-from facefolds_core.training.explicit.views import MovingRays, first_pixel, trace_views
+from facefolds_core.training.explicit.views import MovingRays, Sampling, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
 from tests.scenes import CENTRE, make_scene
@@ -32,8 +32,9 @@ def layers() -> RadialManifolds:
     return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
-def rays(scene: Scene, stride: int = 1, share: float = 400.0, **params: int) -> MovingRays:
-    return MovingRays(scene, layers(), stride, share, MovingParams(**{"shares": 1000, "sample": 1, **params}))
+def rays(scene: Scene, stride: int = 1, share: float = 400.0, **keys: int) -> MovingRays:
+    sampling = Sampling(shares=keys.pop("shares", 1000), sample=keys.pop("sample", 1))
+    return MovingRays(scene, layers(), stride, share, MovingParams(**keys), sampling=sampling)
 
 
 def seen(found: MovingRays, frame: int, parts: int) -> dict[tuple[int, int], tuple[int, ...]]:

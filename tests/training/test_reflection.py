@@ -19,7 +19,14 @@ from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit import reference
 from facefolds_core.training.explicit.gloss import GlossFit
-from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded, smoothed
+from facefolds_core.training.explicit.reflection import (
+    GlossParams,
+    centred,
+    fit_maps,
+    gain_on_cameras,
+    grounded,
+    smoothed,
+)
 from facefolds_core.training.explicit.reflection_kernel import look, normal_equations
 from facefolds_core.training.explicit.reflection_maps import (
     Maps,
@@ -33,7 +40,8 @@ from facefolds_core.training.explicit.views import Views
 from tests.training.test_explicit_kernels import random_cut
 
 WINDOW = (-0.5, 0.4, -0.3, 0.6)
-PARAMS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
+KEYS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
+PARAMS = GlossParams()
 
 
 def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8), environment: int = 8) -> Maps:
@@ -124,7 +132,7 @@ def test_normal_equations_are_those_of_a_dense_matrix() -> None:
 
 def _start(truth: Maps) -> Maps:
     """The right normals, nothing else known."""
-    return Maps.blank(truth.normals, PARAMS)
+    return Maps.blank(truth.normals, KEYS)
 
 
 def _seen(maps: Maps, strength: float, noise: float = 0.01, turned: bool = False) -> Seen:
@@ -179,11 +187,11 @@ def test_a_smoother_one_is_asked_for_where_little_is_gained(
 ) -> None:
     truth = _random_maps(3)
     seen, start = _seen(truth, 0.2), _start(truth)
-    gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, PARAMS, None)
+    gloss = GlossFit(Chart((0.0, 0.0, 0.0)), WINDOW, KEYS, None)
     gloss.maps, gloss._normals = start, start.surface
     state = SimpleNamespace(shine=np.ones((3, 3), np.float32))
 
-    def gain(_: Seen, __: Maps, asked: ReflectionParams) -> float:
+    def gain(_: Seen, __: Maps, asked: GlossParams) -> float:
         return fine if asked == PARAMS else smooth
 
     with patch("facefolds_core.training.explicit.gloss.gain_on_cameras", gain):
@@ -245,14 +253,14 @@ def test_normals_lean_as_the_reflection_asks_for() -> None:
     tilt = np.asarray(0.15 * np.stack([np.cos(angle), np.sin(angle)], -1), np.float32)
     truth = replace(given, tilt=tilt)
     seen, start = _seen(truth, 1.0), replace(given, tilt=np.zeros_like(tilt))
-    found = fit_maps(seen, start, 12, PARAMS.model_copy(update={"normal_smoothness": 0.01}))
+    found = fit_maps(seen, start, 12, replace(PARAMS, normal_smoothness=0.01))
     assert np.median(np.linalg.norm(found.tilt - tilt, axis=-1)) < 0.05
     assert np.abs(found.tilt).max() <= PARAMS.max_tilt
 
 
 def test_normals_stay_where_they_are_asked_to() -> None:
     truth = _random_maps(3)
-    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, PARAMS.model_copy(update={"normals": False}))
+    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, replace(PARAMS, normals=False))
     np.testing.assert_array_equal(found.tilt, 0)
     np.testing.assert_allclose(found.normals, tilted(truth.surface, 0 * truth.tilt))
 

@@ -10,11 +10,8 @@ import trimesh
 
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import directions_to_uv
-from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.tracked import blend, mesh_radii
+from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii
 
-PARAMS = ExplicitParams()
-MESH = PARAMS.mesh
 AXIS = -0.2
 
 

@@ -10,6 +10,23 @@ from torch import Tensor
 from facefolds_core.training.explicit.plan import Epochs
 
 
+@dataclass(frozen=True)
+class DivergenceParams:
+    """When a level of training is begun again, and how often.
+
+    Attributes:
+        error_ratio: a squared error this many times the best of its level is a divergence.
+        smoothing: share of the newest step in the running mean of the error.
+        attempts: each at a lower learning rate; then training ends with a message.
+        slow_down: the learning rate is divided by this before a level is begun again.
+    """
+
+    error_ratio: float = 9.0
+    smoothing: float = 0.1
+    attempts: int = 4
+    slow_down: float = 3.0
+
+
 @dataclass
 class Attempt:
     """At a level.
@@ -36,13 +53,9 @@ class Attempt:
         self.tries, self.step, self.epochs = self.tries + 1, 0, epochs
         self.best, self.recent = float("inf"), float("nan")
 
-    def heed(self, error: float, smoothing: float, most: float) -> bool:
-        """Take in the error of a step; False if the level diverges.
-
-        Args:
-            smoothing: share of the newest error in the smoothed one.
-            most: times its least that the smoothed error may be.
-        """
-        self.recent = error if self.step == 0 else (1 - smoothing) * self.recent + smoothing * error
+    def heed(self, error: float, params: DivergenceParams) -> bool:
+        """Take in the error of a step; False if the level diverges."""
+        share = params.smoothing
+        self.recent = error if self.step == 0 else (1 - share) * self.recent + share * error
         self.best = min(self.best, self.recent)
-        return bool(np.isfinite(error)) and self.recent <= most * self.best + 1e-4
+        return bool(np.isfinite(error)) and self.recent <= params.error_ratio * self.best + 1e-4

@@ -28,7 +28,7 @@ from facefolds_core.subject.outline import (
 from facefolds_core.subject.sight import seen_share
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
-from facefolds_core.training.explicit.tracked import blend, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,15 @@ FINEST = 0.7
 """Voxels are no smaller than so many pixels of the median camera."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
+WINDOW_MARGIN = 0.04
+"""Margin of the window in u and v beyond what holds the subject."""
+MAX_HALFWIDTH_PIXELS = 8.0
+"""Largest distance of a layer from the middle, pixels of the median camera; `geometry.halfwidth` is always allowed."""
+MIN_RADIUS = 0.08
+"""Least radius of a layer's middle, units: at c the search for crossings ends."""
+RADIUS_QUANTILE = 0.9
+"""`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
+where texels are largest."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +90,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
     visible = visible_points(coarse, cameras)
     chart, losses = choose_chart(coarse, visible, start)
-    surface, notes = trusted_surface(scene, coarse, chart, params)
+    surface, notes = trusted_surface(scene, coarse, chart, start)
     vertices = None if surface is None else surface[0].astype(np.float64)
     window = fit_window(coarse, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
@@ -96,21 +105,21 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_share(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
-        known, kept = blend(mesh, seen.radius, params.mesh.reach)
-        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, params.mesh.opacity), opacity)
-        source = fact("middle_from_mesh", reach=params.mesh.reach)
-    middle = extrapolate(known).clip(geometry.min_radius)
+        known, kept = blend(mesh, seen.radius, MESH.reach)
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH.opacity), opacity)
+        source = fact("middle_from_mesh", reach=MESH.reach)
+    middle = extrapolate(known).clip(MIN_RADIUS)
     most = greatest_halfwidth(geometry, pixel_size(scene))
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
     middle = np.maximum(middle, least_middle(widths, geometry))
-    radius = float(np.quantile(middle[opacity >= start.subject_opacity], params.textures.radius_quantile))
+    radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         chart=chart,
         window=window,
         middle=middle,
         halfwidth=widths,
-        trust=params.mesh.trust * kept,
+        trust=MESH.trust * kept,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
@@ -126,7 +135,7 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float) -> 
     start, geometry = params.start, params.geometry
     return (
         fact("centre_chosen", tie=start.centre_tie, lost=lost),
-        fact("window_chosen", opacity=start.subject_opacity, margin=start.window_margin),
+        fact("window_chosen", opacity=start.subject_opacity, margin=WINDOW_MARGIN),
         middle,
         fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
         fact("texels_chosen", pixels=params.textures.pixels_per_texel),
@@ -152,7 +161,7 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     if vertices is not None:
         places, _ = chart.uv(vertices[:: max(1, len(vertices) // 12)].reshape(-1, 3))
         held.append(places[((places >= lowest) & (places <= highest)).all(1) & (np.abs(places[:, 1]) <= 1)])
-    places, margin = np.concatenate(held), params.window_margin
+    places, margin = np.concatenate(held), WINDOW_MARGIN
     if not len(places):
         raise UserError(
             "nothing of what the cameras see has a place on the layers",
@@ -167,7 +176,7 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
 
 def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
     """Units; `pixel`: of the median camera at the subject, units."""
-    return max(params.halfwidth, min(params.max_halfwidth, params.max_halfwidth_pixels * pixel))
+    return max(params.halfwidth, min(params.max_halfwidth, MAX_HALFWIDTH_PIXELS * pixel))
 
 
 def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:
@@ -180,8 +189,8 @@ def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float
 
 
 def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
-    """The smallest middle radius with which no layer of any round comes nearer to c than `min_radius`."""
-    return params.min_radius + max(params.rounds) * halfwidth
+    """The smallest middle radius with which no layer of any round comes nearer to c than `MIN_RADIUS`."""
+    return MIN_RADIUS + max(params.rounds) * halfwidth
 
 
 def _nodes(window: Window, longest: int) -> tuple[int, int]:

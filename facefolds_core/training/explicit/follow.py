@@ -20,7 +20,8 @@ from facefolds_core.adam import corrections, decays
 from facefolds_core.hit_codes import before
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
-from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS, falling
+from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import Pictures
 from facefolds_core.training.explicit.views import Rays, Views
 
@@ -60,14 +61,14 @@ def follow(
 def follow_rates(params: ExplicitParams, rate: float) -> NDArray[np.float32]:
     """(2,) for colours and for logits of alpha, after a training whose own learning rate has come to `rate`."""
     own = params.follow.rate * rate / params.textures.learning_rate
-    return own * np.array([1, params.textures.alpha_rate], np.float32)
+    return own * np.array([1, ALPHA_RATE], np.float32)
 
 
 def mean_errors(state: TextureState, source: Rays, pictures: Pictures, frame: int, light: Light) -> Errors:
     """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
     (h, w), n = state.shape, state.layers.shape[2]
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
-    cut, behind, least = pictures.cut(frame), pictures.behind, state.params.textures.min_light
+    cut, behind, least = pictures.cut(frame), pictures.behind, MIN_LIGHT
     shares = list(source.in_use(frame))
     enough = 4 * state.params.textures.rays_per_texel * h * w  # as many rays as of four steps
     apart = max(1, int(sum(len(views.pixel) for views in shares) / enough))
@@ -110,8 +111,8 @@ def follow_frame(
     values[0][own] -= errors[own]
     cut, texture = pictures.cut(frame), _texture(state, frame)
     random = np.random.default_rng(frame)
-    params, textures = state.params.follow, state.params.textures
-    apart = _apart(len(views.pixel), h * w * textures.rays_per_texel)
+    params = state.params.follow
+    apart = _apart(len(views.pixel), h * w * state.params.textures.rays_per_texel)
     for step in range(params.steps):
         pictures.shuffle(random)
         shading_kernel.shade(
@@ -124,11 +125,10 @@ def follow_frame(
             texture,
             shine,
             state.gradient.numpy().reshape(n, h, w, 4),
-            textures.min_alpha,
-            textures.min_light,
+            MIN_ALPHA,
+            MIN_LIGHT,
             False,
         )
-        falling = 1 - (1 - textures.final_rate) * step / params.steps
         follow_kernel.follow_step(
             own,
             near,
@@ -139,9 +139,9 @@ def follow_frame(
             alphas,
             texture.reshape(h * w, n, 4),
             state.gradient.numpy(),
-            rates * np.float32(falling),
-            np.array(corrections(textures.betas, step + 1), np.float32),
-            decays(textures.betas),
+            rates * np.float32(falling(step / params.steps)),
+            np.array(corrections(BETAS, step + 1), np.float32),
+            decays(BETAS),
         )
 
 
@@ -155,7 +155,7 @@ def _rays_on(
     state: TextureState, source: Rays, frame: int, chosen: NDArray[np.bool_], light: Light
 ) -> tuple[Views, NDArray[np.float32]]:
     """The rays of which chosen texels are enough, and what the reflection adds to them."""
-    texture, least, params = _texture(state, frame), state.params.textures.min_light, state.params.follow
+    texture, least, params = _texture(state, frame), MIN_LIGHT, state.params.follow
     parts, shine = [], []
     for views in source.in_use(frame):
         light(state, views, frame)

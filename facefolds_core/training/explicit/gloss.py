@@ -16,7 +16,15 @@ from facefolds_core.model.reflection import Reflection
 from facefolds_core.params import ReflectionParams
 from facefolds_core.spacing import spread
 from facefolds_core.training.explicit.plan import Level
-from facefolds_core.training.explicit.reflection import centred, fit_maps, gain_on_cameras, grounded, smoothed
+from facefolds_core.training.explicit.reflection import (
+    GLOSS,
+    GlossParams,
+    centred,
+    fit_maps,
+    gain_on_cameras,
+    grounded,
+    smoothed,
+)
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
 from facefolds_core.training.explicit.state import TextureState
 from facefolds_core.training.explicit.targets import Pictures
@@ -29,14 +37,17 @@ class GlossFit:
     Attributes:
         maps: as fitted last; None before the first fit, and where there is no reflection.
         on: whether there is one.
-        smoother: how many times as smooth as `params` say its maps are: 1, or what `params` have where that helps.
+        smoother: how many times as smooth as usual its maps are: 1, or what `how` has where that helps.
 
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
+        how: it is fitted.
     """
 
-    def __init__(self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None) -> None:
-        self.chart, self.window, self.params, self.poses = chart, window, params, poses
+    def __init__(
+        self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None, how: GlossParams = GLOSS
+    ) -> None:
+        self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
@@ -46,7 +57,7 @@ class GlossFit:
         if not self.on:
             return
         radii, shape = middle.cpu().numpy().astype(np.float64), map_shape(self.window, self.params.texels)
-        self._normals = surface_normals(radii, self.chart, self.window, shape, self.params.normal_blur)
+        self._normals = surface_normals(radii, self.chart, self.window, shape, self.how.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, surface=self._normals)
             if self.poses is None:
@@ -91,28 +102,28 @@ class GlossFit:
         assert self._normals is not None
         start = Maps.blank(self._normals, self.params) if first else self.maps
         assert start is not None
-        rounds = self.params.first_rounds if first else self.params.rounds
-        params = smoothed(self.params, self.smoother)
-        maps = grounded(fit_maps(used, start, rounds, params))
+        rounds = self.how.first_rounds if first else self.how.rounds
+        how = smoothed(self.how, self.smoother)
+        maps = grounded(fit_maps(used, start, rounds, how))
         # Textures that are still trained would follow an offset that takes up what they leave over.
-        self.maps = maps if done else centred(maps, used, params)
+        self.maps = maps if done else centred(maps, used, how)
         self._shine(state, seen)
 
     def _decide(self, state: TextureState, seen: Seen) -> Fact:
         """Whether the reflection helps on cameras that its fit did not see, or a smoother one does more: it is fitted
         anew then. If neither does there is none from here on."""
         assert self._normals is not None
-        start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.params.min_gain
-        gain = smooth = gain_on_cameras(used, start, self.params)
-        if gain < self.params.sure_gain:
-            smooth = gain_on_cameras(used, start, smoothed(self.params, self.params.smoother))
+        start, used, least = Maps.blank(self._normals, self.params), self._used(seen), self.how.min_gain
+        gain = smooth = gain_on_cameras(used, start, self.how)
+        if gain < self.how.sure_gain:
+            smooth = gain_on_cameras(used, start, smoothed(self.how, self.how.smoother))
         if gain >= max(least, smooth):
             return fact("reflection", gain=gain, least=least)
         begun, self.maps, state.shine = self.maps is not None, None, np.zeros((0, 3), np.float32)
         self.on = smooth >= least
         if not self.on:
             return fact("no_reflection", gain=max(gain, smooth), least=least)
-        self.smoother = self.params.smoother
+        self.smoother = self.how.smoother
         if begun:
             self._fit(state, seen, done=False)
         return fact("smooth_reflection", gain=smooth, fine=gain, least=least, times=self.smoother)
@@ -127,7 +138,7 @@ class GlossFit:
             return self._look_in_turns(state, source, pictures, self.poses)
         views = _views(source)
         sums = np.zeros((len(views.pixel), 6), np.float32)
-        frames = spread(range(len(state.steps)), self.params.frames)
+        frames = spread(range(len(state.steps)), self.how.frames)
         for frame in frames:
             state.look(views, pictures, frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames)).filled(views)
@@ -138,12 +149,12 @@ class GlossFit:
         Frames are looked at twice. What all their rays see would take up to a gigabyte; how many are opaque, and so
         which ones are taken, is not known before the last frame.
         """
-        frames = spread(range(len(state.steps)), self.params.moving_frames)
+        frames = spread(range(len(state.steps)), self.how.moving_frames)
         opaque, before, found = [], 0, []
         for frame in frames:
             views, _ = source.part(frame, 0, 1)
             sums = _seen(state, views, pictures, frame)
-            opaque.append(np.flatnonzero(sums[:, 3] >= self.params.min_opacity).astype(np.int32))
+            opaque.append(np.flatnonzero(sums[:, 3] >= self.how.min_opacity).astype(np.int32))
         step = self._step(sum(map(len, opaque)))
         for frame, there in zip(frames, opaque, strict=True):
             views = source.part(frame, 0, 1)[0].part(there[-before % step :: step])
@@ -154,12 +165,12 @@ class GlossFit:
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
-        opaque = np.flatnonzero(seen.opacity >= self.params.min_opacity)
+        opaque = np.flatnonzero(seen.opacity >= self.how.min_opacity)
         return seen.part(opaque[:: self._step(len(opaque))])
 
     def _step(self, count: int) -> int:
         """One of so many of `count` rays is used."""
-        return max(1, -(-count // self.params.rays))
+        return max(1, -(-count // self.how.rays))
 
     def _shine(self, state: TextureState, seen: Seen) -> None:
         assert self.maps is not None

@@ -8,8 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from facefolds_core.params import ExplicitParams, GeometryParams
+from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.fit import Fit
+
+HALF_SHARE = 0.4
+"""Of the iterations after the rounds of geometry, at half of the final texels a side; the others are at full
+resolution."""
+
+ROUND_STRIDE = 8
+"""At most every n-th pixel is looked at in the rounds of geometry."""
+
+ROUND_RAYS = 250_000
+"""Rays of all cameras that are looked at in the rounds, at least."""
 
 
 @dataclass(frozen=True)
@@ -73,17 +83,17 @@ def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Lev
         return max(16, fit.texels[0] // divisor), max(16, fit.texels[1] // divisor)
 
     geometry = params.geometry
-    stride = round_stride(geometry, pixels)
+    stride = round_stride(pixels)
     levels = [Level(size(4), geometry.round_iterations, stride, scale, False) for scale in geometry.rounds]
     rounds, least = geometry.round_iterations * len(levels), params.textures.steps_per_frame * frames
     rest = max(max(params.iterations, params.least_iterations) - rounds, least)
     pace = min(1.0, max(params.textures.full_rate_iterations - rounds, least, 1) / rest)
-    half = round(params.textures.half_share * rest)
+    half = round(HALF_SHARE * rest)
     levels.append(Level(size(2), half, 1, geometry.rounds[-1], False, pace))
     levels.append(Level(fit.texels, max(rest - half, frames), 1, geometry.rounds[-1], True, pace))
     return levels
 
 
-def round_stride(geometry: GeometryParams, pixels: int) -> int:
-    """Every so-manieth of `pixels` is looked at in the rounds: `round_rays` of them at least, if there are as many."""
-    return max(1, min(geometry.round_stride, pixels // geometry.round_rays))
+def round_stride(pixels: int) -> int:
+    """Every so-manieth of `pixels` is looked at in the rounds: `ROUND_RAYS` of them at least, if there are as many."""
+    return max(1, min(ROUND_STRIDE, pixels // ROUND_RAYS))

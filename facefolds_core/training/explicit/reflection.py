@@ -12,13 +12,12 @@ of each ray, which the textures are trained with. Whether there is any is asked 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from facefolds_core.params import ReflectionParams
 from facefolds_core.training.explicit.reflection_kernel import normal_equations
 from facefolds_core.training.explicit.reflection_maps import Array, Maps, Seen, values_at
 
@@ -26,7 +25,55 @@ TILT_STEP = 0.01
 """By which normals lean to find how the reflection follows them: under a tenth of a texel of the environment."""
 
 
-def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> Maps:
+@dataclass(frozen=True)
+class GlossParams:
+    """How the reflection is fitted, and how it is asked whether there is one.
+
+    Attributes:
+        normal_blur: smoothing of the radius map before normals are taken of it, standard deviation, nodes.
+        normals: let the normals lean from those of the radius map.
+        normal_smoothness: weight of the smoothness of how they lean.
+        max_tilt: largest tangent of the angle by which they lean, along each of two tangents.
+        gloss_smoothness: weight of the smoothness of gloss and offset.
+        environment_smoothness: weight of the smoothness of the environment.
+        frames: whose mean is looked at, at most.
+        moving_frames: of a turning head that are looked at one by one, at most.
+        rays: looked at in a fit, at most.
+        rounds: times that its parts are solved for in turn, in a fit.
+        first_rounds: such times in the first fit, and in those that tell whether the reflection helps.
+        min_opacity: rays that are less opaque are left out of the fits.
+        max_residual: larger differences between photo and model are clipped.
+        folds: groups of cameras that are left out in turn to tell whether it helps.
+        asked_smoothness: factor on the smoothness in the fits that tell whether it helps, which have fewer cameras.
+        smoother: factor on the smoothness with which it is asked again where it gains little.
+        sure_gain: gain on cameras left out, dB, from which on no smoother one is asked for.
+        min_gain: least gain on cameras left out, dB; with less there is no reflection.
+    """
+
+    normal_blur: float = 1.5
+    normals: bool = True
+    normal_smoothness: float = 0.3
+    max_tilt: float = 0.3
+    gloss_smoothness: float = 0.1
+    environment_smoothness: float = 0.03
+    frames: int = 3
+    moving_frames: int = 8
+    rays: int = 300_000
+    rounds: int = 4
+    first_rounds: int = 12
+    min_opacity: float = 0.9
+    max_residual: float = 0.25
+    folds: int = 4
+    asked_smoothness: float = 10.0
+    smoother: float = 10.0
+    sure_gain: float = 0.5
+    min_gain: float = 0.05
+
+
+GLOSS = GlossParams()
+
+
+def fit_maps(seen: Seen, start: Maps, rounds: int, params: GlossParams) -> Maps:
     """Gloss, offset, environment and the tilt of the normals that explain the residuals; the surface is that of
     `start`."""
     o, clip = seen.opacity, params.max_residual
@@ -55,7 +102,7 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: ReflectionParams) -> 
     return maps
 
 
-def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: ReflectionParams) -> Maps:
+def _lean(maps: Maps, seen: Seen, wanted: Array, axis: int, params: GlossParams) -> Maps:
     """The same with another tilt along one tangent: a Gauss-Newton step, kept within `max_tilt`."""
     step = np.zeros((1, 1, 2), np.float32)
     step[..., axis] = TILT_STEP
@@ -76,7 +123,7 @@ def grounded(maps: Maps) -> Maps:
     return replace(maps, environment=maps.environment - darkest, offset=maps.offset - maps.gloss[..., None] * darkest)
 
 
-def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
+def centred(maps: Maps, seen: Seen, params: GlossParams) -> Maps:
     """The same with the offset that leaves the mean over the rays at every place as it is without reflections."""
     light = values_at(maps.environment, maps.positions(seen)) * values_at(maps.gloss[..., None], seen.st)
     weight = seen.opacity**2
@@ -84,7 +131,7 @@ def centred(maps: Maps, seen: Seen, params: ReflectionParams) -> Maps:
     return replace(maps, offset=offset)
 
 
-def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
+def gain_on_cameras(seen: Seen, start: Maps, params: GlossParams) -> float:
     """dB that the reflection wins on rays of cameras that its fit did not see, each camera left out once."""
     params = smoothed(params, params.asked_smoothness)
     before = after = 0.0
@@ -101,10 +148,13 @@ def gain_on_cameras(seen: Seen, start: Maps, params: ReflectionParams) -> float:
     return 10 * float(np.log10(before / after)) if after > 0 and before > 0 else 0.0
 
 
-def smoothed(params: ReflectionParams, factor: float) -> ReflectionParams:
+def smoothed(params: GlossParams, factor: float) -> GlossParams:
     """With the smoothnesses of gloss, offset and environment times `factor`."""
-    names = "gloss_smoothness", "environment_smoothness"
-    return params.model_copy(update={name: factor * getattr(params, name) for name in names})
+    return replace(
+        params,
+        gloss_smoothness=factor * params.gloss_smoothness,
+        environment_smoothness=factor * params.environment_smoothness,
+    )
 
 
 def _solve(st: Array, weight: Array, wish: Array, shape: tuple[int, ...], smoothness: float) -> Array:

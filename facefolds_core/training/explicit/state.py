@@ -15,6 +15,7 @@ from torch import Tensor
 from facefolds_core.adam import corrections, decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
+from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
 from facefolds_core.training.explicit.targets import Pictures
@@ -22,6 +23,18 @@ from facefolds_core.training.explicit.views import Rays, Views
 
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
+
+MIN_OPACITY = 0.02
+"""Least opacity of all layers together at the start."""
+
+MAX_OPACITY = 0.9
+"""Largest opacity of all layers together at the start, so that inner layers are seen."""
+
+MIN_LIGHT = 0.002
+"""Layers behind less transmittance are skipped: speed, half a code of a pixel."""
+
+MIN_ALPHA = 0.002
+"""Layers with less alpha are skipped once the textures are at half resolution: speed, half a code of a pixel."""
 
 
 def model_bytes(texels: tuple[int, int], layers: int, frames: int) -> int:
@@ -77,7 +90,7 @@ class TextureState:
         self.layers[..., 3] = 0
         self.layers[1:, ..., :3] = 0
         n = self.layers.shape[2]
-        weight = self._start()[:, 3:].clamp(self.params.start.min_opacity, self.params.start.max_opacity) / n
+        weight = self._start()[:, 3:].clamp(MIN_OPACITY, MAX_OPACITY) / n
         alpha = weight / (1 - weight * torch.arange(n))
         self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
@@ -131,8 +144,7 @@ class TextureState:
     def _count_step(self, frame: int) -> NDArray[np.float32]:
         """(4,) bias corrections, see `adam_kernel.adam_step`, of one step more on a frame."""
         self.steps[frame] += 1
-        betas = self.params.textures.betas
-        static, own = corrections(betas, int(self.steps.sum())), corrections(betas, int(self.steps[frame]))
+        static, own = corrections(BETAS, int(self.steps.sum())), corrections(BETAS, int(self.steps[frame]))
         return np.array([*static, *own], np.float32)
 
     def _step(
@@ -159,7 +171,7 @@ class TextureState:
             self.shine,
             self.gradient.numpy().reshape(n, h, w, 4),
             min_alpha,
-            self.params.textures.min_light,
+            MIN_LIGHT,
             False,
         )
         adam_kernel.adam_step(
@@ -172,7 +184,7 @@ class TextureState:
             rates,
             self.kept_of_frames,
             correct,
-            decays(self.params.textures.betas),
+            decays(BETAS),
         )
         return squares
 
@@ -197,18 +209,18 @@ class TextureState:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
         (h, w), n = self.shape, self.layers.shape[2]
         texture = self.activated(frame).numpy().reshape(h, w, n, 4)
-        cut, behind, least = pictures.cut(frame), pictures.behind, self.params.textures.min_light
-        look(views.codes, views.camera, views.pixel, cut, behind, texture, seen, least)
+        cut, behind = pictures.cut(frame), pictures.behind
+        look(views.codes, views.camera, views.pixel, cut, behind, texture, seen, MIN_LIGHT)
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
         """[M, N]: what each texel adds to a ray's opacity at most, over all frames and, in `passes` parts, all rays."""
-        (h, w), frames, least = self.shape, len(self.steps), self.params.textures.min_light
+        (h, w), frames = self.shape, len(self.steps)
         n = self.layers.shape[2]
         peak = torch.zeros(n, h, w)
         for i in range(max(passes, frames)):
             views, rays = source.part(i % frames, i % passes, passes)
             texture = self.activated(i % frames).view(h, w, n, 4)
-            shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), least)
+            shading_kernel.contributions(views.codes, rays, texture.numpy(), peak.numpy(), MIN_LIGHT)
         return peak.view(n, -1).T.contiguous()
 
     def hide(self, unseen: Tensor) -> None:

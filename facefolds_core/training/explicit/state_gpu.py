@@ -14,7 +14,8 @@ from torch import Tensor
 from facefolds_core import gpu
 from facefolds_core.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
-from facefolds_core.training.explicit.state import TextureState
+from facefolds_core.training.explicit.rates import BETAS
+from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
 from facefolds_core.training.explicit.targets import Pictures
 from facefolds_core.training.explicit.views import Rays, Views
 
@@ -115,7 +116,6 @@ class GpuTextureState(TextureState):
     ) -> float:
         away, (h, w) = self._go(), self.shape
         m, n = away.texture.shape[:2]
-        textures = self.params.textures
         self._activate(away, frame)
         away.squares.copy_to_device(np.zeros(SUMS))
         kernels_gpu.shade.run(
@@ -127,7 +127,7 @@ class GpuTextureState(TextureState):
             away.texture.reshape(h, w, n, 4),
             self._kept.get("shine", self.shine, lambda: (gpu.to_gpu(self.shine),))[0],
             away.gradient.reshape(n, h, w, 4),
-            (np.float32(min_alpha), textures.min_light, False),
+            (np.float32(min_alpha), MIN_LIGHT, False),
             away.squares,
             LAYERS=n,
         )
@@ -141,7 +141,7 @@ class GpuTextureState(TextureState):
             gpu.to_gpu(rates),
             self.kept_of_frames,
             gpu.to_gpu(correct),
-            gpu.to_gpu(decays(textures.betas)),
+            gpu.to_gpu(decays(BETAS)),
         )
         return float(away.squares.copy_to_host().sum())
 
@@ -171,8 +171,7 @@ class GpuTextureState(TextureState):
             views, rays = source.part(i % frames, i % passes, passes)
             self._activate(away, i % frames)
             codes, texture = self._views(views)[0], away.texture.reshape(h, w, n, 4)
-            least = self.params.textures.min_light
-            kernels_gpu.contributions.run(len(rays), codes, gpu.to_gpu(rays), texture, peak, least, LAYERS=n)
+            kernels_gpu.contributions.run(len(rays), codes, gpu.to_gpu(rays), texture, peak, MIN_LIGHT, LAYERS=n)
         return torch.from_numpy(peak.copy_to_host()).view(n, -1).T.contiguous()
 
 

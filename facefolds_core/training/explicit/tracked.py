@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
@@ -10,29 +12,58 @@ from scipy import ndimage
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.params import ExplicitParams, MeshParams, StartParams
+from facefolds_core.params import StartParams
 from facefolds_core.subject.outline import profile, whole_window, window_uv
 from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class MeshParams:
+    """How far a tracked mesh is believed, where there is one.
+
+    Attributes:
+        reach: where the Gaussians lie outside the mesh by more, units, they are believed: a mesh knows no hair.
+        max_distance: a direction in which mesh and Gaussians lie farther apart, units, is off.
+        max_share_off: a mesh that is off in more than this share of the directions is left out.
+        nodes: rows and columns of (u, v) at which mesh and Gaussians are compared.
+        trust: the mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much.
+        opacity: at the start, where only the mesh has a surface.
+    """
+
+    reach: float = 0.03
+    max_distance: float = 0.02
+    max_share_off: float = 0.5
+    nodes: int = 128
+    trust: float = 0.004
+    opacity: float = 0.9
+
+
+MESH = MeshParams()
+
+
 def trusted_surface(
-    scene: Scene, volume: Volume, chart: Chart, params: ExplicitParams
+    scene: Scene, volume: Volume, chart: Chart, start: StartParams, params: MeshParams = MESH
 ) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
     """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
     surface = scene.load_surface()
     if surface is None:
         return None, ()
     vertices = surface[0].astype(np.float64)
-    share = share_off(volume, chart, vertices, surface[1], params.mesh, params.start)
-    if share <= params.mesh.max_share_off:
+    share = share_off(volume, chart, vertices, surface[1], start, params)
+    if share <= params.max_share_off:
         return surface, ()
-    return None, (fact("mesh_is_off", share=share, distance=params.mesh.max_distance),)
+    return None, (fact("mesh_is_off", share=share, distance=params.max_distance),)
 
 
 def share_off(
-    volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], params: MeshParams, start: StartParams
+    volume: Volume,
+    chart: Chart,
+    vertices: Array,
+    faces: NDArray[np.int32],
+    start: StartParams,
+    params: MeshParams = MESH,
 ) -> float:
     """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
     over `max_distance` apart; 0 where there are none. Nothing is compared behind the ears, where few cameras look."""

@@ -19,17 +19,21 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
-from facefolds_core.training.explicit.attempt import Attempt
+from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
-from facefolds_core.training.explicit.state import TextureState, on_one_thread, state_type
+from facefolds_core.training.explicit.rates import falling, rates_of
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_type
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
+
+LAYER_ALPHA = 1 / 255
+"""Outer or inner layers whose alpha is nowhere larger are dropped: no pixel changes by more."""
 
 
 class Trainer:
@@ -40,6 +44,8 @@ class Trainer:
         usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
         keep: called after each step; for checkpoints.
     """
+
+    divergence = DivergenceParams()
 
     def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
@@ -75,7 +81,7 @@ class Trainer:
         assert self.state is not None and self.views is not None
         lit = self.gloss.maps, self.state.shine
         at = begun or Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
-        while at.tries < self.params.divergence.attempts:
+        while at.tries < self.divergence.attempts:
             if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
                 if number >= len(self.params.geometry.rounds):
@@ -83,7 +89,7 @@ class Trainer:
                 return
             self.state.restore(at.saved)
             self.gloss.maps, self.state.shine = lit
-            self.rate /= self.params.divergence.slow_down
+            self.rate /= self.divergence.slow_down
             self.events.append(fact("diverged", level=number, rate=self.rate))
             bar.write(f"train: {self.events[-1]}")
             at.begin_again(Epochs(self.scene.num_frames, self.random))
@@ -151,10 +157,8 @@ class Trainer:
         with on_one_thread():
             nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
         radii = self.manifolds().radii().detach().double().numpy()
-        moved = (
-            self.middle
-            + torch.from_numpy(recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)).float()
-        )
+        offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
+        moved = self.middle + torch.from_numpy(offsets).float()
         start = torch.from_numpy(self.fit.middle).float()
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
         moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
@@ -168,7 +172,7 @@ class Trainer:
         stride = self._stride()
         self.state.pace = level.pace
         coarse = at.level < len(self.params.geometry.rounds)
-        min_alpha, divergence = 0.0 if coarse else self.params.textures.min_alpha, self.params.divergence
+        min_alpha = 0.0 if coarse else MIN_ALPHA
         for i in range(at.step, level.iterations):
             frame = at.epochs.next()
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
@@ -178,7 +182,7 @@ class Trainer:
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
             if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
-            if not at.heed(error, divergence.smoothing, divergence.error_ratio):
+            if not at.heed(error, self.divergence):
                 return False
             if self.gloss.due(i, level):
                 done = level.last and i == level.iterations - 1
@@ -206,10 +210,7 @@ class Trainer:
         return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
 
     def _rates(self, pace: float, progress: float) -> NDArray[np.float32]:
-        to = self.params.textures
-        rate = pace * self.rate * (1 - (1 - to.final_rate) * progress)
-        rates = rate * np.array([1, to.layer_rate, to.alpha_rate, to.frame_rate, to.frame_rate * to.alpha_rate])
-        return rates.astype(np.float32)
+        return rates_of(pace * self.rate * falling(progress))
 
     def _follow(self) -> None:
         """Frames where they lag behind what moves."""
@@ -224,9 +225,9 @@ class Trainer:
         state, n = self.state, self.params.layers
         assert self.views is not None
         state.forget_moments()
-        self.events += clear_texels(state, self.views, self._stride(), self.params)
+        self.events += clear_texels(state, self.views, self._stride(), self.params.pruning)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
-        kept = [i for i in range(n) if float(peak[i]) >= self.params.pruning.layer_alpha] or [n // 2]
+        kept = [i for i in range(n) if float(peak[i]) >= LAYER_ALPHA] or [n // 2]
         # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
         self.events += [

@@ -140,6 +140,24 @@ class StillRays:
         yield self.views
 
 
+@dataclass(frozen=True)
+class Sampling:
+    """How many rays of a turning head are traced, and looked at beforehand.
+
+    Attributes:
+        shares: of a frame's rays that are traced, each as large as a step takes.
+        sample: one ray in so many is looked at to estimate how many meet the subject.
+        frames: in which these are looked at.
+    """
+
+    shares: int = 3
+    sample: int = 64
+    frames: int = 6
+
+
+SAMPLING = Sampling()
+
+
 class MovingRays:
     """Of a head that turns: the cameras stand elsewhere in its own frame in each frame, so that each has crossings of
     its own. They are traced in shares when they are asked for, and kept while there is room.
@@ -149,9 +167,10 @@ class MovingRays:
         manifolds: the layers; later changes of them are not seen.
         stride: of the pixels that there are, as in `trace_views`.
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
-        params: how many shares a frame has in use, and how much is kept.
+        params: how much is kept.
         first: number of the first share of frame 0.
         gpu: whether they are traced on a GPU.
+        sampling: how many shares a frame has in use.
     """
 
     def __init__(
@@ -163,6 +182,7 @@ class MovingRays:
         params: MovingParams,
         first: int = 0,
         gpu: bool = False,
+        sampling: Sampling = SAMPLING,
     ) -> None:
         self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
@@ -171,13 +191,13 @@ class MovingRays:
         self._belt = manifolds.chart.numbers
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
-        frames = spread(range(scene.num_frames), params.sample_frames)
-        found = [len(self._traced(k, 0, params.sample).pixel) for k in frames]
-        self.count = params.sample * sum(found) // len(found)
+        frames = spread(range(scene.num_frames), sampling.frames)
+        found = [len(self._traced(k, 0, sampling.sample).pixel) for k in frames]
+        self.count = sampling.sample * sum(found) // len(found)
         if self.count == 0:
             raise _nothing_seen(scene)
         self.shares = max(1, int(self.count / share))
-        self._used = min(self.shares, params.shares)
+        self._used = min(self.shares, sampling.shares)
 
     def part(self, frame: int, phase: int, parts: int) -> tuple[Views, NDArray[np.int64]]:
         """See `Rays`. Of the shares of a frame only some are in use, in each frame others."""

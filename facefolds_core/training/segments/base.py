@@ -81,7 +81,7 @@ def digest_of_training(params: ExplicitParams) -> bytes:
     left_out = {"device", "preset", "segments"}
     values = params.model_dump(mode="json", exclude=left_out)
     digest.update(json.dumps(values, sort_keys=True).encode())
-    digest.update(digest_of_packages("training", "subject", "model", "geometry", "spacing").encode())
+    digest.update(digest_of_packages("training", "subject", "model", "geometry", "params", "spacing").encode())
     return digest.digest()
 
 

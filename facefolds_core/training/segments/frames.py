@@ -19,7 +19,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
-from facefolds_core.training.explicit.state import TextureState, state_type
+from facefolds_core.training.explicit.rates import falling, rates_of
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, state_type
 from facefolds_core.training.explicit.targets import CutOuts, OneFrame, Pictures
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
@@ -89,7 +90,7 @@ class FrameFitter:
         views = self._rays(frame, random)
         texels = state.shape[0] * state.shape[1]
         parts = max(1, int(views.count / (params.textures.rays_per_texel * texels)))
-        steps, min_alpha = params.segments.steps, params.textures.min_alpha
+        steps = params.segments.steps
         phases: list[int] = []
         rays, errors = 0, []
         pictures = OneFrame(self.pictures, frame)
@@ -99,7 +100,7 @@ class FrameFitter:
             if self.maps is not None and self.scene.poses is not None:
                 state.shine = self.maps.on_rays(seen, self.scene.poses.at(frame).rotation)
             pictures.shuffle(random)
-            errors.append(state.step(seen, which, pictures, 0, min_alpha, self._rates(i / steps)))
+            errors.append(state.step(seen, which, pictures, 0, MIN_ALPHA, self._rates(i / steps)))
             if i % params.textures.smooth_every == 0:
                 state.smooth_frame(0)
             rays += len(which)
@@ -142,9 +143,9 @@ class FrameFitter:
         return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first, self.gpu)
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
-        to = self.params.textures
-        rate = self.base.surroundings.rate * (1 - (1 - to.final_rate) * progress)
-        return np.array([0, 0, 0, rate * to.frame_rate, rate * to.frame_rate * to.alpha_rate], np.float32)
+        rates = rates_of(self.base.surroundings.rate * falling(progress))
+        rates[:3] = 0  # what all frames share stays as it is
+        return rates
 
 
 def shine_of(base: Base, params: ExplicitParams, views: Views) -> NDArray[np.float32]:

@@ -1,0 +1,47 @@
+"""What a level's encoders are told: the section as it is configured, and what follows from the meshes."""
+
+from __future__ import annotations
+
+from facefolds_core.packaging.settings import LevelSetting, MeshSetting
+from facefolds_core.params import CompressParams, LevelParams, MeshCodec, VideoCodec
+from tests.assets import cap_crops
+from tests.scenes import look_at_origin
+
+PARAMS = CompressParams(
+    mesh=MeshCodec(max_error_pixels=0.1, quantization_bits=11, texture_coordinate_bits=9, compression_level=3),
+    video=VideoCodec(crf=20, target_psnr=40.0, lossless=True, keyframe_interval=12),
+)
+COARSE = LevelParams(name="small", mesh_resolution=16, texture_resolution=64, crf=31)
+
+
+def test_the_full_level_is_coded_as_configured() -> None:
+    found = LevelSetting.of(PARAMS)
+    assert found.mesh == MeshSetting(11, 9, 3) and found.max_error_pixels == 0.1
+    video = PARAMS.video.model_dump()
+    assert {name: getattr(found.video, name) for name in video} == video
+
+
+def test_a_coarser_level_has_a_rate_and_an_error_of_its_own() -> None:
+    found = LevelSetting.of(PARAMS, COARSE)
+    assert (found.video.crf, found.video.target_psnr, found.video.lossless) == (31, None, False)
+    assert (found.video.keyframe_interval, found.max_error_pixels, found.mesh.compression_level) == (12, 0.1, 3)
+    assert LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).max_error_pixels == 0.5
+
+
+def test_a_stream_has_one_key_frame_a_segment() -> None:
+    assert LevelSetting.of(PARAMS, interval=60).video.keyframe_interval == 60
+    assert LevelSetting.of(PARAMS, COARSE, 60).video.keyframe_interval == 60
+
+
+def test_bits_of_a_mesh_follow_from_the_error_that_is_allowed() -> None:
+    layers, cameras = cap_crops(2, 1, 32), [look_at_origin("a", 0.0, 0.0, 64)]
+    asked = LevelSetting.of(PARAMS)
+    fine, coarse = (
+        LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": error})).fitted(layers, cameras)
+        for error in (0.05, 0.4)
+    )
+    assert coarse.mesh.quantization_bits < fine.mesh.quantization_bits <= 20
+    assert coarse.mesh.compression_level == 3
+    assert asked.fitted(layers, []) == asked  # nobody sees it
+    exact = LevelSetting.of(PARAMS.model_copy(update={"mesh": MeshCodec(quantization_bits=11)}))
+    assert exact.fitted(layers, cameras) == exact
