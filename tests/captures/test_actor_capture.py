@@ -159,7 +159,7 @@ def test_names_are_in_order() -> None:
 
 
 def _configure(folders: SubjectFolders, source: str, path: Path) -> None:
-    write_json(folders.config / "subject.json", {"source": source, "path": str(path)})
+    write_json(folders.config / "entry.json", {"source": source, "path": str(path)})
     write_json(folders.config / "capture.json", PARAMS.model_dump(mode="json"))
 
 

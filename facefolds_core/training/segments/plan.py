@@ -14,11 +14,12 @@ from facefolds_core.training.segments.base import (
     digests_of_frames,
     fingerprint_of_base,
 )
-from facefolds_core.training.segments.key_frames import chosen_key_frames
 from facefolds_core.training.segments.keys import (
     comparable,
+    farthest_first,
     likenesses,
     mixture,
+    named_frames,
 )
 
 
@@ -61,7 +62,7 @@ def plan_take(scene: Scene, params: ExplicitParams, key_frames: int) -> TakePlan
     """
     digests = digests_of_frames(scene, progress(range(scene.num_frames), desc="fingerprints", unit="frame"))
     parts, segments = likenesses(scene), params.segments
-    keys = chosen_key_frames(scene, parts, params, key_frames)
+    keys = named_frames(scene, segments.named) if segments.named else farthest_first(comparable(parts), key_frames)
     base = fingerprint_of_base(scene, digest_of_training(params), keys, digests)
     common = base.encode() + digest_of_fitting(params)
     names = [hashlib.sha256(common + digest).hexdigest()[:16] for digest in digests]
