@@ -59,7 +59,7 @@ def measure(name: str, project: Project, params: dict[str, Any]) -> list[list[st
     rows = []
     for device in ("cpu", "cuda"):
         project.write(merged(params, {"train": {"device": device}}))
-        project.run("configure", *(("capture", "normalize") if device == "cpu" else ()), "train")
+        project.run("configure", *(("capture", "normalize", "subject") if device == "cpu" else ()), "train")
         report, scores = training_of(project.folders), score(project, 3)
         memory = f"{report['peak_memory_bytes'] / 2**30:.2f} GiB"
         values = [f"{report['seconds']:.1f}", f"{scores.psnr:.2f}", memory, f"{report['rays_per_second']:.0f}"]

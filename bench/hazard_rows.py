@@ -137,7 +137,6 @@ def wrong_radius(shots: Shots, factor: float, random: Random) -> Shots:
 
 ODD_SIZES = {n: Film(height=h, width=w) for n, h, w in ((1.0, 97, 65), (2.0, 113, 53), (3.0, 71, 89))}
 """About as many pixels as 96 x 64."""
-RATE = (("mlp", "lr_manifold"), ("explicit", "volume.learning_rate"))
 SPACING = (("mlp", "level_halfwidth"), ("explicit", "geometry.halfwidth"))
 
 HAZARDS: tuple[Hazard, ...] = (
@@ -161,8 +160,6 @@ HAZARDS: tuple[Hazard, ...] = (
     Hazard("centre", "centre guessed wrong", (0.05, 0.1, 0.2), "{} units", world=wrong_centre),
     Hazard("radius", "radius of the mesh wrong", (0.9, 0.8, 0.6), "x {}", disturb=wrong_radius),
     Hazard("scale", "scale guessed wrong", (0.8, 1.25, 1.5), "x {}", world=wrong_scale),
-    Hazard("rate-low", "geometry's rate too low", (0.5, 0.3, 0.1), "x {}", scaled=RATE),
-    Hazard("rate-high", "geometry's rate too high", (2, 3, 10), "x {}", scaled=RATE),
     Hazard("spacing", "layer spacing", (0.5, 2, 4), "x {}", scaled=SPACING),
     Hazard("size", "odd resolutions", (1, 2, 3), "no. {}", film=lambda s: ODD_SIZES[s]),
 )

@@ -1,4 +1,4 @@
-"""Where trainers fail: bad captures, wrong starts, other rates and seeds, as what they cost on clean held-out views.
+"""Where trainers fail: bad captures, wrong starts, other spacings and seeds, as what they cost on clean held-out views.
 
 python -m bench.hazards                      # the actor's small film, a cut budget: docs/research/hazards.md, heat map
 python -m bench.hazards --subject actor      # a prepared scene, each preset's whole budget
@@ -40,12 +40,7 @@ MARKERS = ("<!-- written by bench/hazards.py -->", "<!-- end of what bench/hazar
 SEEDS = {"fast": 3, "paper": 1}
 """Of the film, without --seeds: with these the matrix takes less than an hour on two idle cores."""
 CUT: dict[str, dict[str, Any]] = {
-    "fast": {
-        **{
-            "iterations": 240,
-            "volume": {"levels": [{"resolution": n, "iterations": 50} for n in (40, 64)], "rays": 4096},
-        }
-    },
+    "fast": {"iterations": 240},
     "paper": {
         **{"manifold_width": 64, "output_scale": 1.0, "lr_manifold": 1e-4, "search_samples": 16, "rays": 512},
         **{"texture_layers": 3, "texture_width": 64, "lr_texture": 4e-3, "iterations": 250, "decay_interval": 250},
@@ -121,15 +116,16 @@ def disturbed(hazard: Hazard, strength: float, seed: int, source: Shots | None, 
 
 
 def train(project: Project, blank: Cell, hazard: Hazard) -> None:
-    """The stage `train` on the project's scene, with the cell's values of that section.
+    """The stages `subject` and `train` on the project's scene, with the cell's values of the latter's section.
 
     Raises:
         UserError: if it fails.
     """
     values: dict[str, Any] = {"preset": blank.preset, "seed": blank.seed}
     values |= {"device": "cpu", **deepcopy(CUT[blank.preset])} if blank.subject == FILM else {}
+    found = {"seed": blank.seed, **({"iterations": 600} if blank.subject == FILM else {})}
     subject = {"source": "actor", "path": "facefolds_core/captures/actor", "train": values}
-    params = {**own_params("actor", {}), "subjects": {"cell": subject}}
+    params = {**own_params("actor", {}), "subjects": {"cell": subject}, "subject": found}
     project.write(params)
     project.run("configure")
     usual = read_json(project.folders.config / "train.json")
@@ -140,7 +136,7 @@ def train(project: Project, blank: Cell, hazard: Hazard) -> None:
             place = reduce(lambda section, name: section.setdefault(name, {}), path, values)
             place[last] = blank.strength * given[last]
     project.write(params)
-    project.run("configure", "train")
+    project.run("configure", "subject", "train")
 
 
 def scored(model: Path, scene: Scene, truth: Scene) -> dict[str, Any]:

@@ -45,8 +45,11 @@ WATCH = """(() => {
     const poster = e?.shadowRoot?.querySelector('.poster');
     if (poster?.complete && poster.naturalWidth && !poster.hidden) marks.poster ??= performance.now();
     if (e?.ready) marks.picture ??= performance.now();
-    if (e?.ready && e.level === e.levels.at(-1)) return void (marks.full = performance.now());
-    requestAnimationFrame(look);
+    if (e && !marks.heard) {
+      marks.heard = true;
+      e.addEventListener('load', () => (marks.full = performance.now())); // as fine as this window shows
+    }
+    if (!marks.full) requestAnimationFrame(look);
   };
   requestAnimationFrame(look);
 })()"""

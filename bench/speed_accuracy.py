@@ -56,9 +56,9 @@ def score(project: Project, frames: int) -> Scores:
 
 @cache
 def prepare(project: Project) -> None:
-    """Its scene, anew, once for all trainings of this command."""
+    """Its scene and subject, anew, once for all trainings of this command."""
     project.write(own_params(project.subject, {}))
-    project.run("configure", "capture", "normalize")
+    project.run("configure", "capture", "normalize", "subject")
 
 
 def measure(project: Project, blank: Measurement) -> Measurement:

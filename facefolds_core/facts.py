@@ -98,7 +98,7 @@ WORDS = {
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",
     "matte_is_found": "warning: no masks, and not of all scored pictures mattes: scores are taken where the model "
     "itself is opaque, so that one training's cannot be compared with another's. Give masks of the scored cameras, or "
-    "find mattes: `matte: {{method: auto}}` in params.yaml, and name those that it leaves out (docs/guide/subjects.md)",
+    "run `dvc repro`, whose stage `subject` finds mattes (docs/guide/subjects.md)",
     "training_view_bad": "warning: training camera {camera} sees the asset with {psnr:.1f} dB only in frame {frame}, "
     "the median training camera with {median:.1f}: look at evaluation/pictures/training_{camera}.png (photo beside "
     "asset); is its calibration wrong, does something stand before the subject, or are there too few cameras on its "

@@ -200,6 +200,11 @@ def check_mattes_place(path: str, folders: SubjectFolders) -> Path:
     return _check_place(path, folders, "mattes", "mattes of your own")
 
 
+def check_start_place(path: str, folders: SubjectFolders) -> Path:
+    """The same of the file of Gaussians that a subject names."""
+    return _check_place(path, folders, "start", "Gaussians of your own")
+
+
 def _check_place(path: str, folders: SubjectFolders, key: str, what: str) -> Path:
     check_path_text(path, folders.root.name, "params.yaml", key)
     place = f"subjects.{folders.root.name}.{key} in params.yaml"
@@ -215,7 +220,7 @@ def _check_place(path: str, folders: SubjectFolders, key: str, what: str) -> Pat
             f"{what} where the stages write",
             file=path,
             place=place,
-            expected=f"a folder that neither lies in {folders.root} nor holds it",
+            expected=f"a place that neither lies in {folders.root} nor holds it",
             remedy=f"move {what} to a folder apart, and correct `{key}`; nothing was touched",
         )
     return Path(path)

@@ -12,7 +12,7 @@ from facefolds_core.captures.generated import is_generated
 from facefolds_core.files import atomic_folder, write_json
 from facefolds_core.params import STAGE_SECTIONS
 from facefolds_core.params_file import idle_keys, load_params, write_configs
-from facefolds_core.paths import SubjectFolders, check_capture_place, check_mattes_place
+from facefolds_core.paths import SubjectFolders, check_capture_place, check_mattes_place, check_start_place
 from facefolds_core.source_code import digests_of_stages
 from stages.common import run_for_all
 
@@ -27,6 +27,8 @@ def configure(data: Path) -> str:
             check_capture_place(subject.path, SubjectFolders(data / name))
         if subject.mattes is not None:
             check_mattes_place(subject.mattes, SubjectFolders(data / name))
+        if subject.start is not None:
+            check_start_place(subject.start, SubjectFolders(data / name))
     code = digests_of_stages(ROOT, STAGE_SECTIONS)
     with atomic_folder(data / ".config") as temporary:
         for name in params.subjects:

@@ -41,6 +41,7 @@ subjects:
     train: {preset: quick, iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
 capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true}
 normalize: {}
+subject: {iterations: 300}
 train: {}
 sample: {resolution: 64}
 reconstruct: {}

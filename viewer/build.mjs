@@ -24,15 +24,16 @@ const common = {
 
 await rm(out, { recursive: true, force: true });
 await mkdir(join(out, "draco"), { recursive: true });
+const modules = { ...common, outdir: out, splitting: true, format: "esm", sourcemap: true, legalComments: "linked" };
 await build({
-  ...common,
+  ...modules,
   entryPoints: { "facefolds-player": join(here, "src/index.js"), page: join(here, "src/page.js") },
-  outdir: out,
-  splitting: true,
-  format: "esm",
-  sourcemap: true,
-  legalComments: "linked",
+  external: ["./recording.js"],
 });
+// By itself: what it shares with the player would else be loaded before the first picture with all that it alone needs.
+// Two copies of mediabunny hand nothing to each other; it warns where it finds its own mark.
+const banner = { js: 'delete globalThis[Symbol.for("mediabunny loaded")];' };
+await build({ ...modules, entryPoints: [join(here, "src/recording.js")], banner });
 await cp(join(here, "public"), out, { recursive: true });
 for (const file of [wrapper, wasm]) await cp(file, join(out, "draco", file.slice(draco.length + 1)));
 const worker = { ...common, entryPoints: [join(here, "src/draco/worker.js")], format: "iife" };

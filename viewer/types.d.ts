@@ -21,7 +21,8 @@ export interface Camera {
 /** What a link holds; layers and photos by index. */
 export interface ViewState {
   frame?: number;
-  view?: Orbit;
+  /** To set, parts are enough. */
+  view?: Partial<Orbit>;
   level?: string;
   background?: string;
   hidden?: number[];
@@ -63,6 +64,13 @@ export interface PlayerEvents {
   frame: CustomEvent<null>;
   play: CustomEvent<null>;
   pause: CustomEvent<null>;
+  /** The end, where it does not loop. */
+  ended: CustomEvent<null>;
+  /** All that was to be loaded is there. */
+  load: CustomEvent<null>;
+  /** Of the level that is being loaded: `totalProgress` from 0 to 1. */
+  progress: CustomEvent<{ totalProgress: number; level: string }>;
+  "camera-change": CustomEvent<null>;
   change: CustomEvent<null>;
   error: CustomEvent<PlayerError | Error>;
 }
@@ -84,6 +92,11 @@ export class FacefoldsPlayer extends HTMLElement {
   readonly shareable: boolean;
   loop: boolean;
   speed: number;
+  /** The sound is off until somebody asks for it. */
+  muted: boolean;
+  /** Seconds, at the sequence's own speed. */
+  readonly duration: number;
+  currentTime: number;
   /** A head that turns is held still. */
   still: boolean;
   /** Any colour of CSS. */
@@ -109,8 +122,18 @@ export class FacefoldsPlayer extends HTMLElement {
   capture(camera?: Camera): ImageData;
   /** A PNG. */
   screenshot(camera?: Camera): Promise<Blob>;
-  /** A film of one turn from side to side, MP4 or WebM: 8 s and 40 degrees unless told otherwise; the signal ends it early. */
-  record(options?: { seconds?: number; degrees?: number; signal?: AbortSignal }): Promise<Blob>;
+  /** What is seen, by default as a PNG. */
+  toBlob(options?: { mimeType?: string; qualityArgument?: number }): Promise<Blob>;
+  /**
+   * A film of one turn from side to side, MP4 or WebM, with the asset's sound: 8 s and 40 degrees unless told otherwise. The
+   * signal ends it early; `onPart` hears how much there is, 0 to 1.
+   */
+  record(options?: {
+    seconds?: number;
+    degrees?: number;
+    signal?: AbortSignal;
+    onPart?: (part: number) => void;
+  }): Promise<Blob>;
   compare(photo: number | null): void;
   /** Plays an asset that is at hand: name -> content, manifest.json among them. */
   openFiles(files: Map<string, Blob>): void;

@@ -46,7 +46,7 @@ PAGE: dict[str, Any] = {"widths": [1280, 390], "height": 1000, "gap": 24, "patie
 """CSS pixels: a desktop, and a phone beside it; milliseconds until the player in it plays."""
 PLAYER: dict[str, Any] = {"gap": 20, "width": 1600, "patience": 1500, "quality": 86}
 SIZES: dict[str, Any] = {**PLAYER, "gap": 40, "width": 1200}
-PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1&view=55,10,2.9,0.25,0,-0.05"]]}
+PLAYER |= {"panes": [[1000, 660, "frame=4"], [1000, 660, "frame=0&spread=1"]]}
 PLAYER["panes"] += [[390, 660, "frame=0"]]
 SIZES |= {"panes": [[1440, 900, "frame=0"], [390, 844, "frame=0"], [360, 240, "frame=0"]]}
 """CSS pixels of the windows, and what each shows, as in the player's links; the picture's width; milliseconds for what

@@ -10,6 +10,7 @@ A folder with
 - `mattes.arrow`: opacity that training may use, of any camera and frame, where the capture has it (one channel);
 - `surface.npz`: tracked mesh in the head's own frame, where the capture has one: `vertices` (K, V, 3) float32 and
   `faces` (F, 3) int32;
+- `body.npz`: Gaussians of the whole scene, where they were fitted to find poses (subject/storage.py);
 - `place.png`: the subject's centre, axes and ball over the pictures (`place.py`), for people;
 - `audio.wav`: the sound from the first frame on, where the capture has it.
 

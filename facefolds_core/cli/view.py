@@ -32,6 +32,21 @@ def latest_asset(data: Path) -> Path:
     return found[-1].parent
 
 
+def asset_folder(path: Path) -> Path:
+    """The asset's folder that somebody means who names it, its manifest, the GLB beside it or its subject's folder.
+
+    Raises:
+        UserError: if there is none.
+    """
+    meant = path.parent if path.name == MANIFEST_NAME else path.with_suffix("") if path.suffix == ".glb" else path
+    if not is_folder(meant):
+        glb = "a GLB is a still of one frame, for viewers of glTF; to play the asset, " if path.suffix == ".glb" else ""
+        remedy = f"{glb}name a folder that holds {MANIFEST_NAME}, such as data/actor/asset"
+        raise UserError("no such folder", file=path, expected="an asset's folder", remedy=remedy)
+    subject = meant / "asset"
+    return subject if not (meant / MANIFEST_NAME).exists() and is_folder(subject) else meant
+
+
 def has_screen() -> bool:
     """Whether a browser could open a window here."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
@@ -39,7 +54,8 @@ def has_screen() -> bool:
 
 def command(
     asset: Annotated[
-        Path | None, typer.Argument(help="Folder of the asset. Left out: the one under --data that was made last.")
+        Path | None,
+        typer.Argument(help="Folder of the asset, or its manifest.json. Left out: the one under --data made last."),
     ] = None,
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 for any free one.")] = 0,
@@ -47,10 +63,7 @@ def command(
 ) -> None:
     """Serve an asset and the web player to this machine only, and open the player. Ctrl+C ends it."""
     with report_user_errors("view"):
-        folder = asset or latest_asset(data)
-        if not is_folder(folder):
-            raise UserError("no such folder", file=folder, expected="an asset's folder", remedy="name another one")
-        folder = folder.resolve()
+        folder = (asset_folder(asset) if asset else latest_asset(data)).resolve()
         parse_manifest(folder / MANIFEST_NAME)
         with serving(find_player(), {"asset": folder}, port) as address:
             typer.echo(f"view: {folder}\nview: {address}  (Ctrl+C ends)")

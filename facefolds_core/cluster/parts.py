@@ -61,7 +61,7 @@ class Parts:
     def _part(self, name: str, part: str, job: str, files: Mapping[str, str]) -> Job:
         whole = self.whole[name]
         at_once = whole.at_once if part == BASE else 0
-        target = f"matte@{name}"  # what a part is fitted to
+        target = f"subject@{name}"  # what a part is fitted to
         return replace(whole, name=job, target=target, part=part, files=tuple(sorted(files.items())), at_once=at_once)
 
     def _segments(self, name: str, outcome: Outcome) -> list[Job]:

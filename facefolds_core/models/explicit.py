@@ -1,4 +1,4 @@
-"""Radius maps and texels, fitted from a volume on: docs/reference/method.md."""
+"""Radius maps and texels, fitted from the subject's Gaussians on: docs/reference/method.md."""
 
 from __future__ import annotations
 

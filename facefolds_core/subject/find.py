@@ -18,15 +18,16 @@ from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import SubjectParams
+from facefolds_core.reading import is_there
 from facefolds_core.spacing import spread
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.mattes import Body, Image, Key, Mattes, body_among
+from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.storage import FoundSubject, read_found, write_found
+from facefolds_core.subject.storage import BODY, Body, FoundSubject, read_body, read_found, write_found
 
 Array = NDArray[np.float32]
 
@@ -83,14 +84,11 @@ def find_subject(
     Raises:
         UserError: if nothing is found; see `read_start`.
     """
-    frame, store, how = reference_frame(scene), scene.open_frames(), gaussian_params(params, scene)
+    store, how, mattes, begun = scene.open_frames(), gaussian_params(params, scene), Mattes(scene, named), None
     keys = [(c, k) for k in frames_looked_at(scene) for c in scene.indices("train") if (c, k) in store]
-    mattes, begun = Mattes(scene, named), None
     if start is not None or not all(mattes.known(key) for key in keys):
-        splats = fit_room(scene, frame, how, params.seed) if start is None else read_start(start, scene, frame)
-        body = body_among(scene, splats, frame)
-        _check(body, scene)
-        mattes, begun = Mattes(scene, named, body), splats.part(body.subject)
+        body = _body(scene, how, params.seed, start)
+        mattes, begun = Mattes(scene, named, body), body.splats.part(body.subject)
     views = [view_cut_out(scene, mattes, key) for key in keys]
     if not any((view.opacity > 0.5).any() for view in views):
         raise _nothing(scene)
@@ -186,9 +184,16 @@ def subject_in(scene: Scene) -> FoundSubject:
     return read_found(path, len(scene.indices("train")))
 
 
-def _check(body: Body, scene: Scene) -> None:
+def _body(scene: Scene, how: GaussianParams, seed: int, start: Path | None) -> Body:
+    """The subject among Gaussians of the whole scene: of those that poses were found with, if there are some."""
+    known, frame = scene.folder / BODY, reference_frame(scene)
+    if start is None and is_there(known):
+        return read_body(known, scene.num_frames)
+    splats = fit_room(scene, frame, how, seed) if start is None else read_start(start, scene, frame)
+    body = body_among(scene, splats, frame)
     if not body.subject.any():
         raise _nothing(scene)
+    return body
 
 
 def _nothing(scene: Scene) -> UserError:

@@ -16,6 +16,7 @@ from facefolds_core.subject.cut_out import Array, Bool, EdgeParams, agreement, c
 from facefolds_core.subject.found import background, near_enough, opacity_of, subject_of
 from facefolds_core.subject.plates import from_plate
 from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.storage import Body
 
 Image = NDArray[np.uint8]
 Key = tuple[int, int]
@@ -38,21 +39,6 @@ class Matte:
     opacity: Image
     source: Source
     agreement: float | None = None
-
-
-@dataclass(frozen=True)
-class Body:
-    """What is the subject among Gaussians of a whole scene.
-
-    Attributes:
-        splats: of everything.
-        subject: (N,) whether one is the subject's.
-        frame: of the pictures that they explain.
-    """
-
-    splats: Splats
-    subject: Bool
-    frame: int
 
 
 class Mattes:

@@ -105,8 +105,8 @@ def judged_by(runs: Sequence[Run]) -> str:
         found=f"PSNR of the whole frame alone ({lacking[0]}), which rewards painted rooms"
         if lacking
         else "no score that all of them have",
-        remedy="add them to the capture, or find mattes (`matte.method: auto`; docs/guide/subjects.md), run the sweep "
-        "again and collect it",
+        remedy="add them to the capture, or name mattes (`subjects.NAME.mattes`; docs/guide/subjects.md), run "
+        "the sweep again and collect it",
     )
 
 

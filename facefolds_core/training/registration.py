@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -30,6 +31,8 @@ from facefolds_core.params import NormalizeParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.spill import by_rows
 from facefolds_core.subject.find import find_subject, reference_frame
+from facefolds_core.subject.foreign import moved
+from facefolds_core.subject.storage import BODY, Body, write_body
 from facefolds_core.subject.volume import Volume, volume_of
 from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
 
@@ -65,6 +68,7 @@ class Found:
     degrees, shift: the largest turn, and the largest shift in shares of the subject's extent.
     likeness: (K,) correlation of each frame's pictures with the reference's at the pose found.
     facts: what is to be said.
+    body: the subject in the reference frame, in the world, where mattes did not show it.
     """
 
     track: Track
@@ -72,6 +76,7 @@ class Found:
     shift: float
     likeness: Array
     facts: tuple[Fact, ...]
+    body: Body | None = None
 
 
 def find_track(scene: Scene) -> Found:
@@ -80,7 +85,8 @@ def find_track(scene: Scene) -> Found:
     Raises:
         UserError: if the cameras do not look at one place, or nothing stands out from the background.
     """
-    volume, reference = volume_of(find_subject(scene, SubjectParams())[0].splats), reference_frame(scene)
+    subject, mattes = find_subject(scene, SubjectParams())
+    volume, reference = volume_of(subject.splats), reference_frame(scene)
     cameras = [scene.cameras[i] for i in scene.indices("train")]
     points = [surface_points(volume, camera) for camera in cameras]
     frames = scene.num_frames
@@ -96,7 +102,7 @@ def find_track(scene: Scene) -> Found:
     size = float(np.ptp(np.quantile(cloud, [0.01, 0.99], axis=0), axis=0).max())
     shift = max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track))) / size
     facts = (fact("poses_refused", frames=[scene.frame_ids[k] for k in refused]),) if refused else ()
-    return Found(track, float(track.degrees().max()), shift, likeness, facts)
+    return Found(track, float(track.degrees().max()), shift, likeness, facts, mattes.body)
 
 
 def surface_points(volume: Volume, camera: Camera) -> Points:
@@ -244,6 +250,8 @@ def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
             raise
         return scene  # `train` will say what is wrong with the pictures
     much = is_much(found.degrees, found.shift)
+    if found.body is not None:
+        _keep(found.body, found.track if asked or much else None, scene.folder)
     if not (asked or much):
         return scene
     turns = fact("head_turns", degrees=found.degrees, shift=found.shift, source="found in the pictures")
@@ -257,3 +265,10 @@ def with_found_poses(scene: Scene, params: NormalizeParams) -> Scene:
             np.savez(file, vertices=vertices, faces=faces)
     write_scene(scene, scene.folder)
     return scene
+
+
+def _keep(body: Body, track: Track | None, folder: Path) -> None:
+    """Write the body, in the head's own frame, for the stage `subject`."""
+    if track is not None:
+        body = replace(body, splats=moved(body.splats, track.at(body.frame).inverse()))
+    write_body(folder / BODY, body)

@@ -46,7 +46,7 @@ def test_the_clean_case_and_the_middle_strength_come_first() -> None:
 
 
 def test_what_must_be_filmed_is_none_of_a_prepared_scenes() -> None:
-    assert {c.hazard for c in hazards.plan("mugsy", [], ["fast"], 1)} >= {"cameras", "centre", "rate-high"}
+    assert {c.hazard for c in hazards.plan("mugsy", [], ["fast"], 1)} >= {"cameras", "centre", "spacing"}
     for names, presets in ((["gloss"], ["fast"]), (["rain"], ["fast"]), ([], ["slow"])):
         with pytest.raises(UserError, match="no such row or preset"):
             hazards.plan("mugsy", names, presets, 1)
@@ -82,7 +82,7 @@ def test_rates_multiply_the_usual_values(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(Project, "run", lambda *_: None)
     monkeypatch.setattr(Project, "write", lambda _, params: written.append(params["subjects"]["cell"]["train"].copy()))
     blank = Cell(subject="mugsy", hazard="x", strength=3, preset="fast", seed=7)
-    scaled = (("mlp", "other"), ("explicit", "lr"), ("explicit", "inner.width"), ("explicit", "volume.none"))
+    scaled = (("mlp", "other"), ("explicit", "lr"), ("explicit", "inner.width"), ("explicit", "inner.none"))
     hazards.train(project, blank, Hazard("x", "x", (1, 2, 3), "{}", scaled=scaled))
     assert written[-1] == {"preset": "fast", "seed": 7, "lr": 1.5, "inner": {"width": 6.0}}
 

@@ -12,6 +12,7 @@ PARAMS: dict[str, Any] = {
     "subjects": {"take": {"source": "actor", "path": "facefolds_core/captures/actor", "holdout": {"every": 4}}},
     "capture": {"cameras": 8, "frames": 6, "height": 48, "width": 32, "mattes": True},
     "normalize": {},
+    "subject": {"iterations": 100},
     "train": {
         "preset": "fast",
         "layers": 3,

@@ -26,7 +26,7 @@ class Shell:
 @pytest.mark.parametrize(("part", "push", "there"), [("base", False, True), ("base", True, False), ("3", False, False)])
 def test_in_a_cache_that_is_shared(part: str, push: bool, there: bool, tmp_path: Path) -> None:
     shell: Any = Shell()
-    job = Job("anna.base", "anna", "matte@anna", None, (), part=part)
+    job = Job("anna.base", "anna", "subject@anna", None, (), part=part)
     assert _make_part(shell, tmp_path, job, push, tmp_path / "begun")[0] == 1
     assert shell.said == ["--subject", "anna", "--part", part, *(["--begun", str(tmp_path / "begun")] if there else [])]
 

@@ -29,7 +29,7 @@ def done(job: Job, file: str) -> Outcome:
 def test_the_base_comes_first_then_segments_then_the_subject(tmp_path: Path) -> None:
     parts = Parts(tmp_path, [WHOLE])
     assert [(job.name, job.part, job.target, job.links) for job in parts.first] == [
-        ("anna.base", "base", "matte@anna", WHOLE.links)
+        ("anna.base", "base", "subject@anna", WHOLE.links)
     ]
     segments = base_done(parts, "s0", "s1")
     assert [(job.name, job.part) for job in segments] == [("anna.segment-1", "0"), ("anna.segment-2", "1")]

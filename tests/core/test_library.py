@@ -33,8 +33,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     folder = tmp_path_factory.mktemp("library")
     make_scene(folder / "scene", size=40, surface_radius=OPAQUE[0].radius, mattes=True)
     scene = facefolds.load_scene(folder / "scene")
-    levels = [{"resolution": n, "iterations": 60} for n in (24, 40)]
-    params = {"preset": "fast", "layers": 4, "iterations": 330, "volume": {"levels": levels}}
+    params = {"preset": "fast", "layers": 4, "iterations": 330}
     trained = facefolds.train(scene, facefolds.train_params(params))
     asset = facefolds.export_asset(trained.model, scene, folder / "face", facefolds.ExportParams.model_validate(SMALL))
     return scene, trained, asset

@@ -14,6 +14,7 @@ from facefolds_core.paths import (
     check_capture_place,
     check_mattes_place,
     check_path_text,
+    check_start_place,
     check_subject_name,
     subject_folders,
     subject_of_dvc_stage,
@@ -114,30 +115,32 @@ def test_a_users_capture_is_never_replaced(place: str, tmp_path: Path) -> None:
         (tmp_path / "link").symlink_to(folders.capture)
     (folders.capture / "KRT").write_text("precious")
     subject = {"source": "multiface", "path": str(tmp_path / place)}
-    write_json(folders.config / "subject.json", subject)
+    write_json(folders.config / "entry.json", subject)
     before = fingerprint(tmp_path)
     with pytest.raises(UserError, match="where the stages write"):
         capture(folders)
     assert fingerprint(tmp_path) == before
 
 
-@pytest.mark.parametrize("place", ["data/anna/mattes", "data/anna", "data", "link"])
-def test_mattes_that_a_user_names_are_never_a_stage_s_own(place: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", ["data/anna/subject", "data/anna", "data", "link"])
+def test_what_a_user_names_is_never_a_stage_s_own(place: str, tmp_path: Path) -> None:
     """DVC deletes the stage's folder before the stage reads it."""
     folders = subject_folders(tmp_path / "data", "anna")
-    folders.mattes.mkdir(parents=True)
-    (tmp_path / "link").symlink_to(folders.mattes)
-    with pytest.raises(UserError, match=r"subjects\.anna\.mattes") as caught:
-        check_mattes_place(str(tmp_path / place), folders)
-    assert "where the stages write" in str(caught.value)
-    for other in ("mine", "data/actor/mattes"):
-        assert check_mattes_place(str(tmp_path / other), folders) == tmp_path / other
+    folders.subject.mkdir(parents=True)
+    (tmp_path / "link").symlink_to(folders.subject)
+    for key, check in (("mattes", check_mattes_place), ("start", check_start_place)):
+        with pytest.raises(UserError, match=rf"subjects\.anna\.{key}") as caught:
+            check(str(tmp_path / place), folders)
+        assert "where the stages write" in str(caught.value)
+        for other in ("mine", "data/actor/subject"):
+            assert check(str(tmp_path / other), folders) == tmp_path / other
 
 
-def test_configure_looks_at_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "params.yaml").write_text("subjects:\n  anna: {source: actor, path: x, mattes: data/anna/mattes}\n")
+@pytest.mark.parametrize("key", ["mattes", "start"])
+def test_configure_looks_at_them(key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "params.yaml").write_text(f"subjects:\n  anna: {{source: actor, path: x, {key}: data/anna/subject}}\n")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match=r"subjects\.anna\.mattes"):
+    with pytest.raises(UserError, match=rf"subjects\.anna\.{key}"):
         configure(Path("data"))
 
 

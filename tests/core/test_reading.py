@@ -145,7 +145,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "scene.json": lambda path: read_scene(path.parent),
     "model.json": lambda path: load_model(path.parent),
     "model.safetensors": lambda path: read_tensors(path, "train again"),
-    "subject.json": lambda path: read_subject(path.parent),
+    "entry.json": lambda path: read_subject(path.parent),
     "per_image.parquet": read_images,
     "fit.json": read_mapping,
 }

@@ -30,6 +30,7 @@ from stages.evaluate import evaluate_subject
 from stages.normalize import normalize
 from stages.reconstruct import reconstruct
 from stages.sample import sample
+from stages.subject import subject
 from stages.texture import texture
 from stages.train import train_stage
 from tests.golden import digests
@@ -41,6 +42,7 @@ STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
     "configure": (lambda folders: configure(folders.root.parent), ("../.config", "../.code")),
     "capture": (capture, ("capture",)),
     "normalize": (normalize, ("scene",)),
+    "subject": (subject, ("subject",)),
     "train": (train_stage, ("model",)),
     "sample": (sample, ("samples",)),
     "reconstruct": (reconstruct, ("surfaces",)),
@@ -58,6 +60,7 @@ subjects:
     holdout: {every: 4}
 capture: {cameras: 6, frames: 2, height: 48, width: 32}
 normalize: {}
+subject: {iterations: 10}
 train: {preset: quick, iterations: 8, checkpoint_seconds: 0.001, rays: 128, layers: 3, texture_width: 16,
         manifold_width: 16}
 sample: {resolution: 32}

@@ -46,6 +46,9 @@ from facefolds_core.model.storage import ModelSpec, build_model, load_model, sav
 from facefolds_core.params import Subject
 from facefolds_core.params_file import Params, write_configs
 from facefolds_core.reporting.facts import read_images
+from facefolds_core.subject.cameras import CameraFit
+from facefolds_core.subject.splats import COLUMNS, Splats
+from facefolds_core.subject.storage import FoundSubject, read_found, write_found
 from tests.ellipsoids import Ellipsoids
 from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
 from tests.hostile.structured import damage_path, damage_values
@@ -101,6 +104,11 @@ def _surface(folder: Path) -> Any:
     return made.load_surface()
 
 
+def _gaussians(folder: Path) -> Any:
+    found = read_found(folder / "subject" / "gaussians.npz", 1)
+    return [found.splats.values, np.array(found.psnr), found.cameras.measured, found.cameras.errors]
+
+
 def _parts(stored: Grids | Sheets) -> list[Any]:
     return [repr(part) if isinstance(part, Chart) else part for part in vars(stored).values()]
 
@@ -136,13 +144,14 @@ KINDS = (
     Kind(("scene/frames.arrow",), _store),
     Kind(("scene/scene.json",), _scene),
     Kind(("scene/surface.npz",), _surface),
+    Kind(("subject/gaussians.npz",), _gaussians),
     Kind(("samples/grids.npz",), _grids),
     Kind(("surfaces/sheets.npz",), _sheets),
     Kind(("surfaces/surfaces.npz",), _surfaces),
     Kind(("meshes/meshes.npz",), _meshes),
     Kind(("model/model.safetensors", "model/model.json"), _quiet(lambda folder: load_model(folder / "model"))),
     Kind(("config/train.json",), _quiet(lambda folder: read_train(folder / "config"))),
-    Kind(("config/subject.json",), _quiet(lambda folder: read_subject(folder / "config"))),
+    Kind(("config/entry.json",), _quiet(lambda folder: read_subject(folder / "config"))),
     Kind(
         ("evaluation/per_image.parquet",), _quiet(lambda folder: read_images(folder / "evaluation/per_image.parquet"))
     ),
@@ -167,6 +176,9 @@ def make(root: Path) -> None:
     write_scene(_written_scene(root / "scene"), root / "scene")
     vertices, faces = random.normal(size=(2, 5, 3)).astype(np.float32), np.array([[0, 1, 2], [2, 3, 4]], np.int32)
     np.savez(root / "scene" / "surface.npz", vertices=vertices, faces=faces)
+    splats = Splats(random.normal(size=(7, COLUMNS)).astype(np.float32), np.zeros(3, np.float32))
+    fit = CameraFit(np.full((1, 3), 1.5), np.full(1, 0.1))
+    write_found(root / "subject" / "gaussians.npz", FoundSubject(splats, 30.0, fit))
     grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5), progress=False)
     grids = replace(grids, chart=Chart(grids.chart.centre, Belt(0.8, 0.3)))
     write_grids(root / "samples" / "grids.npz", grids)

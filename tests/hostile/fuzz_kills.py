@@ -25,7 +25,7 @@ from tests.pipeline.tiny import TinyProject
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "kept"
 STAGES = (
-    *("configure", "capture", "normalize", "matte", "train", "sample", "reconstruct"),
+    *("configure", "capture", "normalize", "subject", "train", "sample", "reconstruct"),
     *("decimate", "texture", "bake", "compress", "evaluate"),
 )
 SHORT = 5
@@ -39,6 +39,7 @@ subjects:
     holdout: {every: 4}
 capture: {cameras: 8, frames: 2, height: 48, width: 32}
 normalize: {}
+subject: {iterations: 200}
 train: {preset: quick, iterations: 300, checkpoint_seconds: 0.2, rays: 256, layers: 3, texture_width: 32,
         manifold_width: 32}
 sample: {resolution: 64}

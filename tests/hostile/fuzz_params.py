@@ -29,6 +29,7 @@ SOUND: dict[str, Any] = {
     },
     "capture": {"cameras": 24, "frames": 12},
     "normalize": {"long_side": 768},
+    "subject": {"iterations": 300},
     "train": {"preset": "fast", "seed": 0},
     "sample": {"resolution": 512},
     "reconstruct": {"method": "grid"},

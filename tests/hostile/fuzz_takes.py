@@ -61,7 +61,7 @@ def run(count: int, seed: int, folder: Path) -> Counts:
     """`count` kills; the training after the last one may end."""
     counts, random, project = Counts(), np.random.default_rng(seed), Project(folder, "take")
     project.write(PARAMS)
-    project.run("configure", "capture", "normalize")
+    project.run("configure", "capture", "normalize", "subject")
     start = time.perf_counter()
     project.run("train")
     seconds, expected = time.perf_counter() - start, model(project)

@@ -23,14 +23,23 @@ SCRIPTS = {
         picture = render(camera, 0.3)
         show(picture.rgb, picture.opacity, picture.depth, tracked_mesh(0.3).vertices)
     """,
+    "subject": """
+        from facefolds_core.params import SubjectParams
+        from facefolds_core.subject.find import find_subject
+        from facefolds_core.subject.volume import volume_of
+        from tests.scenes import OPAQUE, make_scene
+
+        scene = make_scene(folder / "scene", size=32)
+        found, mattes = find_subject(scene, SubjectParams(iterations=40))
+        show(found.splats.values, volume_of(found.splats).grid, *[mattes.of((c, 0)).opacity for c in (0, 1)])
+    """,
     "train": """
         from facefolds_core.params import ExplicitParams
         from facefolds_core.training.explicit.loop import train_explicit
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius, mattes=True)
-        volume = {"levels": [{"resolution": 16, "iterations": 20}, {"resolution": 32, "iterations": 20}]}
-        params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183, "volume": volume})
+        params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183})
         train_explicit(scene, params, folder / "model", folder / "log")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,
@@ -84,7 +93,11 @@ print(digest.hexdigest())
 
 
 @pytest.mark.parametrize(
-    "stage", [*("bake", "decimate"), *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "train"))]
+    "stage",
+    [
+        *("bake", "decimate"),
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("capture", "subject", "train")),
+    ],
 )
 def test_the_first_run_equals_later_ones(stage: str, tmp_path: Path, project_root: Path) -> None:
     code = FRAME.format(body=textwrap.dedent(SCRIPTS[stage]))

@@ -14,7 +14,7 @@ STAGES = [
     "configure",
     "capture",
     "normalize",
-    "matte",
+    "subject",
     "train",
     "sample",
     "reconstruct",

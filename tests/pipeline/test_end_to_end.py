@@ -127,6 +127,7 @@ def test_mistakes_in_params_stop_with_one_message(unfinished: TinyProject, param
 
 
 DAMAGE = [
+    ("subject", "scene/frames.arrow"),
     ("train", "scene/frames.arrow"),
     ("train", "scene/scene.json"),
     ("sample", "model/model.safetensors"),
@@ -138,6 +139,7 @@ DAMAGE = [
     ("bake", "meshes/meshes.npz"),
     ("compress", "meshes/meshes.npz"),
     ("compress", "textures/textures.arrow"),
+    ("evaluate", "subject/mattes.arrow"),
     ("evaluate", "asset/manifest.json"),
     ("evaluate", "asset/full.mp4"),
     ("evaluate", "asset/full_meshes.bin"),

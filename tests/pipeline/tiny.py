@@ -32,8 +32,8 @@ subjects:
       preset: fast
       layers: 3
       iterations: 130
-      volume: {levels: [{resolution: 24, iterations: 60}, {resolution: 48, iterations: 60}]}
 capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true}
+subject: {iterations: 150}
 train: {preset: quick}
 sample: {resolution: 64}
 reconstruct: {}

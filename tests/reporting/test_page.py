@@ -190,7 +190,7 @@ def test_the_index_lists_all_subjects(subject: SubjectFolders) -> None:
 
 def test_the_index_says_how_far_the_others_are(tmp_path: Path) -> None:
     for name in ("waiting", "trained"):
-        write_json(tmp_path / ".config" / name / "subject.json", {})
+        write_json(tmp_path / ".config" / name / "entry.json", {})
     for stage, seconds in (("capture", 2.0), ("normalize", 3.0), ("train", 70.0)):
         write_json(tmp_path / ".timings" / "trained" / f"{stage}.json", {"seconds": seconds})
     page = make_index(tmp_path).read_text()

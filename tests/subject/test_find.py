@@ -22,8 +22,8 @@ from facefolds_core.subject.find import all_mattes, find_subject, found_in, fram
 from facefolds_core.subject.folder import make_folder
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.sheet import RED, tile
-from facefolds_core.subject.storage import read_found, write_found
-from tests.scenes import OPAQUE, make_scene, render
+from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
+from tests.scenes import OPAQUE, gaussians, make_scene, render
 
 SIZE = 24
 PARAMS = SubjectParams(iterations=60, fewest=300, most=300)
@@ -154,3 +154,17 @@ def test_damaged_gaussians_are_refused_by_name(tmp_path: Path, fault: str) -> No
     with pytest.raises(UserError, match="Gaussians are damaged") as caught:
         read_found(path, 5 if fault == "cameras" else 6)
     assert str(path) in str(caught.value)
+
+
+def test_gaussians_that_poses_were_found_with_are_taken_up(tmp_path: Path) -> None:
+    """Nothing is fitted to whole pictures again; where they are damaged it is said."""
+    scene = make_scene(tmp_path, size=SIZE)
+    splats = gaussians(OPAQUE)
+    inside = np.ones(len(splats), bool)
+    write_body(tmp_path / BODY, Body(splats, inside, 1))
+    found, mattes = find_subject(scene, PARAMS.model_copy(update={"iterations": 8}))
+    assert mattes.body is not None and mattes.body.frame == 1 and len(found.splats) == len(splats)
+    np.testing.assert_array_equal(mattes.body.splats.values, splats.values)
+    write_body(tmp_path / BODY, Body(splats, inside[1:], 1))
+    with pytest.raises(UserError, match="Gaussians are damaged"):
+        find_subject(scene, PARAMS)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
 
 @pytest.fixture
@@ -81,6 +81,26 @@ def test_keys(player: Player) -> None:
     for key, condition in steps:
         press(key)
         player.wait(condition)
+
+
+def test_keys_work_in_the_full_page_before_a_click(player: Player) -> None:
+    assert value(player, "document.activeElement === document.body")
+    player.page.keyboard.press("ArrowRight")
+    player.wait("e.frame === 1")
+
+
+def test_focus_given_to_the_element_is_its_pictures(new_player: NewPlayer, rich: Path) -> None:
+    """And a key acts once, also after another asset was loaded."""
+    player = new_player({"asset": rich})
+    page_of_yours(player, '<facefolds-player src="asset/" style="height: 300px"></facefolds-player>')
+    player.wait("e.ready")
+    player.page.keyboard.press("ArrowRight")  # the page's own
+    player.run("const p = e.player; e.setAttribute('src', './asset/'); e.focus(); return p === e.player")
+    player.wait("e.level === 'full'")
+    player.run("e.focus()")
+    assert value(player, "[e.frame, e.shadowRoot.activeElement.localName]") == [0, "canvas"]
+    player.page.keyboard.press("ArrowRight")
+    player.wait("e.frame === 1")
 
 
 def test_keys_turn_and_zoom(player: Player) -> None:
@@ -200,8 +220,8 @@ def test_full_screen(player: Player) -> None:
 
 def test_the_shared_link_shows_the_same(player: Player) -> None:
     player.run(
-        """e.player.view.set({azimuth: 25, elevation: 8, distance: 0.8, target: [0, 0.02, 0]});
-        e.background = '#104020'; e.spread = 0.2; e.layers = [true, false, true]; e.effects = false; e.speed = 0.5;
+        """e.spread = 0.2; e.player.view.set({azimuth: 25, elevation: 8, distance: 0.8, target: [0, 0.02, 0]});
+        e.background = '#104020'; e.layers = [true, false, true]; e.effects = false; e.speed = 0.5;
         await e.seek(3);"""
     )
     before = player.capture()

@@ -56,6 +56,19 @@ def test_what_is_no_colour_is_refused_and_changes_nothing(new_player: NewPlayer,
     ]
 
 
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_part_of_the_state_changes_that_part(new_player: NewPlayer, rich: Path, when: str) -> None:
+    player = opened(new_player, rich, ONE.format('controls="none"'))
+    if when == "after":
+        player.wait("e.ready")
+    player.run("e.state = {view: {azimuth: 40}}; e.state = {view: {elevation: 5}}")
+    player.wait("e.ready")
+    view, home = player.run("return [e.state.view, e.player.view.home]")  # type: ignore[misc]
+    assert [view["azimuth"], view["elevation"]] == [40, 5]
+    assert [view["distance"], view["target"]] == [pytest.approx(home["distance"]), pytest.approx(home["target"])]
+    assert player.run("try { e.state = {view: {azimuth: 'x'}} } catch (error) { return error.name }") == "TypeError"
+
+
 def test_the_wheel_scrolls_the_page_until_the_player_is_meant(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, ONE.format("") + TALL)
     player.wait("e.ready")
@@ -169,10 +182,29 @@ def test_the_level_can_be_changed_at_any_time(new_player: NewPlayer, rich: Path)
     player.wait("e.level === 'full' && e.player.detail.auto")
 
 
+@pytest.mark.parametrize("how", ["e.style.width = '300px'", "e.player.view.zoom(0.1)", "e.level = 'full'"])
+def test_a_small_canvas_needs_no_fine_level(new_player: NewPlayer, rich: Path, how: str) -> None:
+    """In pixels of the device: a texel for a pixel is enough. A larger canvas, or a nearer view, needs more."""
+    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
+    player = opened(new_player, rich, small)
+    player.wait("e.ready")
+    player.page.wait_for_timeout(500)
+    assert player.run("return [e.level, e.player.detail.auto]") == ["coarse", True]
+    assert "full.mp4" not in names(player)
+    player.run(how)
+    player.wait("e.level === 'full'")
+
+
+def test_a_dense_screen_needs_a_fine_level(new_player: NewPlayer, rich: Path) -> None:
+    small = ONE.replace("height:300px", "width:24px; height:300px").format('controls="none"')
+    player = opened(new_player, rich, small, device_scale_factor=2)
+    player.wait("e.level === 'full'")
+
+
 def test_what_it_shows_is_kept_when_it_is_moved(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, ONE.format("") + '<div id="other"></div>')
     player.wait("e.level === 'full'")
-    player.run("await e.seek(3); e.spread = 0.5; e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
+    player.run("e.spread = 0.5; await e.seek(3); e.player.view.set({azimuth: 30, elevation: 5, distance: 2, "
                "target: [0, 0, 0]})")  # fmt: skip
     count = len(names(player))
     moved = "const b = e.player; document.querySelector('#other').append(e); await 0; return [e.player === b, e.frame]"

@@ -16,7 +16,7 @@ from playwright.sync_api import Browser
 
 from tests.assets import make_asset
 from tests.older import make_older
-from tests.viewer.conftest import NewPlayer
+from tests.viewer.conftest import NewPlayer, page_of_yours
 from tests.viewer.fixtures import change_manifest, file_entry
 
 NOT_FOUND = "Failed to load resource"  # the browser's own line about an answer of 404
@@ -39,15 +39,47 @@ def one_level(rich_copy: Path) -> Path:
     return rich_copy
 
 
-def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:
-    script = """const get = HTMLCanvasElement.prototype.getContext;
+NO_WEBGL = """const get = HTMLCanvasElement.prototype.getContext;
         HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
           return kind === 'webgl2' ? null : get.call(this, kind, ...rest); };"""
-    player = new_player({"asset": asset}, script=script)
+
+
+def test_without_webgl2(new_player: NewPlayer, asset: Path) -> None:
+    """The poster stands in, above the words."""
+    player = new_player({"asset": asset}, script=NO_WEBGL)
     player.open("asset", wait=False)
     text = player.message()
     assert "no WebGL 2" in text
     assert "hardware acceleration" in text
+    poster = player.page.get_by_role("img", name="The subject, from the front")
+    poster.wait_for()
+    shown, words = poster.bounding_box(), player.page.locator(".message > div").bounding_box()
+    assert shown and words and shown["height"] > 200 and words["y"] >= shown["y"] + shown["height"]
+    red = player.run("const image = e.shadowRoot.querySelector('.poster'); return [image.naturalWidth, image.complete]")
+    assert red == [90, True]
+
+
+@pytest.mark.parametrize("script", ["", NO_WEBGL], ids=["loading", "no WebGL"])
+def test_a_poster_of_the_pages_own(new_player: NewPlayer, asset: Path, script: str) -> None:
+    player = new_player({"asset": asset}, script=script)
+    held: list = []
+    player.page.route("**/*.mp4", lambda route: held.append(route))
+    page_of_yours(
+        player,
+        '<facefolds-player src="asset/" poster="asset/photo0.png" alt="Ann" style="height:300px"></facefolds-player>',
+    )
+    poster = player.page.locator(".poster")
+    poster.wait_for()
+    assert player.run("return e.shadowRoot.querySelector('.poster').src.endsWith('photo0.png')")
+    assert not any(url.endswith("poster.png") for url in player.requests)
+    if script:
+        player.page.get_by_role("img", name="Ann").wait_for()
+        return
+    while not held:
+        player.page.wait_for_timeout(20)
+    held[0].continue_()
+    player.wait("e.ready")
+    player.wait("e.shadowRoot.querySelector('.poster').matches('.gone')")
 
 
 def test_no_asset_at_the_address(new_player: NewPlayer, asset: Path) -> None:

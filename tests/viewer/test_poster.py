@@ -79,7 +79,8 @@ def test_a_poster_that_shows_something_else_is_not_shown(new_player: NewPlayer, 
 def test_both_know_of_the_same_camera_and_colour(project_root: Path) -> None:
     source = project_root / "viewer" / "src"
     view = (source / "view.js").read_text()
-    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", view)[1]) == FIELD_OF_VIEW  # type: ignore[index]
+    attributes = (source / "attributes.js").read_text()
+    assert float(re.search(r"FIELD_OF_VIEW = ([\d.]+)", attributes)[1]) == FIELD_OF_VIEW  # type: ignore[index]
     assert float(re.search(r"FILLED = ([\d.]+)", view)[1]) == FILLED  # type: ignore[index]
     colour = re.search(r'BACKGROUND = "#(\w{6})"', (source / "element.js").read_text())
     assert colour is not None and tuple(round(255 * value) for value in BACKGROUND) == tuple(bytes.fromhex(colour[1]))

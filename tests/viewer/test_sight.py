@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.viewer.conftest import NewPlayer, Player
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
 CONTRAST = """
 const numbers = (colour) => {
@@ -42,8 +43,12 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
 
 
 @pytest.mark.parametrize("behind", [(0, 0, 0), (255, 255, 255)], ids=["dark picture", "white picture"])
-def test_all_words_have_the_contrast_that_wcag_asks_for(player: Player, behind: tuple[int, int, int]) -> None:
-    """4.5 to 1, whatever the picture behind half-transparent panels is."""
+@pytest.mark.parametrize("ground", ["#16181d", "#ffffff"])
+def test_all_words_have_the_contrast_that_wcag_asks_for(
+    player: Player, behind: tuple[int, int, int], ground: str
+) -> None:
+    """4.5 to 1, whatever the picture behind half-transparent panels is, and in both sets of colours."""
+    player.run("e.background = v", ground)
     player.button("Settings")
     player.page.get_by_text("Keys").click()
     found: list[tuple[str, float]] = player.run(CONTRAST, list(behind))  # type: ignore[assignment]
@@ -51,22 +56,73 @@ def test_all_words_have_the_contrast_that_wcag_asks_for(player: Player, behind: 
     assert [(words, round(ratio, 1)) for words, ratio in found if ratio < 4.5] == []
 
 
-def test_layers_that_are_pulled_apart_are_seen_from_aside_and_all_in_sight(player: Player) -> None:
-    player.button("Settings")
-    player.page.get_by_label("Pull apart").fill("1")
-    player.wait("Math.abs(e.player.view.get().azimuth - 55) < 0.1")
+@pytest.mark.parametrize(
+    ("page", "background", "light"),
+    [
+        ("#fff", "transparent", True),
+        ("#fff", "#203040", False),
+        ("#111", "transparent", False),
+        ("#111", "#ffe", True),
+        ("", "transparent", True),
+    ],
+)
+def test_the_controls_have_the_colours_of_what_is_behind(
+    new_player: NewPlayer, rich: Path, page: str, background: str, light: bool
+) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 384, "height": 300})
+    body = f'<facefolds-player src="asset/" background="{background}" style="height: 300px"></facefolds-player>'
+    style = f"<style>html {{ background: {page} }} facefolds-player {{ --facefolds-accent: rgb(1, 2, 3) }}</style>"
+    page_of_yours(player, style + body)
+    player.wait("e.ready")
+    words = "return getComputedStyle(e.shadowRoot.querySelector('.title')).color.match(/\\d+/g).map(Number)"
+    assert (max(player.run(words)) < 100) is light  # type: ignore[call-overload]
+    bar = player.page.locator(".bar").bounding_box()
+    assert bar and 300 - bar["y"] < 45  # of 300 pixels
+    track = "return getComputedStyle(e.shadowRoot.querySelector('[data-do=settings]')).accentColor"
+    assert player.run(track) == "rgb(1, 2, 3)"
+    player.run("document.documentElement.style.colorScheme = 'light dark'")
+    player.page.emulate_media(color_scheme="dark")
+    changed = False if not page else light  # where nothing is painted behind, the browser's own ground is dark now
+    player.wait(f"e.shadowRoot.querySelector('.stage').classList.contains('light') === {str(changed).lower()}")
+
+
+@pytest.mark.parametrize("how", ["settings", "property", "before it is there"])
+@pytest.mark.parametrize("size", [(900, 700), (390, 700)])
+def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
+    new_player: NewPlayer, rich: Path, how: str, size: tuple[int, int]
+) -> None:
+    player = new_player({"asset": rich}, viewport={"width": size[0], "height": size[1]})
+    if how == "before it is there":
+        page_of_yours(player, '<facefolds-player src="asset/" style="height:100vh" controls="none"></facefolds-player>')
+        player.run("await customElements.whenDefined('facefolds-player'); e.spread = 1")
+        player.wait("e.level === 'full'")
+    else:
+        player.open("asset")
+        player.wait("e.level === 'full'")
+        player.run("e.setAttribute('controls', 'none'); e.spread = 0.9")
+        if how == "settings":
+            player.run("e.setAttribute('controls', '')")
+            player.button("Settings")
+            player.page.get_by_label("Pull apart").fill("1")
+            player.button("Close the settings")
+        else:
+            player.run("e.spread = 1")
+    aside = 42 if size[0] > size[1] else 28
+    player.wait(f"Math.abs(e.player.view.get().azimuth - {aside}) < 0.01")
     player.page.wait_for_timeout(500)
     corners = """const { view, renderer, size } = e.player; const { low, high } = renderer.bounds();
         const { projection: p, view: m } = view.matrices(...size, renderer.bounds());
         const times = (a, x) => [0, 1, 2, 3].map((i) => x.reduce((sum, v, k) => sum + a[4 * k + i] * v, 0));
+        const [width, height] = [size[0], size[1] - view.inset];
         return [0, 1, 2, 3, 4, 5, 6, 7].map((k) => {
           const at = [0, 1, 2].map((i) => (k >> i & 1 ? high[i] : low[i]));
           const clip = times(p, times(m, [...at, 1]));
-          return [clip[0] / clip[3], clip[1] / clip[3]]; });"""
-    found: list[tuple[float, float]] = player.run(corners)  # type: ignore[assignment]
-    assert max(abs(value) for corner in found for value in corner) < 1
-    assert max(abs(x) for x, _ in found) > 0.4  # and they fill what there is
-    player.page.get_by_label("Pull apart").fill("0")
+          return [(clip[0] / clip[3] + 1) / 2, (1 - clip[1] / clip[3]) / 2 * size[1] / height]; });"""
+    found = np.array(player.run(corners))
+    assert found.min() > 0.03 and found.max() < 0.97
+    assert np.ptp(found, axis=0).max() == pytest.approx(0.92, abs=0.01)  # of the width or the height: all but a margin
+    assert found.min(0) + found.max(0) == pytest.approx([1, 1], abs=0.02)  # and in the middle
+    player.run("e.spread = 0")
     player.wait("Math.abs(e.player.view.get().azimuth) < 0.1")
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.cli.view import latest_asset
+from facefolds_core.cli.view import asset_folder, latest_asset
 from facefolds_core.errors import UserError
 from facefolds_core.player import find_player
 from tests.assets import make_asset
@@ -31,6 +31,21 @@ def test_the_asset_made_last_is_taken(tmp_path: Path) -> None:
 def test_without_any_asset_it_says_how_to_make_one(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="make repro"):
         latest_asset(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["asset", "asset/manifest.json", "asset.glb", "."])
+def test_what_lies_in_an_asset_or_beside_it_names_it(tmp_path: Path, name: str) -> None:
+    (tmp_path / "asset").mkdir()
+    for file in ("asset/manifest.json", "asset.glb"):
+        (tmp_path / file).write_text("{}")
+    assert asset_folder(tmp_path / name) == tmp_path / "asset"
+
+
+@pytest.mark.parametrize(("name", "said"), [("still.glb", "viewers of glTF"), ("nowhere/manifest.json", "data/actor")])
+def test_what_names_no_asset_is_told_what_does(tmp_path: Path, name: str, said: str) -> None:
+    (tmp_path / "still.glb").touch()
+    with pytest.raises(UserError, match=said):
+        asset_folder(tmp_path / name)
 
 
 def test_a_player_that_is_not_built(tmp_path: Path) -> None:

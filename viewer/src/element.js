@@ -1,22 +1,25 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
-import { isColour, painted } from "./colours.js";
+import { fieldOfView, orbitOf } from "./attributes.js";
+import { isColour, isLight, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
 import { Recovery } from "./recovery.js";
 import { KINDS } from "./shaders.js";
-import { asPng, linkTo } from "./sharing.js";
+import { asFile, linkTo } from "./sharing.js";
 import { connectControls } from "./ui/controls.js";
-import { Overlays } from "./ui/overlays.js";
-import { STYLE, TEMPLATE } from "./ui/template.js";
+import { Overlays, showOwnPoster } from "./ui/overlays.js";
+import { PICTURE, STYLE, TEMPLATE } from "./ui/template.js";
+import { isOrbit } from "./viewstate.js";
 import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
-const FORWARDED = ["ready", "level", "frame", "play", "pause", "change", "error"];
+const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
+const OF_THE_VIEW = ["camera-orbit", "field-of-view", "auto-rotate", "disable-zoom"];
 
 export class FacefoldsPlayer extends HTMLElement {
-  static observedAttributes = ["src", "background", "loop", "speed", "level", "still"];
+  static observedAttributes = ["src", "background", "loop", "speed", "level", "still", "alt", "muted", ...OF_THE_VIEW];
 
   #player = null;
   #given = null; // files that came without an address
@@ -31,7 +34,7 @@ export class FacefoldsPlayer extends HTMLElement {
 
   constructor() {
     super();
-    this.attachShadow({ mode: "open" }).adoptedStyleSheets = [STYLE];
+    this.attachShadow({ mode: "open", delegatesFocus: true }).adoptedStyleSheets = [STYLE];
   }
 
   connectedCallback() {
@@ -61,7 +64,31 @@ export class FacefoldsPlayer extends HTMLElement {
     if (name === "loop") this.loop = now !== "false";
     if (name === "still") this.still = now !== null;
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
+    if (name === "alt") this.#describe();
+    if (name === "muted") this.muted = now !== "false";
+    if (OF_THE_VIEW.includes(name)) this.#turn(name);
     if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
+  }
+
+  #describe() {
+    const canvas = this.shadowRoot.querySelector("canvas");
+    const alt = this.getAttribute("alt");
+    if (canvas) canvas.ariaLabel = alt ?? PICTURE;
+    if (canvas) canvas.ariaDescription = alt === null ? null : PICTURE;
+  }
+
+  /** What attributes say of the view. @param {string} [changed] one of them; all otherwise */
+  #turn(changed) {
+    const { view } = this.#player ?? {};
+    if (!view) return;
+    const concerns = (...names) => !changed || names.includes(changed);
+    view.zooms = !this.hasAttribute("disable-zoom");
+    if (concerns("auto-rotate")) view.setRotation(this.hasAttribute("auto-rotate"));
+    if (concerns("camera-orbit", "field-of-view"))
+      this.#player.setFirst(
+        orbitOf(this.getAttribute("camera-orbit")),
+        fieldOfView(this.getAttribute("field-of-view")),
+      );
   }
 
   /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen. */
@@ -69,6 +96,8 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#stop();
     if (this.getAttribute("loading") !== "lazy") return this.#start();
     this.shadowRoot.innerHTML = TEMPLATE;
+    showOwnPoster(this);
+    this.#describe();
     this.#paint(this.getAttribute("background") ?? BACKGROUND);
     this.#ends.push(whenNear(this, () => this.#start()));
   }
@@ -78,6 +107,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#stop();
     this.shadowRoot.innerHTML = TEMPLATE;
     this.overlays = new Overlays(this);
+    showOwnPoster(this);
     this.shadowRoot.querySelector('[data-do="again"]').addEventListener("click", () => this.#start());
     if (!this.#given && !this.hasAttribute("src"))
       return this.overlays.fail(
@@ -89,13 +119,16 @@ export class FacefoldsPlayer extends HTMLElement {
     try {
       this.#player = new Player(this.shadowRoot.querySelector("canvas"));
     } catch (error) {
-      return this.#failed(error);
+      this.#failed(error);
+      return this.overlays.standIn(this.#files());
     }
     const player = this.#player;
     this.#connect(player);
     try {
       await player.load(this.#files(), this.#state.level ?? this.getAttribute("level") ?? "auto");
-      if (player === this.#player) this.overlays.loaded();
+      if (player !== this.#player) return;
+      this.overlays.loaded();
+      this.dispatchEvent(new CustomEvent("load"));
     } catch (error) {
       if (player === this.#player) this.#failed(error);
     }
@@ -109,9 +142,15 @@ export class FacefoldsPlayer extends HTMLElement {
   #connect(player) {
     player.playback.loop = this.getAttribute("loop") !== "false";
     player.still = this.hasAttribute("still");
+    player.mute(this.getAttribute("muted") !== "false");
+    this.#describe();
+    this.#turn();
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isColour(asked) ? asked : BACKGROUND);
+    const repaint = () => this.#paint(this.background);
+    prefersDark.addEventListener("change", repaint);
+    this.#ends.push(() => prefersDark.removeEventListener("change", repaint));
     this.#ends.push(watchSight(this, (seen) => player.setOnScreen(seen)));
     this.overlays.connect(player);
     this.#ends.push(connectControls(this));
@@ -127,7 +166,7 @@ export class FacefoldsPlayer extends HTMLElement {
     const state = this.#state;
     this.#state = {};
     this.#paint(this.background);
-    for (const name of Object.keys(PLAIN)) this.#player.set(name, this.#settings[name]);
+    for (const name of Object.keys(PLAIN)) this[name] = this.#settings[name];
     this.state = { ...state, level: undefined };
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const rests = state.frame !== undefined || state.photo !== undefined;
@@ -204,6 +243,29 @@ export class FacefoldsPlayer extends HTMLElement {
     if (this.#player) this.#player.still = Boolean(on);
   }
 
+  /** Whether the asset's sound is off; it is until somebody asks for it. */
+  get muted() {
+    return this.#player?.muted ?? this.getAttribute("muted") !== "false";
+  }
+
+  set muted(on) {
+    this.#player?.mute(Boolean(on));
+  }
+
+  /** Seconds of the sequence, at its own speed. */
+  get duration() {
+    return this.fps && this.frames / this.fps;
+  }
+
+  /** Seconds from the beginning to the frame shown; to set: shows the frame that is due then. */
+  get currentTime() {
+    return this.fps && Math.max(0, this.frame) / this.fps;
+  }
+
+  set currentTime(seconds) {
+    this.seek(Math.floor(seconds * this.fps + 1e-6));
+  }
+
   get speed() {
     return this.#player?.playback.speed ?? 1;
   }
@@ -233,6 +295,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#settings.background = colour;
     if (!stage) return;
     this.paint = painted(colour, stage);
+    stage.classList.toggle("light", isLight(this.paint, this));
     this.#player?.set("background", this.paint);
   }
 
@@ -240,8 +303,10 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#settings.spread;
   }
 
+  /** Pulls the layers apart; the view turns aside, so that all are seen. */
   set spread(amount) {
-    this.#set("spread", Math.max(0, Math.min(1, Number(amount) || 0)));
+    this.#settings.spread = Math.max(0, Math.min(1, Number(amount) || 0));
+    this.#player?.pullApart(this.#settings.spread);
   }
 
   get wireframe() {
@@ -350,11 +415,16 @@ export class FacefoldsPlayer extends HTMLElement {
 
   /** @param {object} [camera] as for `setCamera` @returns {Promise<Blob>} the same as a PNG */
   async screenshot(camera) {
-    return asPng(this.capture(camera));
+    return asFile(this.capture(camera));
+  }
+
+  /** What is seen, as a file. @param {{mimeType?: string, qualityArgument?: number}} [options] by default a PNG */
+  async toBlob({ mimeType: type, qualityArgument: quality } = {}) {
+    return asFile(this.capture(), { type, quality });
   }
 
   /**
-   * Records one turn from side to side. @param {{seconds?: number, degrees?: number, signal?: AbortSignal}} [options]
+   * Makes a film of one turn from side to side. @param {import("./recording.js").Wanted} [options]
    * @returns {Promise<Blob>} MP4 or WebM
    */
   async record(options) {
@@ -368,7 +438,7 @@ export class FacefoldsPlayer extends HTMLElement {
     return index === null ? this.comparison?.close() : this.comparison?.open(index);
   }
 
-  /** @returns {import("./viewstate.js").ViewState} */
+  /** To set, parts are enough, also of the view. @returns {import("./viewstate.js").ViewState} */
   get state() {
     const player = this.#player;
     if (!player?.level) return { ...this.#state };
@@ -384,11 +454,13 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   set state(state) {
+    const { frame, view, level, hidden, photo, background } = state;
+    if (view && !isOrbit(view))
+      throw new TypeError("a view has azimuth and elevation in degrees, a distance above 0 and a target of 3 numbers");
     if (!this.ready) {
-      this.#state = { ...this.#state, ...state };
+      this.#state = { ...this.#state, ...state, ...(view && { view: { ...this.#state.view, ...view } }) };
       return;
     }
-    const { frame, view, level, hidden, photo, background } = state;
     if (isColour(background)) this.#paint(background);
     for (const key of [...Object.keys(PLAIN), "speed", "loop"]) if (state[key] !== undefined) this[key] = state[key];
     if (hidden) this.#player.hide(hidden);

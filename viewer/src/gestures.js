@@ -64,7 +64,7 @@ export function connectGestures(surface, view) {
   on(
     "wheel",
     (event) => {
-      if (view.exact) return;
+      if (view.exact || !view.zooms) return;
       if (!event.ctrlKey && !view.wheels?.()) {
         surface.dispatchEvent(new CustomEvent("unwanted-wheel", { bubbles: true }));
         return;

@@ -1,7 +1,7 @@
-/** Which level of detail is shown: loads them one after the other, takes another where one fails or is too much. */
+/** Which level of detail is shown: as fine as the canvas shows; another where one fails or is too much. */
 import { Adaptation } from "./adapt.js";
 import { PlayerError } from "./errors.js";
-import { loadLevel } from "./levels.js";
+import { fineness, loadLevel, texelsAUnit } from "./levels.js";
 
 const CATCH_UP = 6; // times that a level that comes in while it plays asks for the frame that is due by then
 const SPARE = 0.7; // of the connection's bytes a second that a stream may take
@@ -17,6 +17,22 @@ export class LevelChoice {
     this.refused = new Set(); // videos that broke down
     this.broken = new Set(); // levels that cannot be loaded
     this.adaptation = new Adaptation();
+    this.goal = ""; // the level that was last asked for because a canvas shows its detail
+    player.addEventListener("draw", () => this.#look());
+  }
+
+  /** Names of the levels up to the coarsest that has a texel for every pixel of the canvas, coarsest first. */
+  #useful() {
+    const { manifest, view } = this.player;
+    const levels = manifest.levels.filter(({ name }) => this.choices.includes(name));
+    const enough = levels.findIndex((info) => this.density * fineness(info) >= view.pixelsAUnit);
+    return this.choices.slice(0, enough < 0 ? this.choices.length : enough + 1);
+  }
+
+  /** The canvas has grown, or the view gone nearer: is a finer level of use? */
+  #look() {
+    if (!this.auto || !this.goal) return;
+    if (this.choices.indexOf(this.#useful().at(-1)) > this.choices.indexOf(this.goal)) this.#improve();
   }
 
   /** First picture from the coarsest level (or the one named), then the goal. @param {() => void} onFirst */
@@ -34,6 +50,10 @@ export class LevelChoice {
     this.auto = !this.choices.includes(want);
     const first = this.auto ? this.choices : this.#nearest(want);
     await this.#firstOf(first);
+    const { level, view } = this.player;
+    if (!level) return; // closed meanwhile
+    this.density = texelsAUnit(level) / fineness(level.info);
+    view.detail = this.density * Math.max(...fitting.map(fineness));
     onFirst();
     if (!this.auto || this.player.closed) return;
     await this.#improve();
@@ -63,9 +83,11 @@ export class LevelChoice {
     throw failures[0];
   }
 
-  /** With `auto`: the finest level that can be loaded. */
+  /** With `auto`: the finest level that can be loaded and whose detail shows. */
   async #improve() {
-    const names = this.choices.slice(this.choices.indexOf(this.player.level.info.name) + 1).reverse();
+    const useful = this.#useful();
+    this.goal = useful.at(-1);
+    const names = useful.slice(this.choices.indexOf(this.player.level.info.name) + 1).reverse();
     await this.#enoughSeen();
     for (const name of names) {
       if (this.broken.has(name) || !this.#affordable(name)) continue;
@@ -183,7 +205,7 @@ export class LevelChoice {
     const move = this.adaptation.note(seconds, late > 1.3 * budget ? late : player.busy, budget);
     if (move < 0 && player.hurry()) return;
     const at = this.choices.indexOf(player.level.info.name);
-    const next = this.choices.filter(
+    const next = (move < 0 ? this.choices : this.#useful()).filter(
       (name, i) => !this.broken.has(name) && (move < 0 ? i < at : i > at && this.#affordable(name)),
     );
     const name = move < 0 ? next.at(-1) : move > 0 ? next[0] : undefined;

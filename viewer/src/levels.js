@@ -76,3 +76,26 @@ export function gpuBytes(level) {
   const image = level.reflection;
   return bytes + (image ? 4 * image.width * image.height : 0);
 }
+
+/** Texels a unit of the scene, the mean over all layers of a level that is loaded. @param {LoadedLevel} level */
+export function texelsAUnit({ info, geometries }) {
+  let [texels, surface] = [0, 0];
+  geometries.forEach(({ index, position, uv }, i) => {
+    const [, , width, height] = info.layers[i].rect;
+    for (let k = 0; k < index.length; k += 3) {
+      const [a, b, c] = index.subarray(k, k + 3);
+      const edge = (data, size, to, axis) => data[size * to + axis] - data[size * a + axis];
+      const cross = (data, size, x, y) =>
+        edge(data, size, b, x) * edge(data, size, c, y) - edge(data, size, b, y) * edge(data, size, c, x);
+      texels += Math.abs(cross(uv, 2, 0, 1)) * width * height;
+      surface += Math.hypot(cross(position, 3, 0, 1), cross(position, 3, 1, 2), cross(position, 3, 2, 0));
+    }
+  });
+  return Math.sqrt(texels / surface);
+}
+
+/** How fine a level's texture is, to be compared with that of another level of the asset. */
+export function fineness({ layers }) {
+  const areas = layers.map(({ rect: [, , w, h], window: [u0, u1, v0, v1] }) => (w * h) / ((u1 - u0) * (v1 - v0)));
+  return Math.sqrt(areas.reduce((sum, area) => sum + area) / areas.length);
+}

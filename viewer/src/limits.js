@@ -1,22 +1,35 @@
-/** The part of the orbit that was filmed: movements beyond it meet resistance, and the picture fades there. */
+/**
+ * The part of the orbit from where the picture is good: movements beyond it meet resistance, and the picture fades there.
+ *
+ * It is the middle of the range that was filmed. What lies at the outline of a picture from an outermost camera, that camera
+ * saw alone and at a grazing angle, so that nothing told its depth: there hems fray. A tenth of the range is left at each end.
+ */
 
-const FREE = 4; // degrees beyond the outermost cameras that are as good as filmed
+const KEPT = 0.8; // of the range that was filmed
+const NEAR = 4; // degrees: so far from a camera, or from where all of them stood, a picture is as good
 const SOFT = 22; // degrees that a movement can be pushed beyond at most
 const FAINTEST = 0.06;
 const ROUND = 300; // degrees: cameras that go round so far have filmed from everywhere
 
 /** @typedef {{azimuth: [number, number], elevation: [number, number]}} Range degrees, of the manifest's `view` */
 
-/** @param {Range | null} range @returns {Range} with the free margin; infinite where nothing bounds it */
+/** @param {Range | null} range that was filmed @returns {Range} its good part; infinite where nothing bounds it */
 export function bounded(range) {
   const all = [-Infinity, Infinity];
   if (!range) return { azimuth: all, elevation: [-89, 89] };
+  const [low, high] = kept(range.elevation);
   const [a, b] = range.azimuth;
-  const [low, high] = range.elevation;
   return {
-    azimuth: b - a >= ROUND ? all : [a - FREE, b + FREE],
-    elevation: [Math.max(-89, low - FREE), Math.min(89, high + FREE)],
+    azimuth: b - a >= ROUND ? all : kept(range.azimuth),
+    elevation: [Math.max(-89, low), Math.min(89, high)],
   };
+}
+
+/** Of a range of directions; the front, where the first view is from, stays if it was filmed. */
+function kept([low, high]) {
+  const [middle, half] = [(low + high) / 2, Math.max(NEAR, (KEPT * (high - low)) / 2)];
+  const front = low - NEAR <= 0 && high + NEAR >= 0 ? 0 : middle;
+  return [Math.min(front, middle - half), Math.max(front, middle + half)];
 }
 
 export const clamp = (value, [low, high]) => Math.max(low, Math.min(high, value));

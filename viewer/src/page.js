@@ -1,4 +1,4 @@
-/** The full page: index.html?src=FOLDER#VIEW. The address follows the view, so that it can be copied at any time. */
+/** The full page: index.html?src=FOLDER#VIEW. The address follows the view; keys that nobody else takes are the player's. */
 import "./index.js";
 import { acceptDrops } from "./ui/drop.js";
 import { decode, encode } from "./viewstate.js";
@@ -22,5 +22,6 @@ function note() {
 }
 for (const name of ["pause", "change", "level", "play"]) player.addEventListener(name, note);
 for (const name of ["pointerup", "keyup", "wheel"]) player.addEventListener(name, note, { passive: true });
+addEventListener("keydown", (event) => event.target === document.body && player.press?.(event));
 addEventListener("hashchange", () => (player.state = decode(location.hash)));
 player.addEventListener("ready", () => (document.title = `${player.player.manifest.subject} · facefolds`));

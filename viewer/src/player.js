@@ -1,7 +1,8 @@
 /**
  * Plays an asset on a canvas: loads it (coarse level first), keeps time, draws. Knows nothing of buttons.
  *
- * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "change" (any setting), "error".
+ * Events: "progress", "ready" (first picture), "level", "frame", "play", "pause", "ended", "change" (any setting),
+ * "camera-change", "error".
  */
 import { Adaptation } from "./adapt.js";
 import { startDecoder, weight } from "./draco/decoder.js";
@@ -17,9 +18,10 @@ import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
 const SMOOTH = 1 / 30; // s that a picture may take while anything moves
+const ASIDE = { azimuth: 42, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
+const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 const RATE_OVER = 1000; // ms that the frames a second are counted over
 const SETTERS = {
-  spread: "setSpread",
   wireframe: "setWireframe",
   effects: "setEffects",
   background: "setBackground",
@@ -40,6 +42,7 @@ export class Player extends EventTarget {
     this.files = null;
     this.level = null;
     this.sound = null;
+    this.muted = true; // until somebody asks for sound: browsers refuse it before a click
     this.shown = -1; // the frame in the texture
     this.stale = false; // the canvas needs drawing
     this.lost = false; // the graphics context
@@ -48,6 +51,7 @@ export class Player extends EventTarget {
     this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
+    this.together = null; // the view before the layers were pulled apart
     this.size = [0, 0];
     this.haste = new Adaptation();
     this.late = false; // pictures came late: what moves is drawn with one ray a pixel
@@ -59,7 +63,7 @@ export class Player extends EventTarget {
 
   /**
    * @param {import("./files.js").Files | import("./files.js").MemoryFiles} files of the asset
-   * @param {string} [want] name of a level, or "auto": the finest that this machine can take
+   * @param {string} [want] name of a level, or "auto": as fine as the canvas shows and this machine can take
    */
   async load(files, want = "auto") {
     this.files = files;
@@ -84,10 +88,22 @@ export class Player extends EventTarget {
     try {
       const address = this.manifest.levels[0].videos[0].segments && this.files.addressFor?.(entry);
       this.sound = address ? new Sound(address) : Sound.of(await this.files.bytes(entry), entry.mime);
-      this.say("change");
+      this.mute(this.muted);
     } catch (error) {
       this.fail(error);
     }
+  }
+
+  mute(on) {
+    this.muted = on;
+    if (this.sound) this.sound.muted = on;
+    this.say("change");
+  }
+
+  /** Where the first view is from. @param {object} orbit @param {number} field see `View.setFirst` */
+  setFirst(orbit, field) {
+    this.view.setFirst(orbit, field);
+    if (this.home) this.view.setHome(this.home);
   }
 
   /** The first view fits what there is. */
@@ -109,6 +125,7 @@ export class Player extends EventTarget {
     this.#showLayers();
     this.#show(frame, picture);
     if (!old && !this.home) this.#settle(this.renderer.bounds());
+    if (this.view.framed) this.pullApart(this.renderer.spread);
     this.draw();
     old?.dispose();
     if (!old) this.say("ready");
@@ -174,10 +191,25 @@ export class Player extends EventTarget {
     this.renderer.setVisible(this.visible);
   }
 
-  /** @param {"spread" | "wireframe" | "effects" | "background" | "mode"} name */
+  /** @param {"wireframe" | "effects" | "background" | "mode"} name */
   set(name, value) {
     this.renderer[SETTERS[name]](value);
-    if (name === "spread" && this.view.free !== value > 0) this.view.setFree(value > 0);
+    this.#changed();
+  }
+
+  /** Pulls the layers apart, and turns aside so that all are seen and fill the canvas; at 0 goes back. */
+  pullApart(amount) {
+    if (!this.level) return;
+    const { view, renderer } = this;
+    if (amount && !this.together) this.together = { orbit: view.get(), atHome: view.atHome };
+    renderer.setSpread(amount);
+    if (view.free !== amount > 0) view.setFree(amount > 0);
+    if (amount) view.frame(renderer.bounds(), this.size[0] > this.size[1] ? ASIDE : ACROSS);
+    else if (this.together) {
+      view.glide(this.together.orbit);
+      view.atHome = this.together.atHome;
+      this.together = null;
+    }
     this.#changed();
   }
 
@@ -267,7 +299,7 @@ export class Player extends EventTarget {
   /** Asks for an animation frame, if anything moves and anybody sees it. */
   wake() {
     if (this.request || this.closed || this.lost || !this.level || !this.onScreen || this.immersed) return;
-    if (!this.playing && !this.stale) return;
+    if (!this.playing && !this.stale && !(this.view.rotates && this.view.swaying)) return;
     this.request = requestAnimationFrame((now) => this.#tick(now));
   }
 
@@ -326,7 +358,7 @@ export class Player extends EventTarget {
     source.want(playback.frame, seconds * playback.fps * playback.speed);
     this.#showIfThere(playback.frame);
     this.detail.measure(seconds, there);
-    if (ended) this.say("pause");
+    if (ended) this.#end();
   }
 
   /** A video element keeps its own time; the clock goes by it. */
@@ -339,8 +371,13 @@ export class Player extends EventTarget {
     this.#showIfThere(source.shown);
     if (ended && !playback.loop) {
       playback.playing = false;
-      this.say("pause");
+      this.#end();
     }
+  }
+
+  #end() {
+    this.say("pause");
+    this.say("ended");
   }
 
   #showIfThere(frame) {
@@ -365,6 +402,9 @@ export class Player extends EventTarget {
     this.stale = false;
     this.drawn.push(performance.now());
     this.say("draw");
+    if (view.every((v, i) => v === this.seen?.[i])) return;
+    this.seen = view;
+    this.say("camera-change");
   }
 
   /** The head where it stood in the frame shown, or at rest. */

@@ -12,7 +12,8 @@ import { Upload } from "./gl/upload.js";
 import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
-const SPREAD = { step: 0.35, all: 3.3 }; // units from layer to layer when fully pulled apart, and at most from end to end
+const SPREAD = { step: 0.4, all: 4 }; // heights of the head from layer to layer when fully pulled apart, and at most in all
+const LOOK = 96; // pixels a side of the picture that the range of depths is taken from
 
 export class LayerRenderer {
   /** @param {HTMLCanvasElement} canvas that is looked at @throws {PlayerError} if there is no WebGL 2 */
@@ -29,6 +30,7 @@ export class LayerRenderer {
     this.wireframe = false;
     this.spread = 0;
     this.kind = "colour";
+    this.range = null; // distances from the eye that are shown bright and dark, for depth; null: of all there is
     this.background = [0, 0, 0, 1];
     this.side = 1; // rays along each side of a pixel of the last picture
   }
@@ -46,6 +48,8 @@ export class LayerRenderer {
   setLevel(level) {
     this.upload?.dispose();
     this.level = level;
+    const ends = level.geometries.flatMap(({ box }) => [box.low[2], box.high[2]]);
+    this.tall = Math.max(...ends) - Math.min(...ends);
     this.upload = new Upload(this.graphics.gl, level);
   }
 
@@ -99,7 +103,7 @@ export class LayerRenderer {
 
   #shift(index) {
     const middle = (this.level.geometries.length - 1) / 2;
-    return this.spread * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
+    return this.spread * this.tall * Math.min(SPREAD.step, SPREAD.all / (2 * middle || 1)) * (middle - index);
   }
 
   /**
@@ -127,10 +131,38 @@ export class LayerRenderer {
 
   /** Draws through a finer picture, if there is one. @param {WebGLFramebuffer | null} target null: the graphics' canvas */
   #filtered(projection, view, fine, width, height, target) {
+    this.range = this.kind === "depth" ? this.#visibleRange(projection, view) : null;
     this.side = fine ? SIDE : 1;
     const rect = [0, 0, this.side * width, this.side * height];
     this.render(projection, view, rect, fine ? fine.framebuffer : target);
     if (fine) this.graphics.average(fine, target, width, height);
+  }
+
+  /** Distances from the eye of what is seen, but for the nearest and the farthest hundredth. @returns {number[] | null} */
+  #visibleRange(projection, view) {
+    const { gl } = this.graphics;
+    const { background } = this;
+    const data = new Uint8Array(4 * LOOK * LOOK);
+    const target = new Target(gl, LOOK, LOOK);
+    [this.background, this.range] = [[0, 0, 0, 0], null];
+    this.render(projection, view, [0, 0, LOOK, LOOK], target.framebuffer);
+    this.background = background;
+    gl.readPixels(0, 0, LOOK, LOOK, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    target.dispose();
+    const seen = [];
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 127) seen.push(1 - data[i] / data[i + 3]);
+    if (!seen.length) return null;
+    seen.sort((a, b) => a - b);
+    const [near, far] = this.#wholeRange(eyeOf(this.pose ? multiplied(view, this.pose) : view));
+    const place = (part) => near + seen[Math.round(part * (seen.length - 1))] * (far - near);
+    return [place(0.01), Math.max(place(0.99), place(0.01) + 1e-3)];
+  }
+
+  /** Distances that hold all that there is. */
+  #wholeRange(eye) {
+    const { centre, radius } = this.bounds();
+    const away = Math.hypot(...centre.map((v, i) => v - eye[i]));
+    return [away - radius, away + radius];
   }
 
   /** Opacity is shown white on black. */
@@ -226,9 +258,7 @@ export class LayerRenderer {
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
     gl.uniform1i(at.kind, KINDS.indexOf(this.kind));
-    const { centre, radius } = this.bounds();
-    const away = Math.hypot(...centre.map((v, i) => v - eye[i]));
-    gl.uniform2f(at.range, away - radius, away + radius);
+    gl.uniform2f(at.range, ...(this.range ?? this.#wholeRange(eye)));
     if (upload.reflection) {
       const { environment, gloss, offset, normals, scales } = level.info.reflection;
       gl.uniform1i(at.reflection, 1);

@@ -9,20 +9,37 @@ export function linkTo(element) {
   return page.href;
 }
 
-/** HTML for a page of somebody else's. @returns {{frame: string, element: string}} */
+/** Whether only this machine can reach an address: what `facefolds view` serves. */
+const isOwn = (address) => /^(localhost|127\..*|\[::1\])$/.test(new URL(address).hostname);
+
+/**
+ * HTML for a page of somebody else's. An address of this machine would be of no use there: then for the player and the
+ * asset uploaded beside the page, and for one file.
+ * @returns {{file: string, frame: string, element: string, own: boolean}} `own`: nobody else can reach what plays here
+ */
 export function embedCode(element) {
   const quoted = (text) => text.replace(/&/g, "&amp;").replace(/"/g, "&quot;");
-  const script = new URL("./facefolds-player.js", import.meta.url).href;
-  const source = new URL(element.getAttribute("src"), document.baseURI).href;
-  const title = element.player?.manifest?.subject || "facefolds";
+  const asset = new URL(element.getAttribute("src"), document.baseURI).href;
+  const own = isOwn(asset) || isOwn(import.meta.url);
+  const script = own ? "player/facefolds-player.js" : new URL("./facefolds-player.js", import.meta.url).href;
+  const source = own ? "player/asset/" : asset;
+  const link = own ? `player/index.html?src=asset/#${encode(element.state)}` : linkTo(element);
+  const name = (element.player?.manifest?.subject || "face").replace(/[^\w-]+/g, "_");
+  const frame = (address) =>
+    `<iframe src="${quoted(address)}" title="${name}" width="640" height="480" style="border: 0" loading="lazy" allow="fullscreen; clipboard-write"></iframe>`;
   return {
-    frame: `<iframe src="${quoted(linkTo(element))}" title="${quoted(title)}" width="640" height="480" style="border: 0" loading="lazy" allow="fullscreen; clipboard-write"></iframe>`,
+    file: `facefolds export-html data/${name}/asset --out ${name}.html\n${frame(`${name}.html`)}`,
+    frame: frame(link),
     element: `<script type="module" src="${quoted(script)}"></script>\n<facefolds-player src="${quoted(source)}" loading="lazy" style="height: 480px"></facefolds-player>`,
+    own,
   };
 }
 
-/** A picture as a file. @param {ImageData} picture premultiplied, as `capture` gives it @returns {Promise<Blob>} PNG */
-export async function asPng({ data, width, height }) {
+/**
+ * A picture as a file. @param {ImageData} picture premultiplied, as `capture` gives it
+ * @param {{type?: string, quality?: number}} [options] of the browser's encoders @returns {Promise<Blob>} by default a PNG
+ */
+export async function asFile({ data, width, height }, { type = "image/png", quality } = {}) {
   const straight = new ImageData(width, height);
   for (let i = 0; i < data.length; i += 4) {
     const alpha = data[i + 3];
@@ -31,7 +48,7 @@ export async function asPng({ data, width, height }) {
   }
   const canvas = new OffscreenCanvas(width, height);
   canvas.getContext("2d").putImageData(straight, 0, 0);
-  return canvas.convertToBlob({ type: "image/png" });
+  return canvas.convertToBlob({ type, quality });
 }
 
 /** Offers a file for download. */

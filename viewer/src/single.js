@@ -22,4 +22,5 @@ const files = Array.from(document.querySelectorAll("script[data-file]"), (script
 if (parent === window) player.setAttribute("gestures", "all");
 player.openFiles(new Map(files));
 player.state = decode(location.hash);
+addEventListener("keydown", (event) => event.target === document.body && player.press?.(event));
 player.addEventListener("ready", () => (document.title = `${player.player.manifest.subject} · facefolds`));

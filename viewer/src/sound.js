@@ -12,7 +12,7 @@ export class Sound {
   constructor(address) {
     this.audio = new Audio(address);
     this.audio.preload = address.startsWith("blob:") ? "auto" : "none";
-    this.muted = true; // until somebody asks for sound: browsers refuse it before a click
+    this.muted = true;
   }
 
   /** @param {import("./playback.js").Playback} playback */

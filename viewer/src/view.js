@@ -1,15 +1,18 @@
 /** The eye: an orbit by mouse, touch and keys, or for a while an exact camera of a capture. */
+import { FIELD_OF_VIEW } from "./attributes.js";
 import { axesOf, orbitView, projectionOf, viewOf } from "./camera.js";
 import { connectGestures } from "./gestures.js";
 import { bounded, clamp, resisted, strength, unwound } from "./limits.js";
 import { transformed } from "./matrices.js";
 
-const FIELD_OF_VIEW = 30; // degrees; facefolds_core/packaging/poster.py has this and the next
-const HALF = Math.tan((FIELD_OF_VIEW / 360) * Math.PI);
-const FILLED = 0.92; // of the free part of the canvas, by what there is
+const FILLED = 0.92; // of the free part of the canvas, by what there is; facefolds_core/packaging/poster.py has it, too
+const halfOf = (degrees) => Math.tan((degrees / 360) * Math.PI);
 const EASE = 0.07; // s in which most of a movement is done
 const DISTANCES = [0.2, 20];
-const SWAY = { degrees: 5, seconds: 9 };
+const FAINT = 0.9; // strength of the picture below which it is told why
+const LARGEST = 6; // pixels of the canvas that a texel takes when one has come as near as one can
+const SWAY = { degrees: 5, seconds: 9 }; // to each side; there and back
+const ROTATION = { degrees: 25, seconds: 20, speed: 12, patience: 3000 }; // degrees a second all round; ms after a touch
 
 export class View {
   /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange a picture is due */
@@ -22,13 +25,20 @@ export class View {
     this.exact = null;
     this.home = null;
     this.atHome = true; // nobody has moved it: it is fitted again when the canvas changes
+    this.framed = null; // arguments of `frame`
     this.range = bounded(null);
     this.filmed = null; // of the manifest
+    this.front = 0; // units from the middle of what there is to its front
+    this.detail = Infinity; // texels that a unit of the scene has at most
     this.free = false; // limits are off: the layers are pulled apart
     this.inset = 0; // part of the height that the controls take, from below
     this.size = [1, 1];
     this.shape = [1, 1]; // width and height of what the first view fits
     this.swaying = 0; // s since it began; 0: still
+    this.rotates = false; // it sways wider, also at rest, and again after a touch
+    this.zooms = true; // by wheel, pinch and keys
+    this.half = halfOf(FIELD_OF_VIEW); // tangent of half the field of view
+    this.first = {}; // what the page asks of the first view
     this.eases = !matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.gestures = connectGestures(surface, this);
   }
@@ -66,10 +76,23 @@ export class View {
 
   /** A slow turn to and fro, until somebody touches the view. */
   startSway() {
-    if (this.eases) this.swaying = 1e-6;
+    if (this.eases) this.swaying ||= 1e-6;
+  }
+
+  /** Turns by itself: to and fro as far as the picture is good, or round where that is everywhere. */
+  setRotation(on) {
+    this.rotates = on;
+    clearTimeout(this.timer);
+    if (!on) return this.#stopSway();
+    this.startSway();
+    this.onChange();
   }
 
   #stopSway() {
+    if (this.rotates) {
+      clearTimeout(this.timer);
+      this.timer = setTimeout(() => this.setRotation(true), ROTATION.patience);
+    }
     if (!this.swaying) return;
     const offset = this.#sway();
     this.swaying = 0;
@@ -77,10 +100,24 @@ export class View {
     this.goal.azimuth += offset;
   }
 
+  /** Degrees; it begins gently, and goes no further than the picture is good. */
   #sway() {
-    const t = (2 * Math.PI * this.swaying) / SWAY.seconds;
-    const slow = Math.min(1, this.swaying / 2); // it begins gently
-    return this.swaying ? slow * SWAY.degrees * Math.sin(t) : 0;
+    if (!this.swaying) return 0;
+    const { azimuth } = this.range;
+    if (this.rotates && azimuth[1] === Infinity) {
+      const { swaying } = this;
+      return ROTATION.speed * (swaying < 2 ? swaying ** 2 / 4 : swaying - 1);
+    }
+    const { degrees, seconds } = this.rotates ? ROTATION : SWAY;
+    const part = Math.min(1, this.swaying / 2) * Math.sin((2 * Math.PI * this.swaying) / seconds);
+    const room = part > 0 ? azimuth[1] - this.now.azimuth : this.now.azimuth - azimuth[0];
+    return part * Math.max(0, Math.min(degrees, room));
+  }
+
+  /** @param {ReturnType<typeof import("./attributes.js").orbitOf>} orbit @param {number} field of view, degrees */
+  setFirst(orbit, field) {
+    [this.first, this.half] = [orbit, halfOf(field)];
+    this.atHome = true;
   }
 
   /**
@@ -88,16 +125,54 @@ export class View {
    * asset's poster shows the same. @param {{low: number[], high: number[], centre: number[]}} box */
   setHome({ low, high, centre }) {
     this.shape = [high[1] - low[1], high[2] - low[2]];
-    const away = this.distanceFor(...this.shape);
+    this.front = high[0] - centre[0];
+    const away = this.#distanceFor(...this.shape);
     const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
-    this.home = { azimuth: 0, elevation: 0, distance, target: [...centre] };
-    if (this.atHome && !this.exact) this.reset();
+    const { share = 1, ...first } = this.first;
+    this.home = { azimuth: 0, elevation: 0, distance: share * distance, target: [...centre], ...first };
+    if (!this.atHome || this.exact) return;
+    const { swaying } = this;
+    this.reset();
+    this.swaying = swaying; // nobody has touched it
   }
 
   /** From how far something of that width and height fills the free part of the canvas. */
-  distanceFor(across, tall) {
+  #distanceFor(across, tall) {
     const [width, height] = this.#room();
-    return (this.#side() * Math.max(across / width, tall / height)) / (2 * HALF * FILLED);
+    return (this.#side() * Math.max(across / width, tall / height)) / (2 * this.half * FILLED);
+  }
+
+  /**
+   * Turns to a direction, from where the canvas holds all of a box and no more. Until somebody moves the view, it does so
+   * again when the canvas changes.
+   * @param {{low: number[], high: number[]}} box @param {{azimuth: number, elevation: number}} direction
+   */
+  frame({ low, high }, direction) {
+    const { right, up, back } = axesOf(direction);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => ((k >> i) & 1 ? high[i] : low[i])));
+    const along = (axis) => corners.map((corner) => corner.reduce((sum, v, i) => sum + v * axis[i], 0));
+    const towards = along(back);
+    const middle = (Math.min(...towards) + Math.max(...towards)) / 2;
+    // A corner at r along the picture and b towards the eye is inside where |r - t| <= slope * (distance - b).
+    const distanceOf = (axis, pixels) => {
+      const slope = (this.half * FILLED * pixels) / this.#side();
+      const end = (sign) => Math.max(...along(axis).map((r, i) => sign * r + slope * (towards[i] - middle)));
+      return (end(1) + end(-1)) / 2 / slope;
+    };
+    const [width, height] = this.#room();
+    const distance = Math.max(distanceOf(right, width), distanceOf(up, height));
+    const centred = (axis) => {
+      let t = 0;
+      for (let k = 0; k < 8; ++k) {
+        const seen = along(axis).map((r, i) => (r - t) / (distance + middle - towards[i]));
+        t += ((Math.min(...seen) + Math.max(...seen)) / 2) * distance;
+      }
+      return t;
+    };
+    const [x, y] = [centred(right), centred(up)];
+    const target = back.map((v, i) => middle * v + x * right[i] + y * up[i]);
+    this.glide({ ...direction, distance, target });
+    this.framed = [{ low, high }, direction];
   }
 
   reset() {
@@ -110,10 +185,11 @@ export class View {
     return { ...this.now, azimuth: unwound(this.now.azimuth, [-Infinity, Infinity]), target: [...this.now.target] };
   }
 
+  /** Goes there at once. @param {Partial<import("./camera.js").Orbit>} orbit */
   set(orbit) {
     this.setExact(null);
     this.touched();
-    this.#aim(orbit);
+    this.#aim({ ...this.goal, ...orbit });
     this.now = { ...this.goal, target: [...this.goal.target] };
     this.onChange();
   }
@@ -128,16 +204,23 @@ export class View {
   #aim(orbit) {
     const azimuth = clamp(unwound(orbit.azimuth, this.range.azimuth), this.range.azimuth);
     const elevation = clamp(orbit.elevation, this.range.elevation);
-    const distance = clamp(orbit.distance, DISTANCES);
+    const distance = clamp(orbit.distance, this.#distances());
     this.goal = { azimuth, elevation, distance, target: [...orbit.target] };
     if (Math.abs(azimuth - this.now.azimuth) > 180)
       this.now.azimuth = unwound(this.now.azimuth, [azimuth - 180, azimuth + 180]);
+  }
+
+  /** As near as there is detail to be seen, but twice as near as the first view at least. */
+  #distances() {
+    const detailed = this.front + this.#side() / (2 * this.half * LARGEST * this.detail);
+    return [Math.max(DISTANCES[0], Math.min(detailed, (this.home?.distance ?? Infinity) / 2)), DISTANCES[1]];
   }
 
   /** Somebody has moved the view: it stays as it is from now on. */
   touched() {
     this.#stopSway();
     this.atHome = false;
+    this.framed = null;
   }
 
   /** Moves by angles in degrees and a factor of the distance (keyboard). */
@@ -160,6 +243,7 @@ export class View {
     this.pushed.elevation += 250 * dy;
     this.goal.azimuth = resisted(this.pushed.azimuth, this.range.azimuth);
     this.goal.elevation = clamp(resisted(this.pushed.elevation, this.range.elevation), [-89, 89]);
+    if (strength(this.goal, this.range) < FAINT) this.surface.dispatchEvent(new Event("limit"));
     this.onChange();
   }
 
@@ -181,9 +265,10 @@ export class View {
 
   /** Nearer or further, towards a place of the picture. @param {number} x, y CSS pixels from its middle, y down */
   zoom(factor, x = 0, y = 0) {
+    if (!this.zooms) return;
     this.touched();
     const before = this.#unit();
-    this.goal.distance = clamp(this.goal.distance * factor, DISTANCES);
+    this.goal.distance = clamp(this.goal.distance * factor, this.#distances());
     const change = before - this.#unit();
     const { right, up } = axesOf(this.goal);
     this.goal.target = this.goal.target.map((v, i) => v + change * (x * right[i] - y * up[i]));
@@ -193,7 +278,12 @@ export class View {
   /** Units of the scene in a CSS pixel at the target. */
   #unit() {
     const scale = this.surface.clientHeight / this.size[1] || 1;
-    return (2 * HALF * this.goal.distance) / (this.#side() * scale);
+    return (2 * this.half * this.goal.distance) / (this.#side() * scale);
+  }
+
+  /** Pixels of the canvas that a unit of the scene takes, at the target; an exact camera may come as near as it likes. */
+  get pixelsAUnit() {
+    return this.exact ? Infinity : this.#side() / (2 * this.half * this.goal.distance);
   }
 
   /** Of the square, in pixels, that the field of view is of: one that holds what there is fits the canvas just so. */
@@ -236,7 +326,7 @@ export class View {
   #intrinsics(width, height) {
     const hidden = this.size[1] - this.#room()[1];
     const scale = Math.min(width / this.size[0], height / this.size[1]);
-    const focal = (this.#side() * scale) / (2 * HALF);
+    const focal = (this.#side() * scale) / (2 * this.half);
     return [[focal, 0, width / 2], [0, focal, (height - hidden * scale) / 2], [0, 0, 1]]; // prettier-ignore
   }
 
@@ -257,9 +347,11 @@ export class View {
   resize(width, height, inset) {
     this.size = [width, height];
     this.inset = inset;
+    if (this.framed) this.frame(...this.framed);
   }
 
   dispose() {
+    clearTimeout(this.timer);
     this.gestures.dispose();
   }
 }

@@ -1,7 +1,7 @@
 /** What can be shared of a view, as the part of an address behind "#": short, readable, checked when it is read. */
 
 /**
- * @typedef {{frame?: number, view?: {azimuth: number, elevation: number, distance: number, target: number[]},
+ * @typedef {{frame?: number, view?: Partial<import("./camera.js").Orbit>,
  *   level?: string, background?: string, hidden?: number[], spread?: number, wireframe?: boolean, effects?: boolean,
  *   mode?: string, speed?: number, loop?: boolean, photo?: number}} ViewState layers and photos by index; defaults may be left out
  */
@@ -36,9 +36,8 @@ export function decode(text) {
   const numbers = (key) => (given.get(key) ?? "").split(",").map((part) => (part.trim() === "" ? NaN : Number(part)));
   const state = {};
   const [azimuth, elevation, distance, ...target] = numbers("view");
-  if (target.length === 3 && distance > 0 && [azimuth, elevation, ...target].every(Number.isFinite)) {
-    state.view = { azimuth, elevation, distance, target };
-  }
+  const view = { azimuth, elevation, distance, target };
+  if (isOrbit(view)) state.view = view;
   const one = (key, good) => {
     const [value] = numbers(key);
     if (Number.isFinite(value) && good(value)) state[key] = value;
@@ -56,4 +55,9 @@ export function decode(text) {
   if (given.has("hidden")) state.hidden = numbers("hidden").filter((i) => Number.isInteger(i) && i >= 0);
   for (const key of ["wireframe", "effects", "loop"]) if (given.has(key)) state[key] = given.get(key) !== "0";
   return state;
+}
+
+/** @param {Partial<import("./camera.js").Orbit>} orbit @returns {boolean} whether its parts are numbers that mean a view */
+export function isOrbit({ azimuth = 0, elevation = 0, distance = 1, target = [0, 0, 0] }) {
+  return [azimuth, elevation, distance, ...target].every(Number.isFinite) && target.length === 3 && distance > 0;
 }

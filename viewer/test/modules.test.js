@@ -3,6 +3,7 @@ import { test } from "node:test";
 import { Matrix4, Vector3, Vector4 } from "three";
 import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/camera.js";
 import { eyeOf, transformed } from "../src/matrices.js";
+import { fieldOfView, orbitOf } from "../src/attributes.js";
 import { Adaptation } from "../src/adapt.js";
 import { bounded, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
@@ -70,6 +71,13 @@ test("a view survives its way through the address", () => {
   const state = { frame: 7, view, level: "full", background: "#102030", hidden: [0, 3], spread: 0.25, speed: 0.5 };
   const flags = { wireframe: true, effects: false, loop: false, mode: "depth" };
   assert.deepEqual(decode(`#${encode({ ...state, ...flags })}`), { ...state, ...flags });
+});
+
+test("an orbit in the words of model-viewer", () => {
+  assert.deepEqual(orbitOf("30deg 80deg 120%"), { azimuth: 30, elevation: 10, share: 1.2 });
+  assert.deepEqual(orbitOf("-0.5rad auto 1.5m"), { azimuth: -0.5 * (180 / Math.PI), distance: 1.5 });
+  for (const nothing of [null, "", "auto auto auto", "30 80 1"]) assert.deepEqual(orbitOf(nothing), {});
+  assert.deepEqual(["20deg", "auto", null, "500deg", "0deg"].map(fieldOfView), [20, 30, 30, 90, 5]);
 });
 
 test("any colour survives its way through the address", () => {
@@ -281,16 +289,19 @@ test("a manifest that is wrong is refused, naming the place", () => {
   }
 });
 
-test("movements beyond what was filmed meet resistance, and fade", () => {
+test("movements beyond the middle of what was filmed meet resistance, and fade", () => {
   const range = bounded({ azimuth: [-40, 60], elevation: [-10, 20] });
+  assert.deepEqual(range, { azimuth: [-30, 50], elevation: [-7, 17] });
   assert.equal(resisted(50, range.azimuth), 50);
-  const [little, far] = [resisted(75, range.azimuth), resisted(500, range.azimuth)];
-  assert.ok(little > 64 && little < 75 && far > little && far < 90);
-  assert.equal(strength({ azimuth: 60, elevation: 0 }, range), 1);
+  const [little, far] = [resisted(65, range.azimuth), resisted(500, range.azimuth)];
+  assert.ok(little > 54 && little < 65 && far > little && far < 80);
+  assert.equal(strength({ azimuth: 50, elevation: 0 }, range), 1);
   assert.ok(strength({ azimuth: far, elevation: 0 }, range) < 0.1);
   assert.equal(strength({ azimuth: 170, elevation: 60 }, bounded(null)), 1);
   assert.equal(bounded({ azimuth: [-170, 175], elevation: [0, 0] }).azimuth[1], Infinity); // filmed all round
   assert.equal(unwound(350, range.azimuth), -10);
+  // The front stays where it was filmed, and where one camera stood there is room to move.
+  assert.deepEqual(bounded({ azimuth: [-3, 57], elevation: [7, 7] }), { azimuth: [0, 51], elevation: [3, 11] });
 });
 
 /** What is said while pictures come every `seconds` and take `work`, for `total` seconds. */

@@ -8,6 +8,7 @@ const seen = {};
 const note = (name) => (seen[name] ??= { ms: performance.now(), bytes: element.statistics.bytesLoaded });
 
 element.addEventListener("ready", () => note("first"));
+element.addEventListener("load", () => (element.level = element.levels.at(-1))); // whatever the window shows of it
 element.addEventListener("level", () => {
   if (element.level !== element.levels.at(-1) || window.loaded) return;
   note("all");

@@ -19,7 +19,7 @@ export function connectBar(element) {
     back: () => element.step(-1),
     next: () => element.step(1),
     loop: () => (element.loop = !element.loop),
-    sound: () => toggleSound(player),
+    sound: () => player.sound && (element.muted = !element.muted),
     compare: () => (element.comparison.index === null ? element.compare(0) : element.compare(null)),
     settings: () => {
       panel.hidden = !panel.hidden;
@@ -132,9 +132,11 @@ async function saveTurn(element, button) {
   if (!element.ready) return;
   element.recording = new AbortController();
   button.setAttribute("aria-pressed", "true");
-  element.overlays.say("Recording. Press again to end it early.", 8000);
+  const onPart = (part) =>
+    element.overlays.say(`Recording, ${Math.round(100 * part)} %. Press again to end it early.`, 8000);
+  onPart(0);
   try {
-    const film = await element.record({ signal: element.recording.signal });
+    const film = await element.record({ signal: element.recording.signal, onPart });
     save(film, `${fileName(element)}-turn.${film.type.split("/")[1]}`);
     element.overlays.say("Saved");
   } catch (error) {
@@ -150,10 +152,4 @@ function dismiss(element) {
   const panel = element.shadowRoot.querySelector(".panel");
   if (!panel.hidden) element.actions.settings();
   else element.compare(null);
-}
-
-function toggleSound(player) {
-  if (!player.sound) return;
-  player.sound.muted = !player.sound.muted;
-  player.dispatchEvent(new Event("change"));
 }

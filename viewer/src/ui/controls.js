@@ -6,6 +6,8 @@ import { connectIdle } from "./idle.js";
 import { connectKeys } from "./keys.js";
 import { connectPanel } from "./panel.js";
 
+const AGAIN = 1000; // ms without what a word is about, before it is said a second time
+const PROMPT = 3000; // ms until it is said what one can do
 const RATIO = 2; // pixels of the canvas for a CSS pixel, at most
 
 /** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
@@ -17,9 +19,8 @@ export function connectControls(element) {
   connectBar(element);
   connectPanel(element);
   connectEmbed(element);
-  connectKeys(element);
   connectGesturesOf(element);
-  const idle = connectIdle(element);
+  const [keys, idle] = [connectKeys(element), connectIdle(element)];
   const resizing = new ResizeObserver(() => {
     // The bar, and on a phone the open sheet of the settings: the head stands above them.
     const sheet = panel.offsetHeight && panel.offsetTop > stage.clientHeight / 3;
@@ -30,6 +31,7 @@ export function connectControls(element) {
   for (const part of [stage, bar, panel]) resizing.observe(part);
   return () => {
     resizing.disconnect();
+    keys();
     idle();
   };
 }
@@ -39,8 +41,24 @@ function connectGesturesOf(element) {
   const { player, shadowRoot: root } = element;
   const own = () => element.getAttribute("gestures") === "all" || document.fullscreenElement === element;
   player.view.wheels = () => own() || root.activeElement !== null;
-  let told = 0;
-  player.canvas.addEventListener("unwanted-wheel", () => {
-    if (told++ < 2) element.overlays.say("Ctrl + wheel zooms, or click first");
-  });
+  const tell = (name, text) => {
+    let told = 0;
+    let last = 0;
+    player.canvas.addEventListener(name, ({ timeStamp }) => {
+      if (timeStamp - last > AGAIN && told++ < 2) element.overlays.say(text);
+      last = timeStamp;
+    });
+  };
+  tell("unwanted-wheel", "Ctrl + wheel zooms, or click first");
+  if (element.getAttribute("interaction-prompt") === "auto") prompt(element);
+  tell("limit", "Cameras saw too little from further round");
+}
+
+/** Says what one can do, where nobody has done it yet. */
+function prompt({ player, overlays }) {
+  let done = false;
+  player.canvas.addEventListener("pointerdown", () => (done = true), { once: true });
+  player.addEventListener("ready", () =>
+    setTimeout(() => done || player.closed || overlays.say("Drag to turn"), PROMPT),
+  );
 }

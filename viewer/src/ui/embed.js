@@ -8,6 +8,7 @@ export function connectEmbed(element) {
   element.openEmbed = () => {
     const code = embedCode(element);
     for (const [name, field] of Object.entries(fields)) field.value = code[name];
+    dialog.classList.toggle("own", code.own);
     dialog.showModal();
   };
   dialog.addEventListener("click", async ({ target }) => {

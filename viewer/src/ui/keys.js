@@ -1,18 +1,17 @@
-/** Keys, while the player (or anything in it that does not need the key itself) has the focus. */
-
-import { pullApart } from "./panel.js";
+/** Keys, while the player (or anything in it that does not need the key itself) has the focus, or the page is all its. */
 
 const TURN = 5; // degrees
 const ZOOM = 1.1;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
 
-/** @param {import("../element.js").FacefoldsPlayer} element */
+/** @param {import("../element.js").FacefoldsPlayer} element @returns {() => void} ends it */
 export function connectKeys(element) {
   const { player, shadowRoot: root } = element;
   const act = (name) => () => element.actions[name]();
   const flip = (name) => () => (element[name] = !element[name]);
-  const turn = (azimuth, elevation) => () => player.view.exact || player.view.move(azimuth, elevation);
-  const zoom = (factor) => () => player.view.exact || player.view.move(0, 0, factor);
+  const held = () => player.view.exact || element.getAttribute("camera-controls") === "none";
+  const turn = (azimuth, elevation) => () => held() || player.view.move(azimuth, elevation);
+  const zoom = (factor) => () => held() || !player.view.zooms || player.view.move(0, 0, factor);
   const faster = (by) => () => {
     const next = SPEEDS.findIndex((speed) => speed >= element.speed) + by;
     element.speed = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, next))];
@@ -21,7 +20,7 @@ export function connectKeys(element) {
     " ": act("play"), k: act("play"), ArrowLeft: act("back"), ArrowRight: act("next"), ",": act("back"), ".": act("next"),
     Home: () => element.seek(0), End: () => element.seek(element.frames - 1), "<": faster(-1), ">": faster(1), l: act("loop"),
     "+": zoom(1 / ZOOM), "=": zoom(1 / ZOOM), "-": zoom(ZOOM), 0: act("reset"), w: flip("wireframe"), e: flip("effects"),
-    p: () => pullApart(element, element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
+    p: () => (element.spread = element.spread > 0 ? 0 : 1), m: act("sound"), f: act("full"),
     c: () => player.manifest?.photos.length && element.actions.compare(),
     s: () => element.overlays.showStatistics(!element.overlays.statistics),
     Escape: act("dismiss"), i: act("picture"),
@@ -32,7 +31,8 @@ export function connectKeys(element) {
     ArrowUp: turn(0, TURN),
     ArrowDown: turn(0, -TURN),
   };
-  root.addEventListener("keydown", (event) => {
+  const listening = new AbortController();
+  const press = (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || !element.ready) return;
     if (event.target.closest("dialog")) return; // it knows Escape by itself
     if (needsKeys(event.target, event.key)) return;
@@ -43,7 +43,10 @@ export function connectKeys(element) {
     if (!action) return;
     event.preventDefault();
     action();
-  });
+  };
+  element.press = press;
+  root.addEventListener("keydown", press, { signal: listening.signal });
+  return () => listening.abort();
 }
 
 /** Controls that use the key themselves. */

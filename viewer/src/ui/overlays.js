@@ -1,8 +1,16 @@
 /** What lies over the picture and is not a control: poster, progress, statistics, messages. */
 import { weight } from "../draco/decoder.js";
 import { PlayerError } from "../errors.js";
+import { parseManifest } from "../manifest.js";
 
 const mebibytes = (bytes) => `${(bytes / 2 ** 20).toFixed(bytes < 2 ** 20 * 10 ? 2 : 1)} MiB`;
+
+/** The page's own poster, at once. @param {import("../element.js").FacefoldsPlayer} element */
+export function showOwnPoster(element) {
+  const poster = element.shadowRoot.querySelector(".poster");
+  const address = element.getAttribute("poster");
+  if (address) [poster.src, poster.hidden] = [address, false];
+}
 
 export class Overlays {
   /** @param {import("../element.js").FacefoldsPlayer} element */
@@ -37,12 +45,14 @@ export class Overlays {
     const { player } = this;
     const { manifest } = player;
     if (!manifest) return;
-    if (manifest.poster && !player.level && !this.posterAsked) this.#showPoster(manifest.poster);
+    if (manifest.poster && !player.level && !this.posterAsked) this.#showPoster(manifest.poster, player.files);
     const wanted = manifest.levels.find(({ name }) => name === (player.detail.wanted ?? player.choices[0]));
     if (!wanted) return;
     if (this.levelBefore !== wanted) [this.levelBefore, this.loadedBefore] = [wanted, player.files.loaded];
     const [decoder, all] = player.level ? [0, 0] : [weight.loaded, weight.total]; // before the first picture it comes too
     const part = Math.min(1, (player.files.loaded - this.loadedBefore + decoder) / (wanted.first + all));
+    const detail = { totalProgress: part, level: wanted.name };
+    this.element.dispatchEvent(new CustomEvent("progress", { detail }));
     this.find(".spinner i").style.width = `${100 * part}%`;
     this.find(".spinner div").setAttribute("aria-valuenow", String(Math.round(100 * part)));
     this.find(".spinner span").textContent = `Loading, ${mebibytes(player.files.loaded + decoder)}`;
@@ -53,11 +63,12 @@ export class Overlays {
   }
 
   /** A picture to look at until there is one; without it, nothing is lost. */
-  async #showPoster(entry) {
+  async #showPoster(entry, files) {
     this.posterAsked = true;
+    if (this.element.hasAttribute("poster")) return;
     const poster = this.find(".poster");
     try {
-      poster.src = URL.createObjectURL(new Blob([await this.player.files.bytes(entry)]));
+      poster.src = URL.createObjectURL(new Blob([await files.bytes(entry)]));
       await poster.decode();
       this.poster = entry;
       this.#placePoster();
@@ -66,9 +77,23 @@ export class Overlays {
     }
   }
 
+  /** Where nothing can be drawn: the poster, and below it why. @param {import("../files.js").Files} files */
+  async standIn(files) {
+    try {
+      const { poster } = parseManifest(await files.text("manifest.json"), files.address("manifest.json"));
+      if (poster) await this.#showPoster(poster, files);
+    } catch {
+      return; // what was said stays
+    }
+    const poster = this.find(".poster");
+    if (poster.src)
+      [poster.hidden, poster.alt] = [false, this.element.getAttribute("alt") ?? "The subject, from the front"];
+    this.find(".stage").classList.toggle("still", !poster.hidden);
+  }
+
   /** Where the first picture will show the same; one that would show something else is not shown. */
   #placePoster() {
-    if (!this.poster || this.player.level) return;
+    if (!this.poster || !this.player || this.player.level) return;
     const { element, player } = this;
     const { camera } = this.poster;
     const { style } = this.find(".poster");

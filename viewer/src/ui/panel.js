@@ -1,8 +1,6 @@
 /** The settings: detail, what is shown, background, layers, pull apart, wireframe, reflection, statistics. */
 import { hexOf } from "../colours.js";
 
-const ASIDE = 55; // degrees: from where layers that are pulled apart are seen
-
 /** @param {import("../element.js").FacefoldsPlayer} element */
 export function connectPanel(element) {
   const panel = element.shadowRoot.querySelector(".panel");
@@ -12,7 +10,7 @@ export function connectPanel(element) {
   for (const swatch of panel.querySelectorAll("[data-colour]")) swatch.style.setProperty("--c", swatch.dataset.colour);
   for (const name of ["level", "mode"])
     input(name).addEventListener("change", (event) => (element[name] = event.target.value));
-  input("spread").addEventListener("input", (event) => pullApart(element, Number(event.target.value)));
+  input("spread").addEventListener("input", (event) => (element.spread = event.target.value));
   for (const name of ["wireframe", "effects"]) {
     input(name).addEventListener("change", (event) => (element[name] = event.target.checked));
   }
@@ -61,21 +59,4 @@ export function connectPanel(element) {
   };
   player.addEventListener("level", showLevel);
   for (const name of ["ready", "change"]) player.addEventListener(name, showState);
-}
-
-/** Pulls the layers apart, turns aside and fits them, so that all are seen; goes back at the end. */
-export function pullApart(element, amount) {
-  const { view, renderer } = element.player;
-  if (!element.spread && amount) element.together = view.get();
-  element.spread = amount;
-  if (amount) {
-    const { low, high, centre } = renderer.bounds();
-    const [depth, width, tall] = high.map((value, i) => value - low[i]);
-    const angle = (ASIDE * Math.PI) / 180;
-    const away = view.distanceFor(depth * Math.sin(angle) + width * Math.cos(angle), tall);
-    view.glide({ azimuth: ASIDE, distance: away + (depth / 2) * Math.cos(angle), target: centre });
-  } else if (element.together) {
-    view.glide(element.together);
-    element.together = null;
-  }
 }

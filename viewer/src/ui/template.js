@@ -41,19 +41,27 @@ const SWATCHES = { "#16181d": "Dark", "#000000": "Black", "#7f7f7f": "Grey", "#f
 
 const MODES = { colour: "Picture", alpha: "Opacity", depth: "Depth", uv: "Texture coordinates" };
 
+/** What the canvas is, to who does not see it. */
+export const PICTURE =
+  "Three-dimensional picture. Drag to turn, wheel (with Ctrl) or pinch to zoom, right button or two fingers to move.";
+
+/** A text to copy. */
+const field = ([name, label]) =>
+  `<div class="${name}"><label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button></div>`;
+
 export const TEMPLATE = `<div class="stage">
-  <canvas tabindex="0" role="img" aria-label="Three-dimensional picture. Drag to turn, wheel (with Ctrl) or pinch to zoom, right button or two fingers to move."></canvas>
-  <img class="poster" alt="" hidden>
+  <canvas tabindex="0" role="img" part="canvas"></canvas>
+  <img class="poster" part="poster" alt="" hidden>
   <div class="compare" hidden>
     <div class="frame"><img alt="Photo of a camera that was held out">
       <span class="tag left">Asset</span><span class="tag right">Photo</span><i></i>
       <input type="range" min="0" max="100" value="50" step="0.5" aria-label="Border between asset and photo"></div>
     <div class="chooser"><select aria-label="Photo"></select>${button("close", "Close the comparison", "Esc")}</div>
   </div>
-  <header><b class="title"></b><span class="pill" role="status" hidden></span></header>
+  <header><b class="title" part="title"></b><span class="pill" role="status" hidden></span></header>
   <dl class="stats" hidden aria-label="Statistics"></dl>
-  <div class="spinner" hidden><div role="progressbar" aria-label="Loading" aria-valuemin="0" aria-valuemax="100"><i></i></div><span>Loading</span></div>
-  <aside class="panel" aria-label="Settings" hidden>
+  <div class="spinner" part="progress" hidden><div role="progressbar" aria-label="Loading" aria-valuemin="0" aria-valuemax="100"><i></i></div><span>Loading</span></div>
+  <aside class="panel" part="panel" aria-label="Settings" hidden>
     <div class="row head"><b>Settings</b>${button("settings", "Close the settings").replace(ICONS.settings, ICONS.close)}</div>
     <label class="row"><span>Detail</span><select name="level"></select></label>
     <label class="row"><span>Show</span><select name="mode">${Object.entries(MODES)
@@ -72,8 +80,8 @@ export const TEMPLATE = `<div class="stage">
       <dt>W</dt><dd>wireframe</dd><dt>E</dt><dd>reflection</dd><dt>P</dt><dd>pull apart</dd><dt>1 … 9</dt><dd>layer on, off</dd><dt>C</dt><dd>compare</dd>
       <dt>M</dt><dd>sound</dd><dt>S</dt><dd>statistics</dd><dt>F</dt><dd>full screen</dd><dt>I</dt><dd>save the picture</dd><dt>Esc</dt><dd>close</dd></dl></details>
   </aside>
-  <div class="toast" role="status" aria-live="polite" hidden></div>
-  <div class="bar" role="group" aria-label="Playback">
+  <div class="toast" part="toast" role="status" aria-live="polite" hidden></div>
+  <div class="bar" part="bar" role="group" aria-label="Playback">
     <div class="buttons">${button("play", "Play", "Space")}${button("back", "Previous frame", "←")}${button("next", "Next frame", "→")}</div>
     <div class="time"><input type="range" name="frame" min="0" max="0" step="1" value="0" aria-label="Frame"><span class="count" aria-hidden="true"></span>
       <select name="speed" aria-label="Speed" title="Speed">${SPEEDS.map((speed) => `<option value="${speed}" ${speed === 1 ? "selected" : ""}>${speed}×</option>`).join("")}</select></div>
@@ -83,12 +91,16 @@ export const TEMPLATE = `<div class="stage">
       ${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
     </div>
   </div>
-  <div class="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>
+  <div class="message" part="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>
   <div class="drop" aria-hidden="true">Drop the asset's folder or a ZIP of it</div>
   <dialog aria-label="Embed"><form method="dialog">
     <div class="row head"><b>Put it on a page of yours</b>${button("", "Close").replace("<button", "<button data-close").replace("></button>", `>${ICONS.close}</button>`)}</div>
+    <p class="if-own">Only this machine can reach the address of this page, and its server lets no other page show it. Upload one of these to a server of yours.</p>
+    <p class="unless-own">A page of another site can show it where this server lets it: no <code>X-Frame-Options</code> or <code>frame-ancestors</code> against the frame; <code>Access-Control-Allow-Origin</code> for the element, on the player's files and the asset's.</p>
+    ${field(["file", "One file that plays by itself: this command makes it"])}
+    <p class="if-own">Or the folders: what <code>viewer/dist</code> holds as <code>player/</code>, and the asset's folder as <code>player/asset/</code>, beside the page.</p>
     ${[["frame", "As a frame, with this view"], ["element", "As an element"]]
-      .map(([name, label]) => `<label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button>`)
+      .map(field)
       .join("")}
   </form></dialog>
 </div>`; // prettier-ignore

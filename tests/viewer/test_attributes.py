@@ -1,0 +1,150 @@
+"""What users of <model-viewer> expect of an element: attributes, properties and events of the same names."""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+
+
+def opened(new_player: NewPlayer, asset: Path, attributes: str = "", **options: object) -> Player:
+    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300}, **options)
+    page_of_yours(player, f'<facefolds-player src="asset/" style="height: 300px" {attributes}></facefolds-player>')
+    player.wait("e.level === 'full'")
+    return player
+
+
+def numbers(player: Player, expression: str) -> list[float]:
+    found = player.run(f"return {expression}")
+    assert isinstance(found, list)
+    return found
+
+
+VIEW = "[e.state.view.azimuth, e.state.view.elevation, e.state.view.distance]"
+
+
+def test_camera_orbit_is_the_first_view(new_player: NewPlayer, rich: Path) -> None:
+    plain = opened(new_player, rich)
+    away = numbers(plain, VIEW)[2]
+    player = opened(new_player, rich, 'camera-orbit="30deg 80deg 120%"')
+    assert numbers(player, VIEW) == pytest.approx([30, 10, 1.2 * away])
+    player.run("e.state = {view: {azimuth: -20}}; e.resetView()")
+    assert numbers(player, VIEW)[0] == pytest.approx(30)
+    player.run("e.setAttribute('camera-orbit', '-15deg auto 1.5m')")
+    assert numbers(player, VIEW) == pytest.approx([-15, 0, 1.5])
+    player.run("e.removeAttribute('camera-orbit')")
+    assert numbers(player, VIEW) == pytest.approx([0, 0, away])
+
+
+def test_a_narrower_field_of_view_shows_the_same_from_further_away(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 'background="#00ff00" controls="none"')
+    before, away = player.capture(), numbers(player, VIEW)[2]
+    player.run("e.setAttribute('field-of-view', '12deg')")
+    after = player.capture()
+    assert numbers(player, VIEW)[2] > 2 * away
+    widths = [np.flatnonzero((np.abs(one[..., :3] - (0, 1, 0)).max(-1) > 0.1).any(0)) for one in (before, after)]
+    assert np.ptp(widths[1]) == pytest.approx(np.ptp(widths[0]), rel=0.15)
+
+
+def test_camera_controls_and_zoom_can_be_switched_off(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, "disable-zoom")
+    before = numbers(player, VIEW)
+    player.page.mouse.click(200, 100)
+    player.page.mouse.wheel(0, -300)
+    player.page.keyboard.press("+")
+    player.page.wait_for_timeout(300)
+    assert numbers(player, VIEW) == before
+    player.page.keyboard.press("Shift+ArrowRight")
+    assert numbers(player, VIEW)[0] == pytest.approx(before[0] + 5)
+    player.run("e.removeAttribute('disable-zoom'); e.setAttribute('camera-controls', 'none'); e.resetView()")
+    player.page.mouse.move(200, 100)
+    player.page.mouse.down()
+    player.page.mouse.move(100, 100, steps=4)
+    player.page.mouse.up()
+    for key in ("Shift+ArrowRight", "+"):
+        player.page.locator("[data-do=play]").press(key)
+    player.page.wait_for_timeout(300)
+    assert numbers(player, VIEW) == before
+
+
+def test_it_turns_by_itself_and_again_after_a_touch(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, "auto-rotate")
+    first = player.capture()
+    player.page.wait_for_timeout(1500)
+    assert np.abs(player.capture() - first).max() > 0.1
+    player.page.mouse.click(200, 100)
+    assert player.run("return e.player.view.swaying") == 0
+    player.wait("e.player.view.swaying > 0.2")
+    player.run("e.removeAttribute('auto-rotate')")
+    assert player.run("return [e.player.view.swaying, e.playing]") == [0, False]
+
+
+def test_with_reduced_motion_it_does_not_turn(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, "auto-rotate", reduced_motion="reduce")
+    player.page.wait_for_timeout(300)
+    assert player.run("return e.player.view.swaying") == 0
+
+
+def test_a_prompt_for_who_does_nothing(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 'interaction-prompt="auto"')
+    assert player.notice() == "Drag to turn"
+
+
+def test_alt_names_the_picture(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 'alt="Ann, who laughs"')
+    player.page.get_by_role("img", name="Ann, who laughs").wait_for()
+    player.run("e.removeAttribute('alt')")
+    player.page.get_by_role("img", name="Three-dimensional picture").wait_for()
+
+
+def test_time_and_sound(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 'muted="false"')
+    player.wait("e.player.sound")
+    assert player.run("return [e.muted, e.player.sound.muted]") == [False, False]
+    player.run("e.muted = true")
+    assert player.run("return e.player.sound.muted") is True
+    duration, fps = numbers(player, "[e.duration, e.fps]")
+    assert duration == pytest.approx(6 / fps)
+    player.run("e.currentTime = 3.5 / e.fps")
+    player.wait("e.frame === 3")
+    assert player.run("return e.currentTime") == pytest.approx(3 / fps)
+
+
+@pytest.mark.parametrize("script", ["", "delete globalThis.VideoDecoder"], ids=["WebCodecs", "video element"])
+def test_events(new_player: NewPlayer, rich: Path, script: str) -> None:
+    listen = """window.seen = {}; for (const name of ['load', 'progress', 'camera-change', 'ended', 'pause'])
+        addEventListener(name, ({ type, detail }) => (seen[type] ??= []).push(detail?.totalProgress), true);"""
+    player = opened(new_player, rich, 'loop="false"', script=script + ";" + listen)
+    player.wait("seen.load")
+    progress = numbers(player, "seen.progress")
+    assert min(progress) < 0.9 and max(progress) == 1
+    player.run("seen['camera-change'] = []; e.state = {view: {azimuth: 20}}")
+    player.wait("seen['camera-change'].length === 1")
+    player.run("e.play()")
+    player.wait("seen.ended?.length === 1 && e.frame === 5 && !e.playing")
+    assert player.run("return seen['camera-change'].length") == 1
+
+
+def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich)
+    code = """const blob = await e.toBlob(v); const bytes = new Uint8Array(await blob.arrayBuffer());
+        return [blob.type, btoa(String.fromCharCode(...bytes))];"""
+    for options, kind in (({}, "image/png"), ({"mimeType": "image/jpeg", "qualityArgument": 0.9}, "image/jpeg")):
+        found, data = player.run(code, options)  # type: ignore[misc]
+        assert found == kind
+        picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) / 255
+        assert np.abs(picture - player.capture()[..., :3]).mean() < 0.02
+
+
+def test_parts_can_be_styled(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich)
+    player.run("const sheet = new CSSStyleSheet(); document.adoptedStyleSheets.push(sheet);"
+               "sheet.replaceSync('facefolds-player::part(bar) { border-radius: 3px }')")  # fmt: skip
+    style = "getComputedStyle(e.shadowRoot.querySelector('.bar')).borderRadius"
+    assert player.run(f"return {style}") == "3px"
