@@ -106,7 +106,7 @@ class ExplicitParams(Section):
     them."""
 
     start: StartParams = StartParams()
-    """Charts that are tried."""
+    """Charts that are tried for the subject as it was found."""
 
     geometry: GeometryParams = GeometryParams()
     """The radius maps."""
