@@ -24,6 +24,7 @@ from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import read_start
+from facefolds_core.subject.found import joined
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.mattes import Image, Key, Mattes, body_among
 from facefolds_core.subject.splats import Splats
@@ -99,6 +100,7 @@ def find_subject(
     else:
         assert begun is not None
         splats = begun
+    splats = splats.part(joined(splats, scene))
     fit, psnr = judged(scene, splats, views)
     return FoundSubject(splats, psnr, fit), mattes
 

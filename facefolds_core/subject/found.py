@@ -20,6 +20,8 @@ Bool = NDArray[np.bool_]
 
 FINEST, COARSEST = 100, 8
 """Cells in a radius of the ball, at most and at least."""
+AROUND = 2.0
+"""Radius, in those of the ball, within which a subject that is known in the pictures may go on."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +42,20 @@ class BodyParams:
 
 
 def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
-    """(N,) whether a Gaussian is the subject's."""
+    """(N,) whether a Gaussian is the subject's, of those of a whole scene."""
     params = params or BodyParams()
-    reach = scene.radius or REACH
-    possible = near_enough(splats, scene, params)
+    return _body(splats, near_enough(splats, scene, params), scene.radius or REACH, params)
+
+
+def joined(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+    """(N,) whether a Gaussian is joined to the subject, of those fitted to it alone; all, if none is solid."""
+    reach = AROUND * (scene.radius or REACH)
+    body = _body(splats, np.linalg.norm(splats.means, axis=1) < reach, reach, params or BodyParams())
+    return body if body.any() else np.ones(len(splats), bool)
+
+
+def _body(splats: Splats, possible: Bool, reach: float, params: BodyParams) -> Bool:
+    """(N,) the heaviest connected body near the origin among those that are possible, in the ball of `reach`."""
     solid = possible & (splats.opacities > params.solid)
     if not solid.any():
         return solid

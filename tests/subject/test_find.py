@@ -20,8 +20,10 @@ from facefolds_core.params import SubjectParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
 from facefolds_core.subject.folder import make_folder
+from facefolds_core.subject.found import joined
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.sheet import RED, tile
+from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
 from tests.scenes import OPAQUE, gaussians, make_scene, render
 
@@ -121,6 +123,20 @@ def test_few_cameras_before_a_head_that_turns_look_at_several_frames(tmp_path: P
     still[:, 0] = 1
     turning = replace(scene, poses=Track(still, np.linspace(-0.1, 0.1, 27).reshape(9, 3)))
     assert frames_looked_at(turning) == [4, 0, 8]  # six cameras: four times six pictures
+
+
+def test_what_floats_beside_the_subject_is_none_of_it(tmp_path: Path) -> None:
+    """Neither what is solid nor what is faint; a subject may be larger than the ball."""
+    scene, head = make_scene(tmp_path, size=8), gaussians(OPAQUE)
+    loose = head.values[:2].copy()
+    loose[:, MEAN] = [[0.3, 0.5, 0.4], [-0.1, -0.6, 0.0]]
+    loose[1, OPACITY] = -1.5
+    both = Splats(np.concatenate([head.values, loose]), head.background)
+    np.testing.assert_array_equal(joined(both, scene), np.arange(len(both)) < len(head))
+    large = head.values.copy()
+    large[:, MEAN] *= 2
+    large[:, SCALE] += np.log(2)
+    assert joined(Splats(large, head.background), scene).all()
 
 
 def test_a_doubtful_picture_has_a_red_frame_on_the_sheet(tmp_path: Path) -> None:
