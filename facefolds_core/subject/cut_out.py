@@ -17,6 +17,11 @@ Image = NDArray[np.uint8]
 Bool = NDArray[np.bool_]
 
 
+AROUND = 10
+"""Colours of what stands behind are told so far around the subject, in widths of the band: the rest is far away, and
+costs time."""
+
+
 @dataclass(frozen=True)
 class EdgeParams:
     """How an outline is found in a picture.
@@ -57,10 +62,13 @@ def cut_out(picture: Image, start: Array, camera: Camera, edge: EdgeParams) -> B
     labels[inside], labels[~near] = cv2.GC_FGD, cv2.GC_BGD
     cut = start > 0.5
     if near.any() and not near.all() and cut.any():
+        part = around(near, AROUND * radius)
+        own, image = labels[part].copy(), np.ascontiguousarray(picture[part][..., ::-1])
         cv2.setRNGSeed(0)  # its clusters begin at random
         models, mode = np.zeros((2, 1, 65)), cv2.GC_INIT_WITH_MASK
-        cv2.grabCut(np.ascontiguousarray(picture[..., ::-1]), labels, (0, 0, 1, 1), models[0], models[1], 3, mode)
-        cut = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+        cv2.grabCut(image, own, (0, 0, 1, 1), models[0], models[1], 3, mode)
+        cut = np.zeros_like(cut)
+        cut[part] = (own == cv2.GC_FGD) | (own == cv2.GC_PR_FGD)
     return np.asarray(ndimage.binary_fill_holes(cut))
 
 
@@ -77,10 +85,21 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
     near = grown(cut.astype(np.uint8), radius) > 0
     if not inside.any() or near.all():
         return cut.astype(np.float32)
-    colours = picture.astype(np.float32) / np.float32(255)
-    found = opacity_before(colours, np.clip(behind, 0, 1), inside, near & ~inside, edge.noise, PlateParams())
-    both = np.sqrt(found * np.clip(start, 0, 1))
-    return np.asarray(np.where(inside, np.float32(1), np.where(near, both, np.float32(0))))
+    part, opacity = around(near, AROUND * radius), inside.astype(np.float32)
+    colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
+    found = opacity_before(colours, room, inside[part], (near & ~inside)[part], edge.noise, PlateParams())
+    both = np.sqrt(found * np.clip(start[part], 0, 1))
+    opacity[part] = np.where(inside[part], np.float32(1), np.where(near[part], both, np.float32(0)))
+    return opacity
+
+
+def around(mask: Bool, margin: int) -> tuple[slice, slice]:
+    """Rows and columns of what is true in (H, W), and so many more on each side."""
+    rows, columns = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
+    return (
+        slice(max(0, int(rows[0]) - margin), int(rows[-1]) + 1 + margin),
+        slice(max(0, int(columns[0]) - margin), int(columns[-1]) + 1 + margin),
+    )
 
 
 def agreement(cut: Bool, other: Bool) -> float:

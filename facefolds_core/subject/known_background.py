@@ -89,6 +89,12 @@ def _blurred(values: Array, width: float) -> Array:
     return np.asarray(cv2.GaussianBlur(values, (0, 0), width), np.float32)
 
 
+def _resized(values: Array, size: tuple[int, int], how: int) -> Array:
+    """(H, W, Q) to (width, height): four channels at a time, as OpenCV takes no more of odd sizes."""
+    parts = (np.ascontiguousarray(values[..., k : k + 4]) for k in range(0, values.shape[-1], 4))
+    return np.dstack([cv2.resize(part, size, interpolation=how) for part in parts]).astype(np.float32, copy=False)
+
+
 def _nearby(
     colours: Array, weight: Array, ring: tuple[NDArray[np.int64], ...], params: PlateParams
 ) -> tuple[Array, Array]:
@@ -98,8 +104,9 @@ def _nearby(
     sums = np.dstack([weight, colours * weight[..., None], products * weight[..., None]])
     height, width = weight.shape  # of half the size a wide blur is the same, and four times as fast
     half = (max(1, width // 2), max(1, height // 2))
-    sums = _blurred(np.asarray(cv2.resize(sums, half, interpolation=cv2.INTER_AREA)), params.spread / 2)
-    sums = np.asarray(cv2.resize(sums, (width, height), interpolation=cv2.INTER_LINEAR))
+    sums = _resized(
+        _blurred(_resized(sums, half, cv2.INTER_AREA), params.spread / 2), (width, height), cv2.INTER_LINEAR
+    )
     if not (sums[..., 0][ring] > TINY).all():  # too far from the inside: as the nearest that is not
         near = ndimage.distance_transform_edt(sums[..., 0] <= TINY, return_distances=False, return_indices=True)
         sums = sums[tuple(near)]

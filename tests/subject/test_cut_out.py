@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.subject.cut_out import EdgeParams, agreement, cut_out
+from facefolds_core.subject.cut_out import EdgeParams, agreement, around, cut_out
 from facefolds_core.subject.known_background import PlateParams
 from facefolds_core.subject.plates import from_plate
 from tests.scenes import look_at_origin
@@ -139,3 +139,23 @@ def test_agreement_is_the_share_that_both_have_of_what_either_has() -> None:
     assert agreement(one, other) == 1
     one[:2], other[1:3] = True, True
     assert agreement(one, other) == pytest.approx(1 / 3)
+
+
+@pytest.mark.parametrize("size", [(63, 64), (64, 61), (63, 61)])
+def test_pictures_of_odd_sizes_have_mattes(size: tuple[int, int]) -> None:
+    """OpenCV resizes more than four channels by whole factors only."""
+    y, x = np.mgrid[: size[0], : size[1]]
+    opacity = np.clip((20 - np.hypot(x - 32, y - 32)) / 4 + 0.5, 0, 1)
+    assert np.abs(from_plate(*_before_a_plate(opacity), PlateParams()) - opacity).max() < 0.15
+
+
+def test_what_is_far_from_the_subject_changes_nothing() -> None:
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:96, :96]
+    disc = np.hypot(x - 30, y - 30) < 14
+    image = (np.where(disc[..., None], (200, 150, 120), (40, 60, 90)) + rng.integers(-8, 9, (96, 96, 3))).astype(
+        np.uint8
+    )
+    rough = np.clip(1.3 - np.hypot(x - 31, y - 30) / 18, 0, 1).astype(np.float32)
+    found, image[80:, 80:] = cut(image, rough), (200, 150, 120)
+    np.testing.assert_array_equal(cut(image, rough), found)
+    assert around(disc, 3) == (slice(14, 47), slice(14, 47))
