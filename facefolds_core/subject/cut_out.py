@@ -90,7 +90,7 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
     found = opacity_before(colours, room, inside[part], (near & ~inside)[part], edge.noise, PlateParams())
     both = np.sqrt(found * np.clip(start[part], 0, 1))
     opacity[part] = np.where(inside[part], np.float32(1), np.where(near[part], both, np.float32(0)))
-    return opacity
+    return np.asarray(opacity)
 
 
 def around(mask: Bool, margin: int) -> tuple[slice, slice]:
