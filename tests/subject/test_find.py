@@ -22,6 +22,7 @@ from facefolds_core.subject.find import all_mattes, find_subject, found_in, fram
 from facefolds_core.subject.folder import make_folder
 from facefolds_core.subject.found import joined
 from facefolds_core.subject.mattes import Matte, Mattes
+from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.sheet import RED, tile
 from facefolds_core.subject.splats import MEAN, OPACITY, SCALE, Splats
 from facefolds_core.subject.storage import BODY, Body, read_found, write_body, write_found
@@ -184,3 +185,14 @@ def test_gaussians_that_poses_were_found_with_are_taken_up(tmp_path: Path) -> No
     write_body(tmp_path / BODY, Body(splats, inside[1:], 1))
     with pytest.raises(UserError, match="Gaussians are damaged"):
         find_subject(scene, PARAMS)
+
+
+def test_a_splat_file_takes_the_place_of_our_own_fit(tmp_path: Path) -> None:
+    """Of a scene without plates and mattes: they say where the subject is, and stay as they are."""
+    scene, own = make_scene(tmp_path, size=40, frames=1), gaussians(OPAQUE)
+    write_ply(tmp_path / "splats.ply", own)
+    found, mattes = find_subject(scene, PARAMS, start=tmp_path / "splats.ply")
+    assert 0.9 * len(own) < len(found.splats) <= len(own)
+    held = scene.splits.index("holdout")
+    true, here = render(scene.cameras[held], OPAQUE, 0)[1] > 0.5, mattes.of((held, 0)).opacity > 127
+    assert (true & here).sum() / (true | here).sum() > 0.9
