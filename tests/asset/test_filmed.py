@@ -97,7 +97,7 @@ def test_the_direction_of_a_camera() -> None:
 
 def test_the_player_takes_the_same_margins(project_root: Path) -> None:
     source = (project_root / "viewer" / "src" / "limits.js").read_text(encoding="utf-8")
-    assert f"FREE = {FREE:g};" in source and f"ROUND = {ROUND:g};" in source
+    assert f"NEAR = {FREE:g};" in source and f"ROUND = {ROUND:g};" in source
 
 
 def test_the_key_is_optional_and_checked(tmp_path: Path) -> None:
