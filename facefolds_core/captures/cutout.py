@@ -1,4 +1,4 @@
-"""The subject's own colours in pixels that it half covers."""
+"""The subject without what stands behind it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,19 @@ Array = NDArray[np.floating[Any]]
 
 WIDE, NARROW = 91, 7
 """Pixels, windows of the two passes of blur fusion."""
+
+
+def cut_from(photo: Array, opacity: Array, plate: Array | None) -> Array:
+    """The subject's colours times its opacity, (H, W, 3), of a photo F opacity + (1 - opacity) plate; where nobody
+    knows the plate, F is estimated from around.
+
+    Args:
+        photo, plate: (H, W, 3) in [0, 1].
+        opacity: (H, W) in [0, 1].
+    """
+    if plate is None:
+        return np.asarray(opacity[..., None] * foreground(photo, opacity))
+    return np.asarray(np.clip(photo - (1 - opacity)[..., None] * plate, 0, opacity[..., None]))
 
 
 def foreground(photo: Array, opacity: Array) -> Array:

@@ -17,7 +17,7 @@ class SubjectParams(Section):
     """Steps in which Gaussians are fitted, a picture each."""
 
     fewest: Count = 9000
-    """Gaussians at the end, at least; but one for four pixels at most."""
+    """Gaussians at the end, at least."""
 
     most: Count = 30_000
     """Gaussians at the end, at most."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from facefolds_core.captures.cutout import foreground
+from facefolds_core.captures.cutout import cut_from
 from facefolds_core.scoring.metrics import Array, decibels, shown
 
 BACKGROUNDS = (0.0, 1.0, 0.5)
@@ -42,12 +42,8 @@ class Cutout:
 
     @classmethod
     def of(cls, photo: Array, opacity: Array, plate: Array | None) -> Cutout:
-        """From a photo (H, W, 3) = F + (1 - opacity) plate; where nobody knows the plate, the subject's own colours are
-        estimated from its neighbourhood."""
-        if plate is None:
-            return cls(opacity[..., None] * foreground(photo, opacity), opacity)
-        through = (1 - opacity)[..., None] * plate
-        return cls(np.clip(photo - through, 0, opacity[..., None]), opacity, plate)
+        """See `cut_from`."""
+        return cls(cut_from(photo, opacity, plate).astype(np.float64, copy=False), opacity, plate)
 
     def over(self, background: float | Array) -> Array:
         """(H, W, 3) over a grey, or over a picture (H, W, 3)."""

@@ -41,8 +41,8 @@ def camera_gains(
     """Gains g of each camera and channel that minimise sum |g shown - seen|^2, robustly; their mean over cameras is 1.
 
     Args:
-        shown: (R, 3) colours of the volume over black.
-        alpha: (R,) its opacity.
+        shown: (R, 3) colours of the Gaussians over black.
+        alpha: (R,) their opacity.
         seen: (R, 3) pixels.
         camera: (R,) which camera each ray belongs to.
         count: cameras.
@@ -105,6 +105,12 @@ class CameraFit:
         """Nothing known yet: all cameras alike."""
         return cls(np.ones((count, 3)), np.full(count, np.nan))
 
+    @classmethod
+    def of(cls, shown: Array, alpha: Array, seen: Array, camera: NDArray[np.int32], count: int) -> CameraFit:
+        """Args: see `camera_gains`."""
+        gains = camera_gains(shown, alpha, seen, camera, count, CameraParams())
+        return cls(gains, camera_errors(shown, alpha, seen / gains[camera], camera, count, CameraParams()))
+
     @property
     def gains(self) -> Gains:
         """(C, 3) as measured; 1 where the cameras differ so little that it may be the fit's own error."""
@@ -118,15 +124,3 @@ class CameraFit:
             return []
         far = self.errors > self.params.max_error_ratio * np.nanmedian(self.errors)
         return [int(i) for i in np.flatnonzero(far)]
-
-    def corrected(self, colours: Array, camera: NDArray[np.int32]) -> Array:
-        """(R, 3) pixels as the mean camera would have seen them."""
-        return (colours / self.gains[camera]).astype(np.float32)
-
-    def refined(self, shown: Array, alpha: Array, corrected: Array, camera: NDArray[np.int32]) -> CameraFit:
-        """What is left in pixels that were corrected already goes on top."""
-        count = len(self.measured)
-        left = camera_gains(shown, alpha, corrected, camera, count, self.params)
-        measured = self.gains * left
-        errors = camera_errors(shown, alpha, corrected / left[camera], camera, count, self.params)
-        return CameraFit(measured / measured.mean(0), errors, self.params)

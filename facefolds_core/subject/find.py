@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.cutout import foreground
+from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
@@ -130,13 +130,11 @@ def view_cut_out(scene: Scene, mattes: Mattes, key: Key) -> View:
     """A training picture with the subject cut out of it."""
     opacity = mattes.of(key).opacity.astype(np.float32) / np.float32(255)
     picture = scene.open_frames().image(*key).astype(np.float32) / np.float32(255)
-    plates = scene.open_plates()
+    plates, plate = scene.open_plates(), None
     if plates is not None and (key[0], 0) in plates:
         plate = plates.image(key[0], 0).astype(np.float32) / np.float32(255)
-        colours = np.clip(picture - (1 - opacity)[..., None] * plate, 0, opacity[..., None])
-    else:
-        colours = opacity[..., None] * foreground(picture, opacity)
-    return View(scene.indices("train").index(key[0]), key, np.asarray(colours, np.float32), opacity)
+    colours = np.asarray(cut_from(picture, opacity, plate), np.float32)
+    return View(scene.indices("train").index(key[0]), key, colours, opacity)
 
 
 def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraFit, float]:
@@ -150,7 +148,7 @@ def judged(scene: Scene, splats: Splats, views: Sequence[View]) -> tuple[CameraF
         colours, seen = (image.reshape(-1, 3)[sure] for image in (rgb, view.colours))
         parts.append((colours, 1 - light.reshape(-1)[sure], seen, np.full(len(sure), view.camera, np.int32)))
     shown, alpha, photos, numbers = (np.concatenate(each) for each in zip(*parts, strict=True))
-    fit = CameraFit.alike(len(scene.indices("train"))).refined(shown, alpha, photos, numbers)
+    fit = CameraFit.of(shown, alpha, photos, numbers, len(scene.indices("train")))
     return fit, -10 * math.log10(max(float(np.mean(squares)), 1e-10))
 
 

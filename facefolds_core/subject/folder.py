@@ -25,6 +25,7 @@ from facefolds_core.frame_store import Image, write_frames
 from facefolds_core.params import SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.spacing import spread
+from facefolds_core.subject.cut_out import agreement
 from facefolds_core.subject.find import find_subject
 from facefolds_core.subject.mattes import Key, Matte, Mattes, Source
 from facefolds_core.subject.sheet import MOST, contact_sheet, tile
@@ -79,7 +80,9 @@ def _rows(
     with progress(total=len(keys), desc="mattes", unit="picture") as bar:
         for key in keys:
             matte = mattes.of(key)
-            iou = _iou(matte.opacity, masks.image(*key)[..., 0]) if masks is not None and key in masks else None
+            iou = None
+            if masks is not None and key in masks:
+                iou = agreement(matte.opacity > 127, masks.image(*key)[..., 0] > 127)
             told.append(Told(key, matte.source, matte.agreement, iou))
             if matte.source != "capture":
                 _save(scene, key, matte, folder)
@@ -98,12 +101,6 @@ def _save(scene: Scene, key: Key, matte: Matte, folder: Path) -> None:
     place = folder / scene.cameras[key[0]].name / f"{scene.frame_ids[key[1]]}.png"
     place.parent.mkdir(exist_ok=True)
     Pillow.fromarray(matte.opacity).save(place)
-
-
-def _iou(opacity: Image, mask: Image) -> float:
-    true, here = mask > 127, opacity > 127
-    union = int((true | here).sum())
-    return int((true & here).sum()) / union if union else 1.0
 
 
 def _described(scene: Scene, told: list[Told], found: FoundSubject) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from facefolds_core.captures.scene import REACH, Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.density import longest_axes
 from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.sight import seen_share
 from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float32]
@@ -78,7 +79,8 @@ def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) 
     params = params or BodyParams()
     inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or REACH)
     cameras = scene.views_of("train")
-    return np.asarray(inside & (_seeing(splats.means, cameras) >= min(params.views, len(cameras))))
+    seen = np.rint(len(cameras) * seen_share(cameras, splats.means.astype(np.float64)))
+    return np.asarray(inside & (seen >= min(params.views, len(cameras))))
 
 
 def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, voxel: float) -> None:
@@ -89,16 +91,6 @@ def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: 
         cells = ((places + reach) / voxel).astype(np.int64) + 1
         inside = ((cells >= 0) & (cells < weight.shape[0])).all(1)
         np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
-
-
-def _seeing(points: Array, cameras: list[Camera]) -> NDArray[np.int64]:
-    """(N,) cameras in whose pictures points (N, 3) lie."""
-    seen = np.zeros(len(points), np.int64)
-    for camera in cameras:
-        pixels, depth = camera.project(points.astype(np.float64))
-        inside = (pixels >= 0).all(1) & (pixels[:, 0] < camera.width) & (pixels[:, 1] < camera.height)
-        seen += inside & (depth > 0)
-    return seen
 
 
 def opacity_of(splats: Splats, subject: Bool, camera: Camera) -> Array:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.scoring.backgrounds import Cutout, foreground, patch_side, squared_error, worst_patch
+from facefolds_core.captures.cutout import foreground
+from facefolds_core.scoring.backgrounds import Cutout, patch_side, squared_error, worst_patch
 from facefolds_core.scoring.images import Rendering, over_any
 from facefolds_core.scoring.matte import opacity_errors
 from facefolds_core.scoring.patches import find_patch

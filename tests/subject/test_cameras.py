@@ -59,17 +59,15 @@ def test_a_camera_that_sees_nothing_is_believed() -> None:
 def test_small_differences_are_left_alone() -> None:
     shown, alpha, camera = rays()
     gains = 1 + PARAMS.min_gain_spread * 0.5 * np.repeat([[1.0], [-1.0]], 3, 0).repeat(3, 1)
-    fit = CameraFit.alike(COUNT).refined(shown, alpha, shown * gains.astype(np.float32)[camera], camera)
+    fit = CameraFit.of(shown, alpha, shown * gains.astype(np.float32)[camera], camera, COUNT)
     assert np.array_equal(fit.gains, np.ones((COUNT, 3))) and fit.measured == pytest.approx(gains, rel=1e-2)
 
 
-def test_refining_multiplies() -> None:
+def test_errors_are_told_without_the_gains() -> None:
     shown, alpha, camera = rays()
-    seen = shown * true_gains()[camera].astype(np.float32)
-    first = CameraFit(true_gains() ** 0.5, np.full(COUNT, np.nan), PARAMS)
-    again = first.refined(shown, alpha, first.corrected(seen, camera), camera)
-    np.testing.assert_allclose(again.gains, true_gains(), rtol=0.01)
-    assert again.errors.max() < 0.01
+    fit = CameraFit.of(shown, alpha, shown * true_gains()[camera].astype(np.float32), camera, COUNT)
+    np.testing.assert_allclose(fit.gains, true_gains(), rtol=0.01)
+    assert fit.errors.max() < 0.01
 
 
 def test_one_camera_far_off_is_left_out_by_name(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """What a training step is compared with: the subject alone, over a colour that changes from step to step.
 
 The subject's opacity m is known in every training picture, and so its own colours F are: F = I - (1 - m) B before a
-plate B, else `foreground` estimates them. Layers are compared with F + (1 - m) g over any colour g, a new one for
+plate B, else they are estimated (`cut_from`). Layers are compared with F + (1 - m) g over any colour g, a new one for
 each camera in each step: |C + T g - F - (1 - m) g|^2 asks for the right colour and for the right opacity at once,
 inside, at the outline and outside. What stands behind need not be known, and nothing can be painted with it.
 """
@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.cutout import foreground
+from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
 from facefolds_core.frame_store import FrameStore
 from facefolds_core.training.explicit.views import Images
@@ -77,11 +77,8 @@ class CutOuts:
         for position, (camera, photo, plate) in enumerate(zip(self._photos.cameras, photos, plates, strict=True)):
             matte = self._mattes.image(camera, index)[..., 0]
             opacity, picture = matte / np.float32(255), photo.reshape(*matte.shape, 3) / np.float32(255)
-            if plate is None:
-                colour = opacity[..., None] * foreground(picture, opacity)
-            else:
-                colour = picture - (1 - opacity)[..., None] * (plate / np.float32(255))
-            rgb = np.rint(255 * np.clip(colour, 0, opacity[..., None])).astype(np.uint8)
+            behind = None if plate is None else plate / np.float32(255)
+            rgb = np.rint(255 * cut_from(picture, opacity, behind)).astype(np.uint8)
             found[position] = np.concatenate([rgb, matte[..., None]], -1).reshape(-1, 4)
         return found
 
