@@ -88,7 +88,6 @@ bench: $(READY)
 	$(BIN)/python -m bench.speed_accuracy
 
 charts: repro
-	$(BIN)/facefolds waterfall
 	$(BIN)/python -m bench.sweeps queue rate
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/dvc exp run --run-all
 	$(BIN)/python -m bench.sweeps collect

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,6 @@ from bench.results import Cell, Measurement, Row
 from bench.tables import PAPER, RATES, cell_text
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
-from facefolds_core.scoring.terminal import SPLIT_WORDS
-from facefolds_core.sweeps.frontier import frontier
 
 STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 FRONTIER = "Pareto frontier"
@@ -50,7 +49,10 @@ def _legend(figure: Figure, names: Sequence[str], **options: Any) -> None:
 
 
 def _front(axes: Axes, points: Sequence[tuple[float, float]], up: bool = True, falling: bool = False) -> None:
-    best = [points[i] for i in frontier([(-x if falling else x, y) for x, y in points], up)]
+    """The points that no other one beats: of smaller cost (larger, if `falling`) and a better value."""
+    way = sorted(points, key=lambda point: (-point[0] if falling else point[0], -point[1] if up else point[1]))
+    bests = list(accumulate((y for _, y in way), max if up else min))
+    best = [point for i, point in enumerate(way) if i == 0 or bests[i] != bests[i - 1]]
     axes.plot([x for x, _ in best], [y for _, y in best], zorder=1, label=FRONTIER, **WIDE)
     axes.plot([x for x, _ in best], [y for _, y in best], "o", **RING)
     axes.grid(color="#e6e6e6", lw=0.6, zorder=0)
@@ -270,30 +272,3 @@ def rate(rows: Sequence[Row], path: Path, title: str) -> None:
         axes.xaxis.set_major_formatter("{x:g}")
         axes.grid(True, alpha=0.3)
         axes.legend(loc="lower right")
-
-
-def waterfall_title(step: Mapping[str, Any]) -> str:
-    """The subject, and the pictures on which the steps of its export were measured, where that is noted."""
-    split = step.get("split")
-    return f"{step['subject']}, {step['images']} pictures {SPLIT_WORDS[split]}" if split else str(step["subject"])
-
-
-def waterfall(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    """Bars a subject: PSNR against the photos, what each step gained or lost, the bytes; below it ST-LPIPS, if any."""
-    found = {name: [row for row in rows if row["subject"] == name] for name in sorted({r["subject"] for r in rows})}
-    tall = {"psnr": 4.2, "st_lpips": 2.6}
-    panels = [(s, key) for s, own in found.items() for key in tall if None not in [step.get(key) for step in own]]
-    with figure_of(path, 9, sum(tall[key] for _, key in panels), dpi=120) as figure:
-        grid = figure.subplots(len(panels), squeeze=False, height_ratios=[tall[key] for _, key in panels])[:, 0]
-        for axes, (name, key) in zip(grid, panels, strict=True):
-            steps, values, first = found[name], [step[key] for step in found[name]], key == "psnr"
-            low, high, digits = (min(values) - 1, max(values) + 0.8, 2) if first else (0, 1.45 * max(values), 4)
-            axes.bar([s["name"] for s in steps], values, color=["#4c72b0", *["#9aa7bd"] * (len(steps) - 2), "#55a868"])
-            for i, (step, value) in enumerate(zip(steps, values, strict=True)):
-                change = f"\n{value - values[i - 1]:+.{digits}f}" if i else ""
-                size = step["mesh_bytes"] + step["texture_bytes"] if first else 0
-                axes.annotate(f"{value:.{digits}f}{change}", (i, value), ha="center", va="bottom")
-                axes.annotate(f"{size / 1e6:.2f} MB" if size else "", (i, low + 0.1), ha="center", color="white")
-            axes.set(
-                ylim=(low, high), ylabel=METRICS[key], title=waterfall_title(steps[0]) if first else "lower is better"
-            )

@@ -18,18 +18,20 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field
 
 from bench.results import ROOT, Entry, Means, Store, commit_name, now
 from bench.run import Project, own_params
 from bench.tables import markdown, number
-from facefolds_core.asset import read_asset
+from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.actor import make_rig
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
-from facefolds_core.rendering.strips import strip
+from facefolds_core.rendering.areas import view_of
+from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit
 from facefolds_core.spacing import spread
 
 KEPT = ROOT / "bench" / "results" / "gate.json"
@@ -60,6 +62,30 @@ actor differ by 0.05 dB over any background, 0.09 of the subject, 0.10 in the ba
 patch, 0.22 in the worst training view."""
 SHARES = {"bytes": 1.2, "cpu_seconds": 1.3, "peak_bytes": 1.2}
 """Cost -> how many times as much as before it may be; bytes of these seeds differ by 9 %."""
+
+
+def strip(
+    asset: Asset,
+    azimuths: Sequence[float],
+    colours: Sequence[tuple[float, float, float]],
+    size: tuple[int, int],
+    field_of_view: float,
+) -> NDArray[np.uint8]:
+    """(rows, columns, 3): a row a colour, a column an azimuth, of the first frame; the whole asset is in each picture.
+
+    Args:
+        azimuths: degrees from the front.
+        colours: RGB in [0, 1].
+        size: width and height of a picture, pixels.
+        field_of_view: degrees, of its shorter side.
+    """
+    box, eyes = asset.manifest.bounds, [Eye(azimuth) for azimuth in azimuths]
+    away = 1.0 if box is None else max(1.0, distance_to_fit(box.min, box.max, eyes, *size, field_of_view))
+    cameras = [camera_of(Eye(eye.azimuth, distance=away), *size, field_of_view) for eye in eyes]
+    textures = asset.frame(0)
+    seen = [view_of(asset.full, camera).composite(textures) for camera in cameras]
+    rows = [np.hstack([rgb + (1 - alpha[..., None]) * np.array(colour) for rgb, alpha in seen]) for colour in colours]
+    return np.asarray(np.rint(255 * np.vstack(rows).clip(0, 1)), np.uint8)
 
 
 def aside(count: int) -> list[str]:

@@ -22,7 +22,8 @@ from bench.results import ROOT
 from bench.run import Project
 from bench.tables import markdown
 from bench.takes import Watched, watched
-from facefolds_core.captures.krt import Calibration, read_krt
+from facefolds_core.captures.gathering import Calibration
+from facefolds_core.captures.krt import read_krt
 from facefolds_core.errors import report_user_errors
 from facefolds_core.files import write_json, write_text
 from facefolds_core.params import STAGE_SECTIONS, merged
@@ -35,7 +36,7 @@ def enlarged_krt(cameras: list[Calibration], factor: int) -> str:
     moved = np.array([[factor, 0, (factor - 1) / 2], [0, factor, (factor - 1) / 2], [0, 0, 1.0]])
     blocks = []
     for camera in cameras:
-        rows = [*(moved @ camera.K), camera.distortion, *camera.w2c]
+        rows = [*(moved @ camera.K), camera.coefficients, *camera.w2c]
         blocks.append("\n".join([camera.name, *(" ".join(f"{x:.10g}" for x in row) for row in rows)]))
     return "\n\n".join(blocks) + "\n"
 

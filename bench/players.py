@@ -104,8 +104,10 @@ def prepare(assets: Sequence[Asset], splats: Sequence[int], heads: Path) -> tupl
     first = assets[0]
     write_glb(heads / "head.glb", first.full, "head")
     middle = first.num_layers // 2
-    flat = len(first.layers[first.num_layers - 1 - middle].faces)  # innermost first in the GLB
-    rows: list[Entry] = [{"name": f"one opaque mesh, {flat:,} triangles", "page": "mesh", "query": f"layer={middle}"}]
+    flat = len(first.layers[middle].faces)
+    before = sum(len(mesh.faces) for mesh in first.layers[middle + 1 :])  # innermost first in the GLB
+    query = f"first={3 * before}&count={3 * flat}"
+    rows: list[Entry] = [{"name": f"one opaque mesh, {flat:,} triangles", "page": "mesh", "query": query}]
     for i, asset in enumerate(assets):
         triangles = sum(len(mesh.faces) for mesh in asset.layers) // asset.num_layers
         name = f"ours, {asset.num_layers} x {triangles:,} triangles"

@@ -3,8 +3,7 @@
 python -m bench.sweeps queue mesh      layers, mesh, texture, or rate: the paper's export and ours at five rates
 dvc exp run --run-all                  runs what was queued (or `dvc queue start -j 2`: docs/guide/sweeps.md)
 python -m bench.sweeps collect         what has ended, into bench/results/sweeps.json
-python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there;
-                                       of what `facefolds waterfall` measured, too
+python -m bench.sweeps draw            the tables of docs/research/ablations.md and the charts, from what is there
 
 A cell is the subject's own configuration with a few values changed. Stages that cells share run once.
 """
@@ -28,12 +27,11 @@ from dvc.api import DVCFileSystem
 from bench import charts
 from bench.results import Row, Store, commit_name, machine_name, now
 from bench.run import own_params
-from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table, waterfall_rows
+from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.export.sampling import LEAST
-from facefolds_core.files import read_json, write_json
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.sweeps.experiments import runs_of
@@ -89,7 +87,7 @@ def changes(name: str, value: int, subject: str) -> dict[str, Any]:
     params = own_params(subject, {})
     entry = params["subjects"][subject]
     found = {**SWEEPS[name].fixed, SWEEPS[name].key: value, "compress.levels": []}
-    given = {**params["sample"], **entry.get("sample", {})}.get("resolution", "auto")
+    given = {**params.get("sample", {}), **entry.get("sample", {})}.get("resolution", "auto")
     samples = LEAST if given == "auto" else given
     if name == "texture" and value > samples:
         found |= {"sample.resolution": value, "reconstruct.resolution": samples}
@@ -192,7 +190,7 @@ def collect(results: Results = RESULTS) -> None:
 
 @app.command()
 def draw(results: Results = RESULTS) -> None:
-    """Tables, charts, and the table for `facefolds recommend`, from what has been measured."""
+    """Tables and charts of what has been measured."""
     with report_user_errors("sweeps"):
         kept = sorted(Store(results, "rows", Row).read(), key=lambda row: (row.sweep, row.subject, -row.value))
         rows = [row for row in kept if row.sweep in AXES]
@@ -209,12 +207,6 @@ def draw(results: Results = RESULTS) -> None:
             name = "rate_distortion" if film == "actor" else f"rate_distortion_{film}"
             charts.rate(rates, IMAGES / f"{name}.png", f"{film}, {RATE_FRAMES} frames")
             typer.echo(f"{film}:\n\n{rate_tables(rates)}")
-        files = sorted(Path("data").glob("*/waterfall/waterfall.json"))
-        steps = [row for path in files for row in waterfall_rows(read_json(path))]
-        there = results.with_name("waterfall.json")
-        steps = [old for old in read_json(there) if old["subject"] not in {new["subject"] for new in steps}] + steps
-        write_json(there, steps)
-        charts.waterfall(steps, IMAGES / "export_waterfall.png")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -171,9 +171,3 @@ def interpolated(at: float, points: Sequence[tuple[float, float]]) -> float | No
     if not ordered or not ordered[0][0] <= at <= ordered[-1][0]:
         return None
     return float(np.interp(at, [x for x, _ in ordered], [y for _, y in ordered]))
-
-
-def waterfall_rows(found: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """A row a step of a waterfall.json, each with the subject and the pictures that it was measured on."""
-    on = {key: found[key] for key in ("subject", "region", "split", "images") if key in found}
-    return [on | step for step in found["steps"]]

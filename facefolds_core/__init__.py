@@ -1,20 +1,18 @@
 """FaceFolds: multi-view face video to nested textured meshes with an RGBA texture video.
 
-The names below are imported when they are first used: reading, checking and rendering an asset needs numpy, PyAV,
-DracoPy, Embree and pydantic, and nothing of what trains one.
-
     import facefolds_core as facefolds
 
-    asset = facefolds.load_asset("data/actor/asset")
-    camera = facefolds.camera_of(facefolds.Eye(azimuth=25), width=512, height=768, field_of_view=30)
-    rgb, alpha = facefolds.render(asset, camera, frame=0)
+    capture = facefolds.load_capture("captures/anna")     # any layout that is read; or facefolds.film_actor()
+    scene = facefolds.normalize(capture)
+    subject = facefolds.find_subject(scene)
+    model = facefolds.train(scene, subject)               # about a minute
+    asset = model.export("anna")
+    scores = facefolds.evaluate(asset, scene)
 
-With the extra `train`, from a scene (as the stage `normalize` writes it) to an asset and its scores (pipeline.py):
+    asset = facefolds.load_asset("data/actor/asset")      # needs nothing of what trains one
+    picture = asset.render("poster", frame=0)
 
-    scene = facefolds.load_scene("data/actor/scene")
-    trained = facefolds.train(scene)
-    asset = facefolds.export_asset(trained.model, scene, "face")
-    scores = facefolds.evaluate(asset, scene, trained.model)
+The names are imported when they are first used. docs/reference/library.md describes them.
 """
 
 from __future__ import annotations
@@ -25,44 +23,62 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.2.0"
 
 if TYPE_CHECKING:
-    from facefolds_core.asset.reader import read_asset as load_asset
+    from facefolds_core.api.asset import Asset, load_asset
+    from facefolds_core.api.capture import Capture, film_actor, load_capture
+    from facefolds_core.api.model import Model, load_model, train
+    from facefolds_core.api.scene import Scene, load_scene, normalize
+    from facefolds_core.api.scores import Scores, evaluate
+    from facefolds_core.api.subject import Subject, find_subject
     from facefolds_core.asset.validation import validate_asset as validate
-    from facefolds_core.captures.scene import read_scene as load_scene
-    from facefolds_core.model.storage import load_model
-    from facefolds_core.params import train_params
-    from facefolds_core.pipeline import ExportParams, evaluate, export_asset, train
+    from facefolds_core.errors import UserError
+    from facefolds_core.geometry.cameras import Camera
     from facefolds_core.rendering.camera_paths import Eye, camera_of
-    from facefolds_core.rendering.pixels import render
 
 _PLACES = {
-    "ExportParams": ("facefolds_core.pipeline", "ExportParams"),
+    "Asset": ("facefolds_core.api.asset", "Asset"),
+    "Camera": ("facefolds_core.geometry.cameras", "Camera"),
+    "Capture": ("facefolds_core.api.capture", "Capture"),
     "Eye": ("facefolds_core.rendering.camera_paths", "Eye"),
+    "Model": ("facefolds_core.api.model", "Model"),
+    "Scene": ("facefolds_core.api.scene", "Scene"),
+    "Scores": ("facefolds_core.api.scores", "Scores"),
+    "Subject": ("facefolds_core.api.subject", "Subject"),
+    "UserError": ("facefolds_core.errors", "UserError"),
     "camera_of": ("facefolds_core.rendering.camera_paths", "camera_of"),
-    "evaluate": ("facefolds_core.pipeline", "evaluate"),
-    "export_asset": ("facefolds_core.pipeline", "export_asset"),
-    "load_asset": ("facefolds_core.asset.reader", "read_asset"),
-    "load_model": ("facefolds_core.model.storage", "load_model"),
-    "load_scene": ("facefolds_core.captures.scene", "read_scene"),
-    "render": ("facefolds_core.rendering.pixels", "render"),
-    "train": ("facefolds_core.pipeline", "train"),
-    "train_params": ("facefolds_core.params", "train_params"),
+    "evaluate": ("facefolds_core.api.scores", "evaluate"),
+    "film_actor": ("facefolds_core.api.capture", "film_actor"),
+    "find_subject": ("facefolds_core.api.subject", "find_subject"),
+    "load_asset": ("facefolds_core.api.asset", "load_asset"),
+    "load_capture": ("facefolds_core.api.capture", "load_capture"),
+    "load_model": ("facefolds_core.api.model", "load_model"),
+    "load_scene": ("facefolds_core.api.scene", "load_scene"),
+    "normalize": ("facefolds_core.api.scene", "normalize"),
+    "train": ("facefolds_core.api.model", "train"),
     "validate": ("facefolds_core.asset.validation", "validate_asset"),
 }
 """Name of the API -> module and name there."""
 
 __all__ = [
-    "ExportParams",
+    "Asset",
+    "Camera",
+    "Capture",
     "Eye",
+    "Model",
+    "Scene",
+    "Scores",
+    "Subject",
+    "UserError",
     "__version__",
     "camera_of",
     "evaluate",
-    "export_asset",
+    "film_actor",
+    "find_subject",
     "load_asset",
+    "load_capture",
     "load_model",
     "load_scene",
-    "render",
+    "normalize",
     "train",
-    "train_params",
     "validate",
 ]
 
@@ -70,8 +86,15 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, attribute = _PLACES[name]
-    return getattr(importlib.import_module(module), attribute)
+    place, attribute = _PLACES[name]
+    try:
+        module = importlib.import_module(place)
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("facefolds_core"):
+            raise
+        remedy = "pip install 'facefolds[train]'"
+        raise ModuleNotFoundError(f"`{name}` needs the package {error.name}: {remedy}", name=error.name) from None
+    return getattr(module, attribute)
 
 
 def __dir__() -> list[str]:

@@ -151,10 +151,18 @@ def _has(overrides: Any, name: str) -> bool:
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:
     """Write `entry.json`, one file a stage, `levels.json` (see `config`); returns their paths."""
     core = params.subject(subject).model_dump(mode="json", by_alias=True, exclude=set(Overrides.model_fields))
-    values: dict[str, Any] = {"entry": core}
-    values |= {stage: params.stage(stage, subject).model_dump(mode="json") for stage in STAGE_SECTIONS}
-    resolutions = sorted({level["mesh_resolution"] for level in values["compress"]["levels"]})
-    values["levels"] = {"mesh_resolutions": resolutions}
-    for name, value in values.items():
-        write_json(folder / f"{name}.json", value)
+    write_json(folder / "entry.json", core)
+    written = [write_section(stage, params.stage(stage, subject), folder) for stage in STAGE_SECTIONS]
+    return [folder / "entry.json", *(path for paths in written for path in paths)]
+
+
+def write_section(stage: str, section: Section, folder: Path) -> list[Path]:
+    """Write one stage's file, and what other stages need to know of it; returns their paths."""
+    value = section.model_dump(mode="json")
+    values: dict[str, Any] = {stage: value}
+    if stage == "compress":
+        resolutions = sorted({level["mesh_resolution"] for level in value["levels"]})
+        values["levels"] = {"mesh_resolutions": resolutions}
+    for name, content in values.items():
+        write_json(folder / f"{name}.json", content)
     return [folder / f"{name}.json" for name in values]

@@ -103,11 +103,6 @@ class SubjectFolders:
     def metrics(self) -> Path:
         return self.root / "metrics.json"
 
-    @property
-    def waterfall(self) -> Path:
-        """What each step of the export loses: written by `facefolds waterfall`, an output of no stage."""
-        return self.root / "waterfall" / "waterfall.json"
-
     def timing(self, stage: str) -> Path:
         """Seconds that a stage took, read by evaluate. Why they lie beside the subject's folder: .dvcignore."""
         return self.root.parent / ".timings" / self.root.name / f"{stage}.json"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
 import json
 import mimetypes
 import os
@@ -20,12 +19,8 @@ LARGEST_MANIFEST = 1 << 24
 CHUNK = 1 << 18
 WRITE_PATIENCE = 30.0
 """Seconds that a client may take for one chunk: one that reads nothing does not hold a file for ever."""
-
-PACKED_TYPES = (".html", ".js", ".css", ".json", ".wasm", ".svg", ".map")
+PACKED_TYPES = (".html", ".js", ".css", ".json", ".wasm", ".svg")
 """Meshes, videos and pictures are packed already."""
-LARGEST_PACKED, MOST_PACKED = 1 << 23, 1 << 25
-"""Bytes of a file that is packed at all, and of all that is kept."""
-_PACKED: dict[str, bytes] = {}
 
 _PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,254}")
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
@@ -106,41 +101,16 @@ def byte_range(header: str, size: int) -> tuple[int, int] | None:
     return (start, stop) if start < stop else None
 
 
-def takes_gzip(request: web.Request) -> bool:
-    """Whether the client reads gzip; not where it asks for a part, which is one of the file itself."""
-    offered = [part.strip().split(";") for part in request.headers.get("Accept-Encoding", "").lower().split(",")]
-    wanted = any(
-        name.strip() in ("gzip", "*") and "q=0" not in [one.strip() for one in rest] for name, *rest in offered
-    )
-    return wanted and "Range" not in request.headers
-
-
-def packed(file: FileIO, etag: str) -> bytes:
-    """A file by gzip; kept, since pages ask for the same few again and again."""
-    if etag not in _PACKED:
-        data = file.read()
-        while _PACKED and sum(map(len, _PACKED.values())) > MOST_PACKED:
-            _PACKED.pop(next(iter(_PACKED)))
-        _PACKED[etag] = gzip.compress(data, compresslevel=9, mtime=0)
-    return _PACKED[etag]
-
-
 async def send(request: web.Request, file: FileIO, name: str) -> web.StreamResponse:
-    """Answer with an open file, or the part that is asked for; texts and programs by gzip where the client takes that.
+    """Answer with an open file, or the part that is asked for; texts and programs packed, where the client reads that.
 
     A file that shrinks meanwhile ends the connection.
     """
     status = os.fstat(file.fileno())
-    suffix = Path(name).suffix.lower()
     size, etag = status.st_size, f"{status.st_ino:x}-{status.st_mtime_ns:x}-{status.st_size:x}"
-    headers = {"Accept-Ranges": "bytes"}
-    packs = suffix in PACKED_TYPES and size <= LARGEST_PACKED
+    headers, packs = {"Accept-Ranges": "bytes", "ETag": f'"{etag}"'}, Path(name).suffix.lower() in PACKED_TYPES
     if packs:
         headers["Vary"] = "Accept-Encoding"
-        packs = takes_gzip(request)
-    if packs:
-        etag = f"{etag}-gzip"
-    headers["ETag"] = f'"{etag}"'
     if any(tag.value in (etag, "*") for tag in request.if_none_match or ()):
         return web.Response(status=304, headers=headers)
     start, stop, code = 0, size, 200
@@ -151,12 +121,13 @@ async def send(request: web.Request, file: FileIO, name: str) -> web.StreamRespo
             return web.Response(status=416, headers=headers | {"Content-Range": f"bytes */{size}"})
         (start, stop), code = found, 206
         headers["Content-Range"] = f"bytes {start}-{stop - 1}/{size}"
-    headers["Content-Type"] = _TYPES.get(suffix) or mimetypes.guess_type(name)[0] or "application/octet-stream"
-    if packs:
-        headers["Content-Encoding"] = "gzip"
-        return web.Response(headers=headers, body=await asyncio.to_thread(packed, file, etag))
+    kind = _TYPES.get(Path(name).suffix.lower()) or mimetypes.guess_type(name)[0]
+    headers["Content-Type"] = kind or "application/octet-stream"
     response = web.StreamResponse(status=code, headers=headers)
-    response.content_length = stop - start
+    if code == 200 and packs:
+        response.enable_compression()  # by what the client reads; as a web host would, so that bytes can be counted
+    else:
+        response.content_length = stop - start
     await response.prepare(request)
     if request.method != "HEAD":
         await asyncio.to_thread(file.seek, start)

@@ -14,7 +14,6 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
-from typing import cast
 
 from aiohttp import web
 
@@ -23,11 +22,8 @@ from facefolds_core.served_files import asset_file, player_file, send
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost", "[::1]")
-PATIENCE = 10.0
-"""Seconds in which a connection must have sent its first request's head."""
 IDLE = 30.0
 """Seconds that a connection may be kept without a request."""
-MOST_CONNECTIONS = 128
 
 HEADERS = {
     "Cache-Control": "no-cache",  # what is made anew is seen at once
@@ -87,54 +83,8 @@ async def _checked(
     return await handler(request)
 
 
-class _Watched(asyncio.Protocol):
-    """A connection on its way to aiohttp's protocol. Closed if no first request comes, or if too many are open."""
-
-    def __init__(self, inner: web.RequestHandler, open_connections: set[_Watched]) -> None:
-        self._inner = inner
-        self._open = open_connections
-        self._timer: asyncio.TimerHandle | None = None
-        self._head = b""
-        self._transport: asyncio.Transport | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)
-        if len(self._open) >= MOST_CONNECTIONS:
-            self._transport.abort()
-            return
-        self._open.add(self)
-        self._timer = asyncio.get_running_loop().call_later(PATIENCE, self._transport.abort)
-        self._inner.connection_made(transport)
-
-    def data_received(self, data: bytes) -> None:
-        if self not in self._open:
-            return
-        if self._timer:
-            self._head = (self._head + data)[-(len(data) + 3) :]
-            if b"\r\n\r\n" in self._head or b"\n\n" in self._head:
-                self._timer.cancel()
-                self._timer, self._head = None, b""
-        self._inner.data_received(data)
-
-    def eof_received(self) -> bool | None:
-        self._inner.eof_received()
-        return None
-
-    def connection_lost(self, exc: BaseException | None) -> None:
-        if self._timer:
-            self._timer.cancel()
-        if self in self._open:
-            self._open.discard(self)
-            self._inner.connection_lost(exc)
-
-    def pause_writing(self) -> None:
-        self._inner.pause_writing()
-
-    def resume_writing(self) -> None:
-        self._inner.resume_writing()
-
-
-async def _start(player: Path, assets: Mapping[str, Path], port: int) -> tuple[web.AppRunner, asyncio.Server]:
+async def _start(player: Path, assets: Mapping[str, Path], port: int) -> tuple[web.AppRunner, int]:
+    """A running server, and the port that it listens on."""
     runner = web.AppRunner(
         player_app(player, assets),
         access_log=None,
@@ -144,13 +94,12 @@ async def _start(player: Path, assets: Mapping[str, Path], port: int) -> tuple[w
         shutdown_timeout=1.0,
     )
     await runner.setup()
-    make, connections = cast(Callable[[], web.RequestHandler], runner.server), set[_Watched]()
     try:
-        listener = await asyncio.get_running_loop().create_server(lambda: _Watched(make(), connections), HOST, port)
+        await web.TCPSite(runner, HOST, port).start()
     except BaseException:
         await runner.cleanup()
         raise
-    return runner, listener
+    return runner, int(runner.addresses[0][1])
 
 
 @contextmanager
@@ -173,13 +122,12 @@ def serving(player: Path, assets: Mapping[str, Path], port: int = 0) -> Iterator
 
     def run() -> None:
         try:
-            runner, listener = loop.run_until_complete(_start(player, assets, port))
+            runner, own = loop.run_until_complete(_start(player, assets, port))
         except BaseException as error:  # whatever it is, the caller waits for it
             address.set_exception(_port_error(error, port) if isinstance(error, OSError) else error)
             return
-        address.set_result(f"http://{HOST}:{listener.sockets[0].getsockname()[1]}/")
+        address.set_result(f"http://{HOST}:{own}/")
         loop.run_forever()
-        listener.close()
         loop.run_until_complete(runner.cleanup())
         loop.run_until_complete(loop.shutdown_default_executor())
 

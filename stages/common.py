@@ -4,43 +4,24 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.facts import Fact
-from facefolds_core.files import write_json
-from facefolds_core.locks import Lock, holding, owner, try_lock
-from facefolds_core.paths import SubjectFolders, check_subject_name, subject_folders, subject_of_dvc_stage
+from facefolds_core.errors import report_user_errors
+from facefolds_core.locks import Lock, try_lock
+from facefolds_core.paths import check_subject_name, subject_folders, subject_of_dvc_stage
+from facefolds_core.pipeline.running import Work, alone, run_alone
 from facefolds_core.processes import end_with_parent
 
 Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
-Work = Callable[[SubjectFolders], str]
-"""Does a stage's work on one subject's folders, and says in a line what was made and where; more lines may follow."""
-
-CHOICE = "choice.json"
-"""Name of the record of what `auto` chose, in the folder of the stage that chose it."""
-
-LOCK_WAIT = 20.0
-"""Seconds that a stage waits for another run of it, which may be ending, on the same subject."""
-
 KILLED = "if DVC was killed, and says the next time that a file is corrupted, `facefolds doctor` mends it"
 """What a stage says that ends with its DVC: a DVC that is killed can leave files that stop it before any stage runs."""
 
 LOOK = 0.25
 """Seconds between two looks at DVC's lock."""
-
-
-def write_choice(folder: Path, why: Fact | None) -> str:
-    """Write `choice.json` of a stage's folder: what `auto` chose, and why. Returns the line that says it, or ""."""
-    if why is None:
-        return ""
-    write_json(folder / CHOICE, why.to_json())
-    return f"\n  {why}"
 
 
 def run_stage(name: str, work: Work, help_text: str) -> None:
@@ -59,13 +40,7 @@ def run_stage(name: str, work: Work, help_text: str) -> None:
         with report_user_errors(name, KILLED if "DVC_STAGE" in os.environ else ""):
             end_with_dvc()
             folders = subject_folders(data, subject or subject_of_dvc_stage(name, os.environ.get("DVC_STAGE", "")))
-            with alone(name, folders.root / "locks"):
-                start = time.perf_counter()
-                made = work(folders)
-                seconds = time.perf_counter() - start
-                write_json(folders.timing(name), {"stage": name, "seconds": round(seconds, 3)})
-                said, *more = made.splitlines()
-                typer.echo("\n".join([f"{name}: {said} ({seconds:.1f} s)", *more]))
+            typer.echo(run_alone(name, work, folders))
             wait_for_other_dvcs()
 
     _run(name, command, help_text)
@@ -100,27 +75,6 @@ def _run(name: str, command: Callable[..., None], help_text: str) -> None:
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.command(name=name)(command)
     app()
-
-
-@contextmanager
-def alone(name: str, locks: Path) -> Iterator[None]:
-    """Keep a second run of the stage out while the block runs.
-
-    Args:
-        locks: folder of the locks: a subject's, or that of all subjects.
-
-    Raises:
-        UserError: if another run is at work, and does not end within LOCK_WAIT.
-    """
-    path = locks / name
-    with holding(path, LOCK_WAIT) as free:
-        if not free:
-            raise UserError(
-                f"another run of {name} is at work: {owner(path)}",
-                file=path,
-                remedy="let it end, or end it, and run the same command again",
-            )
-        yield
 
 
 def end_with_dvc() -> None:

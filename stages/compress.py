@@ -2,49 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-
-from facefolds_core.asset.glb import write_glb
-from facefolds_core.asset.reader import read_level
-from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
-from facefolds_core.export.steps import TEXTURES
-from facefolds_core.export.stores import read_chart, read_meshes, read_reflection_maps, read_windows
-from facefolds_core.frame_store import FrameStore
-from facefolds_core.packaging.notes import codec_warning
-from facefolds_core.packaging.package import Export, package
-from facefolds_core.params import CompressParams
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.pipeline.compress import compress
 from stages.common import run_stage
-
-
-def compress(folders: SubjectFolders) -> str:
-    params = read_stage(CompressParams, folders.config)
-    scene = read_scene(folders.scene)
-    grids, resolutions = folders.samples / "grids.npz", {level.mesh_resolution for level in params.levels}
-    export = Export(
-        meshes=read_meshes(folders.meshes / "meshes.npz"),
-        windows=read_windows(grids),
-        textures=FrameStore(folders.textures / TEXTURES),
-        centre=read_chart(grids).centre,
-        coarser={r: read_meshes(folders.meshes / f"level_{r}.npz") for r in resolutions},
-        reflection=read_reflection_maps(grids),
-    )
-    manifest = package(folders.asset, export, scene, params, folders.checkpoints / "encoded")
-    level = manifest.full
-    write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)
-    mesh_bytes = sum(layer.bytes for layer in level.layers)
-    videos = ", ".join(f"{video.codec} level {video.level}, {video.bytes} bytes" for video in level.texture.videos)
-    quality = f", {level.quality.psnr_to_model:.1f} dB to what went in" if level.quality else ""
-    warning = codec_warning(level.quality.psnr_to_model if level.quality else None, params.video)
-    if warning:
-        sys.stderr.write(f"compress: {warning}\n")
-    coarser = "".join(f"; {other.name} {other.bytes} bytes" for other in manifest.levels[:-1])
-    return (
-        f"{len(level.layers)} of {len(export.meshes)} meshes ({mesh_bytes} bytes) and {level.texture.frames} frames "
-        f"in {level.texture.width} x {level.texture.height} ({videos}){quality}{coarser}; {folders.asset}"
-    )
-
 
 if __name__ == "__main__":
     run_stage("compress", compress, __doc__ or "")

@@ -2,45 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from pathlib import Path
-
-from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage, read_subject
-from facefolds_core.facts import shorten
-from facefolds_core.params import SubjectParams
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.subject.folder import make_folder
+from facefolds_core.pipeline.subject import subject
 from stages.common import run_stage
-
-WORDS = {
-    "capture": "from the capture",
-    "named": "named by hand",
-    "plate": "beside plates",
-    "picture": "cut out",
-    "gaussians": "from the Gaussians alone",
-}
-
-
-def subject(folders: SubjectFolders) -> str:
-    params, entry, scene = (
-        read_stage(SubjectParams, folders.config),
-        read_subject(folders.config),
-        read_scene(folders.scene),
-    )
-    named, start = (None if path is None else Path(path) for path in (entry.mattes, entry.start))
-    found, told = make_folder(scene, folders.subject, params, named, start)
-    counts = Counter(one.source for one in told)
-    sources = ", ".join(f"{count} {WORDS[source]}" for source, count in counts.items())
-    doubtful = [
-        f"{scene.cameras[one.key[0]].name} {scene.frame_ids[one.key[1]]}" for one in told if one.source == "gaussians"
-    ]
-    more = f"; these pictures contradict the others: {shorten(doubtful, 300)}" if doubtful else ""
-    return (
-        f"{len(found.splats)} Gaussians, PSNR {found.psnr:.1f} dB; mattes: {sources}; "
-        f"look at {folders.subject / 'sheet.png'}{more}"
-    )
-
 
 if __name__ == "__main__":
     run_stage("subject", subject, __doc__ or "")

@@ -2,22 +2,8 @@
 
 from __future__ import annotations
 
-from facefolds_core.captures.found_scene import found_scene
-from facefolds_core.config import read_train
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.training.models import train
+from facefolds_core.pipeline.train import train
 from stages.common import run_stage
 
-
-def train_stage(folders: SubjectFolders) -> str:
-    params = read_train(folders.config)
-    scene = found_scene(folders)
-    report = train(scene, params, folders.model, folders.checkpoints, folders.training_log)
-    return (
-        f"{report.iterations} iterations on {report.device}, {report.rays_per_second:.0f} rays/s, "
-        f"PSNR {report.final_psnr:.2f} dB on training rays, model in {folders.model}"
-    )
-
-
 if __name__ == "__main__":
-    run_stage("train", train_stage, __doc__ or "")
+    run_stage("train", train, __doc__ or "")

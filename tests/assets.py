@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +10,28 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Manifest
 from facefolds_core.asset.cropping import CroppedLayer, crop_layers
-from facefolds_core.asset.writer import AssetSource, write_asset
+from facefolds_core.asset.inputs import check_inputs
+from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
+from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
+from facefolds_core.files import atomic_folder
 from facefolds_core.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, MeshCodec, VideoCodec
 
 CENTRE = (-0.25, 0.0, 0.0)
 WINDOW: Window = (-0.5, 0.5, -0.4, 0.4)
 SOURCE = AssetSource(
     "caps", 30.0, Similarity(2.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.3])), CENTRE
 )
+
+PLAIN = CompressParams(
+    mesh=MeshCodec(max_error_pixels=None, compression_level=0),
+    video=VideoCodec(target_psnr=None, preset="slow"),
+    levels=(),
+)
+"""Exact floats, one level, a fixed factor: nothing is searched for."""
 
 
 def radius_of(layer: int) -> float:
@@ -83,6 +93,22 @@ def cap_crops(layers: int, frames: int, resolution: int) -> tuple[CroppedLayer, 
     return crop_layers(meshes, [WINDOW] * layers, Store(), frames)
 
 
+def write_asset(
+    folder: Path,
+    meshes: Sequence[TexturedMesh],
+    windows: Sequence[Window],
+    textures: FrameStore,
+    source: AssetSource,
+    params: CompressParams,
+) -> Manifest:
+    """Write an asset of one level, as `package` does."""
+    frames = check_inputs(meshes, windows, textures)
+    layers = crop_layers(meshes, windows, textures, frames)
+    with atomic_folder(folder) as temporary:
+        level = write_level(temporary, FULL, LevelContent(layers, textures, frames, source.fps), params)
+        return write_manifest(manifest_of(source, [level], temporary), temporary / MANIFEST_NAME)
+
+
 def make_asset(
     folder: Path,
     layers: int = 3,
@@ -95,4 +121,4 @@ def make_asset(
     textures = np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)])
     store = write_store(folder.parent / f"{folder.name}-textures.arrow", textures)
     meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
-    return write_asset(folder, meshes, [WINDOW] * layers, store, source, params or CompressParams())
+    return write_asset(folder, meshes, [WINDOW] * layers, store, source, params or PLAIN)

@@ -12,7 +12,12 @@ from playwright.sync_api import Browser, sync_playwright
 from tests.chromium import BROWSERS, Chromium, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
-BROWSER = ("tests/viewer/", "tests/reporting/test_browser.py", "tests/core/test_chromium.py")
+BROWSER = (
+    "tests/viewer/",
+    "tests/reporting/test_browser.py",
+    "tests/documents/test_site_pages.py",
+    "tests/core/test_chromium.py",
+)
 RUN_ONCE = ("tests/pipeline/test_end_to_end.py", "tests/pipeline/test_commands.py")
 """Tests of one project that DVC has run."""
 LONGEST = (*RUN_ONCE, *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")

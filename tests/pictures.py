@@ -26,6 +26,11 @@ def five_cameras(size: int) -> list[Camera]:
     return [look_at_origin(name, azimuth, elevation, size) for name, (azimuth, elevation) in places.items()]
 
 
+def turned_cameras(size: int) -> list[Camera]:
+    """From the front to the subject's left side, a little from above; named by degrees."""
+    return [look_at_origin(str(azimuth), azimuth, 3, size) for azimuth in (0, 30, 45, 60, 80)]
+
+
 def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
     error = float(np.mean((np.asarray(found, np.float64) - expected) ** 2))
     return float(-10 * np.log10(max(error, 1e-12)))

@@ -23,8 +23,8 @@ from facefolds_core.asset.video import FORMATS
 from facefolds_core.asset.writer import LevelContent, manifest_of
 from facefolds_core.files import file_sha256
 from facefolds_core.packaging.rungs import stream_unit, write_rungs
-from facefolds_core.params import CompressParams
-from tests.assets import SOURCE, WINDOW, cap_mesh, cap_textures, radius_of
+from facefolds_core.params import CompressParams, merged
+from tests.assets import PLAIN, SOURCE, WINDOW, cap_mesh, cap_textures, radius_of
 
 
 def stored(path: Path) -> StoredFile:
@@ -70,7 +70,7 @@ def streamed_asset(
         section: `compress`.
     """
     folder.mkdir(parents=True)
-    params = CompressParams.model_validate(section)
+    params = CompressParams.model_validate(merged(PLAIN.model_dump(), section))
     textures, meshes = Caps(2, resolution), [cap_mesh(radius_of(layer)) for layer in range(2)]
     unit = stream_unit(params.levels, resolution)
     layers = crop_layers(meshes, [WINDOW] * 2, textures, frames, unit)

@@ -122,6 +122,8 @@ export class FacefoldsPlayer extends HTMLElement {
   capture(camera?: Camera): ImageData;
   /** A PNG. */
   screenshot(camera?: Camera): Promise<Blob>;
+  /** u, v and depth at a place of the window (`clientX`, `clientY`), for `data-surface` of a hotspot. */
+  surfaceFromPoint(x: number, y: number): string | null;
   /** What is seen, by default as a PNG. */
   toBlob(options?: { mimeType?: string; qualityArgument?: number }): Promise<Blob>;
   /**

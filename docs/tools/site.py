@@ -78,6 +78,30 @@ def first_page(text: str, player: bool) -> str:
     return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: FRAME, text, count=1, flags=re.MULTILINE) if player else text
 
 
+def with_steps(text: str) -> str:
+    """A document with its flow charts of one row (Mermaid's `A[first] --> B[second]`) as lists: no script."""
+
+    def steps(chart: re.Match[str]) -> str:
+        items = "".join(f"<li>{label}</li>" for label in re.findall(r'\w+\["?([^]"]+)"?\]', chart[1]))
+        return f'<ol class="steps">{items}</ol>'
+
+    return re.sub(r"^```mermaid\nflowchart LR\n(.*?)^```$", steps, text, flags=re.DOTALL | re.MULTILINE)
+
+
+def with_closed_tables(page: str) -> str:
+    """HTML of the parameters' page: its tables marked as those of keys, and those for experts closed."""
+    first, expert, rest = page.partition('<h2 id="expert-keys">')
+
+    def closed(table: re.Match[str]) -> str:
+        keys = re.findall(r"<td><code>(.*?)</code></td>\n<td>", table[0])
+        names = ", ".join(f"<code>{key}</code>" for key in keys)
+        count = f"{len(keys)} key{'s' * (len(keys) > 1)}"
+        return f'<details class="keys"><summary>{count}: {names}</summary>{table[0]}</details>'
+
+    shown = re.sub(r"<table>.*?</table>", lambda table: f'<div class="keys">{table[0]}</div>', first, flags=re.DOTALL)
+    return shown + expert + re.sub(r"<table>.*?</table>", closed, rest, flags=re.DOTALL)
+
+
 def api_page() -> str:
     """Every name of the library, with its signature and docstring."""
     lines = ["# The library, name by name", "", "From the docstrings; [in words](library.md).", ""]
@@ -104,7 +128,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     player = (ROOT / HERO).exists()
     for source in sorted(documents):
         text = (ROOT / source).read_text(encoding="utf-8")
-        text, more = relinked(first_page(text, player) if source == "README.md" else text, source)
+        text, more = relinked(with_steps(first_page(text, player)) if source == "README.md" else text, source)
         wanted |= more
         place = place_of(source)
         if (old := files.get_file_from_path(source.removeprefix("docs/"))) is not None:
@@ -116,6 +140,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     if player:
         files.append(File.generated(config, "hero.html", abs_src_path=str(ROOT / HERO)))
     return files
+
+
+def on_page_content(html: str, page: Page, **_: object) -> str:
+    """The parameters' page folded up."""
+    return with_closed_tables(html) if page.file.src_uri == "reference/params.md" else html
 
 
 def on_page_context(context: dict[str, Any], page: Page, **_: object) -> dict[str, Any]:

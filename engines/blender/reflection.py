@@ -12,7 +12,8 @@ from typing import Any
 
 import bpy
 
-RECTS = ("environment", "gloss", "offset", "normals")
+CHART = "UVMap.001"
+"""What Blender's importer calls TEXCOORD_1: the place on the model's UV map."""
 
 
 @dataclass
@@ -21,12 +22,10 @@ class Gloss:
 
     Attributes:
         entry: the manifest's `reflection`.
-        windows: (u0, u1, v0, v1) of each layer, outermost first.
         image: the picture, stored values.
     """
 
     entry: dict[str, Any]
-    windows: list[list[float]]
     image: Any
 
 
@@ -38,7 +37,7 @@ def read_gloss(asset: Path) -> Gloss | None:
         return None
     image = bpy.data.images.load(str((asset / entry["file"]).resolve()))
     image.colorspace_settings.name = "Non-Color"
-    return Gloss(entry, [layer["uv_window"] for layer in level["layers"]], image)
+    return Gloss(entry, image)
 
 
 class Nodes:
@@ -94,15 +93,15 @@ class Nodes:
         return node.outputs[0]
 
 
-def reflected(tree: Any, colour: Any, gloss: Gloss, layer: int) -> Any:
-    """The socket of a layer's colour with its reflection, of a mesh that Blender's importer read from a GLB."""
+def reflected(tree: Any, colour: Any, gloss: Gloss) -> Any:
+    """The socket of the layers' colour with its reflection, of a mesh that Blender's importer read from a GLB."""
     nodes, entry = Nodes(tree), gloss.entry
-    s, t, _ = nodes.parts(tree.nodes.new("ShaderNodeUVMap").outputs["UV"])
-    t = nodes.number("SUBTRACT", 1.0, t)
-    a0, a1, b0, b1 = gloss.windows[layer]
+    chart = tree.nodes.new("ShaderNodeUVMap")
+    chart.uv_map = CHART
+    across, up, _ = nodes.parts(chart.outputs["UV"])  # (v + 2) / 4 and, as the importer turns it, (u + 2) / 4
     u0, u1, v0, v1 = entry["uv_window"]
-    s = nodes.number("MULTIPLY_ADD", s, (b1 - b0) / (v1 - v0), (b0 - v0) / (v1 - v0))
-    t = nodes.number("MULTIPLY_ADD", t, (a1 - a0) / (u1 - u0), (u1 - a1) / (u1 - u0))
+    s = nodes.number("MULTIPLY_ADD", across, 4 / (v1 - v0), (-2 - v0) / (v1 - v0))
+    t = nodes.number("MULTIPLY_ADD", up, -4 / (u1 - u0), (u1 + 2) / (u1 - u0))
 
     def look(name: str, s: Any, t: Any) -> Any:
         x, y, width, height = entry[f"{name}_rect"]

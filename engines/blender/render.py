@@ -49,11 +49,13 @@ def prepare(file: Path, background: tuple[float, float, float], samples: int, as
         bpy.ops.wm.usd_import(filepath=str(file.resolve()))
     else:
         bpy.ops.import_scene.gltf(filepath=str(file))
-    layers = [thing for thing in bpy.data.objects if thing.type == "MESH"]
+    meshes = [thing for thing in bpy.data.objects if thing.type == "MESH"]
     gloss = None if asset is None else read_gloss(asset)
-    for layer in layers:
-        for slot in layer.material_slots:
-            blend_as_stored(slot.material, gloss, int(layer.name.removeprefix("layer_")[:2]))
+    for mesh in meshes:
+        drop_core(mesh.data)
+        for slot in mesh.material_slots:
+            blend_as_stored(slot.material, gloss)
+    layers = sum(mesh.get("layers", 1) for mesh in meshes)  # a GLB has them in one mesh
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -62,8 +64,8 @@ def prepare(file: Path, background: tuple[float, float, float], samples: int, as
     scene.cycles.use_denoising = False
     scene.cycles.pixel_filter_type = "BOX"
     scene.cycles.filter_width = 0.01 if samples == 1 else 1.0
-    scene.cycles.transparent_max_bounces = CROSSINGS * len(layers)
-    scene.cycles.min_transparent_bounces = CROSSINGS * len(layers)  # fewer: rays end by chance, the picture is noisy
+    scene.cycles.transparent_max_bounces = CROSSINGS * layers
+    scene.cycles.min_transparent_bounces = CROSSINGS * layers  # fewer: rays end by chance, the picture is noisy
     scene.display_settings.display_device = "sRGB"
     scene.view_settings.view_transform = "Raw"
     scene.view_settings.look = "None"
@@ -75,7 +77,21 @@ def prepare(file: Path, background: tuple[float, float, float], samples: int, as
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*background, 1.0)
 
 
-def blend_as_stored(material: Any, gloss: Gloss | None, layer: int) -> None:
+def drop_core(mesh: Any) -> None:
+    """Leave out the opaque core of a GLB, which is for programs that do not trace rays through what is transparent."""
+    core = [index for index, material in enumerate(mesh.materials) if material.name.startswith("core")]
+    if not core:
+        return
+    import bmesh  # is there once bpy is
+
+    parts = bmesh.new()
+    parts.from_mesh(mesh)
+    bmesh.ops.delete(parts, geom=[face for face in parts.faces if face.material_index in core], context="FACES")
+    parts.to_mesh(mesh)
+    parts.free()
+
+
+def blend_as_stored(material: Any, gloss: Gloss | None) -> None:
     """Unlit: emission of the texture's stored colour, mixed with transparency by its alpha.
 
     Of each layer only the nearest crossing counts, which a material cannot know. Back sides are left out instead: where
@@ -83,7 +99,6 @@ def blend_as_stored(material: Any, gloss: Gloss | None, layer: int) -> None:
 
     Args:
         gloss: what is reflected besides; None for nothing.
-        layer: its index, outermost 0.
     """
     tree = material.node_tree
     images = sorted(images_of(tree))
@@ -91,7 +106,7 @@ def blend_as_stored(material: Any, gloss: Gloss | None, layer: int) -> None:
     nodes = [texture_node(tree, *one) for one in images]
     colour = nodes[0].outputs["Color"]
     if gloss is not None:
-        colour = reflected(tree, colour, gloss, layer)
+        colour = reflected(tree, colour, gloss)
     alpha = nodes[0].outputs["Alpha"] if len(nodes) == 1 else nodes[1].outputs["Color"]  # grey
     emission, clear = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeBsdfTransparent")
     mix, out = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeOutputMaterial")

@@ -1,13 +1,12 @@
 """One frame of an asset as a binary glTF 2.0 file (GLB), for programs that know nothing of the asset format.
 
-A node, mesh, material and PNG for each layer: KHR_materials_unlit, alphaMode BLEND, edges clamped. Programs blend every
-crossing of a sheet, where the format counts the nearest one: so backs are left out (not double-sided), and plain meshes
-list their triangles from the back to the front, as seen from before the face. Draco keeps the asset's own order. The
-root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x, y, z) -> (y, z, x). Nodes are listed
-from the innermost layer to the outermost: viewers draw blended objects at one distance in that order.
+One mesh, one picture. Programs blend every crossing of a sheet, where the format counts the nearest one, and sort
+whole meshes, not triangles. So the mesh is listed twice. First its opaque core (`alphaMode` MASK, which writes depth):
+it hides all that lies behind. Then the soft shell (BLEND), from the innermost layer to the outermost, each from the
+back to the front as seen from before the face, without backs. KHR_materials_unlit; each layer has a gutter.
+The root node turns the asset's axes into glTF's (y up, the subject looks to +z): (x, y, z) -> (y, z, x).
 
-glTF's viewers decode colours to linear light before they blend, the asset's players do not: half-transparent parts look
-slightly different (docs/reference/asset-format.md).
+Measured in three.js and model-viewer: docs/guide/engines.md.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from facefolds_core.asset.opaque import faces_over, opaque_where_covered
+from facefolds_core.asset.packing import GUTTER
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.errors import UserError
 from facefolds_core.files import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.geometry.track import Track
 
 TO_Y_UP = [-0.5, -0.5, -0.5, 0.5]
@@ -35,6 +38,8 @@ UNLIT = "KHR_materials_unlit"
 FLOAT, UNSIGNED_INT = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 LINEAR, CLAMP_TO_EDGE = 9729, 33071
+CUTOFF = 0.9
+"""Of the core's alpha; it is 1 there, and filtered at its rim."""
 
 
 @dataclass
@@ -61,19 +66,15 @@ class Builder:
         self.accessors.append(entry)
         return len(self.accessors) - 1
 
-    def primitive(self, mesh: TexturedMesh) -> dict[str, Any]:
-        """A layer's triangles."""
-        indices = back_to_front(mesh).astype("<u4").ravel()
-        arrays = (("POSITION", "VEC3", mesh.vertices), ("TEXCOORD_0", "VEC2", mesh.st))
-        attributes = {}
-        for name, kind, values in arrays:
-            view = self.view(values.astype("<f4").tobytes(), ARRAY_BUFFER)
-            attributes[name] = self.accessor(kind, FLOAT, values, view, bounds=name == "POSITION")
-        view = self.view(indices.tobytes(), ELEMENT_ARRAY_BUFFER)
-        return {
-            "attributes": attributes,
-            "indices": self.accessor("SCALAR", UNSIGNED_INT, indices, view),
-        }
+    def array(self, kind: str, values: NDArray[Any], bounds: bool = False) -> int:
+        """Store floats (count, ...), a value a vertex; returns the index of their accessor."""
+        view = self.view(values.astype("<f4").tobytes(), ARRAY_BUFFER)
+        return self.accessor(kind, FLOAT, values, view, bounds)
+
+    def indices(self, faces: NDArray[np.intp]) -> int:
+        """Store triangles (F, 3); returns the index of their accessor."""
+        values = faces.astype("<u4").ravel()
+        return self.accessor("SCALAR", UNSIGNED_INT, values, self.view(values.tobytes(), ELEMENT_ARRAY_BUFFER))
 
 
 def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
@@ -93,30 +94,23 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
             found=frame,
             remedy="correct it in params.yaml",
         )
+    textures = opaque_where_covered(level.frame(frame), level.windows)
     builder = Builder()
-    meshes, materials, images, nodes = [], [], [], []
-    textures = level.frame(frame)
-    for place, index in enumerate(reversed(range(level.num_layers))):
-        label = f"layer_{index:02d}"
-        primitive = builder.primitive(level.layers[index]) | {"material": place}
-        meshes.append({"name": label, "primitives": [primitive]})
-        images.append({"name": label, "mimeType": "image/png", "bufferView": builder.view(_png(textures[index]))})
-        materials.append(_material(label, place))
-        nodes.append({"name": label, "mesh": place})
-    count, children = len(nodes), list(range(len(nodes)))
+    primitives = _primitives(builder, level, [texture[..., 3] == 255 for texture in textures])
+    picture = builder.view(_png(_picture(level, textures)))
+    nodes: list[dict[str, Any]] = [{"name": "layers", "mesh": 0, "extras": {"layers": level.num_layers}}]
     if level.track is not None:
-        nodes.append({"name": "head", "children": children, **_pose(level.track, frame)})
-        children = [count]
+        nodes.append({"name": "head", "children": [0], **_pose(level.track, frame)})
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
         "extensionsUsed": [UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [len(nodes)]}],
-        "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": children}],
-        "meshes": meshes,
-        "materials": materials,
-        "textures": [{"source": place, "sampler": 0} for place in range(count)],
-        "images": images,
+        "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": [len(nodes) - 1]}],
+        "meshes": [{"name": "layers", "primitives": primitives}],
+        "materials": [_material("core", alphaMode="MASK", alphaCutoff=CUTOFF), _material("shell", alphaMode="BLEND")],
+        "textures": [{"source": 0, "sampler": 0}],
+        "images": [{"name": "layers", "mimeType": "image/png", "bufferView": picture}],
         "samplers": [{"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE}],
         "accessors": builder.accessors,
         "bufferViews": builder.views,
@@ -126,18 +120,59 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
         temporary.write_bytes(_container(document, bytes(builder.binary)))
 
 
+def _primitives(builder: Builder, level: AssetLevel, opaque: Sequence[NDArray[np.bool_]]) -> list[dict[str, Any]]:
+    """The core's triangles and the shell's, over the same vertices.
+
+    Args:
+        opaque: of each layer, (h, w): its texels that are of the core.
+    """
+    _, _, width, height = level.entry.texture.colour_rect
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in level.layers])
+    st, chart, core, shell = [], [], [], []
+    for mesh, layer, mask, start in zip(level.layers, level.entry.layers, opaque, starts, strict=False):
+        x, y, w, h = layer.texture_rect
+        st.append((mesh.st * (w, h) + (x, y)) / (width, height))
+        uv = st_to_uv(mesh.st.astype(np.float64), layer.uv_window)
+        chart.append(np.stack([(uv[:, 1] + 2) / 4, (2 - uv[:, 0]) / 4], -1))
+        core.append(mesh.faces[faces_over(mesh, mask)].astype(np.intp) + start)
+        shell.append(back_to_front(mesh).astype(np.intp) + start)
+    attributes = {
+        "POSITION": builder.array("VEC3", np.concatenate([mesh.vertices for mesh in level.layers]), bounds=True),
+        "TEXCOORD_0": builder.array("VEC2", np.concatenate(st)),
+        "TEXCOORD_1": builder.array("VEC2", np.concatenate(chart)),
+    }
+    parts = [np.concatenate(core), np.concatenate(shell[::-1])]
+    return [
+        {"attributes": attributes, "indices": builder.indices(part), "material": material}
+        for material, part in enumerate(parts)
+        if len(part)
+    ]
+
+
+def _picture(level: AssetLevel, textures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """All layers in one RGBA picture, where the asset's colour image has them, with gutters."""
+    _, _, width, height = level.entry.texture.colour_rect
+    picture = np.zeros((height, width, 4), np.uint8)
+    for texture, layer in zip(textures, level.entry.layers, strict=True):
+        x, y, w, h = layer.texture_rect
+        left, top, right, below = (min(GUTTER, room) for room in (x, y, width - x - w, height - y - h))
+        padded = np.pad(texture, ((top, below), (left, right), (0, 0)), mode="edge")
+        picture[y - top : y + h + below, x - left : x + w + right] = padded
+    return picture
+
+
 def _pose(track: Track, frame: int) -> dict[str, list[float]]:
     """Of a node: where the head stands in a frame."""
     w, x, y, z = track.quaternions[frame].tolist()
     return {"rotation": [x, y, z, w], "translation": track.translations[frame].tolist()}
 
 
-def _material(name: str, texture: int) -> dict[str, Any]:
+def _material(name: str, **alpha: Any) -> dict[str, Any]:
     return {
         "name": name,
-        "alphaMode": "BLEND",
+        **alpha,
         "doubleSided": False,
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}, "metallicFactor": 0.0, "roughnessFactor": 1.0},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0},
         "extensions": {UNLIT: {}},
     }
 

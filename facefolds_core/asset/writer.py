@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from facefolds_core import __version__
 from facefolds_core.asset.codecs import CODECS, Codec, CodecName, VideoSettings
-from facefolds_core.asset.cropping import CroppedLayer, Textures, crop_layers
+from facefolds_core.asset.cropping import CroppedLayer, Textures
 from facefolds_core.asset.draco import MeshSettings, encode_mesh
-from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import (
     Bounds,
     Coordinates,
@@ -29,18 +28,14 @@ from facefolds_core.asset.manifest import (
     Video,
 )
 from facefolds_core.asset.manifest_base import StoredFile
-from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.parts import Filmed, Parts, encode_parts
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
-from facefolds_core.files import atomic_folder, file_sha256
-from facefolds_core.frame_store import FrameStore
-from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.files import file_sha256
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.geometry.track import Track
 
 STATIC_FPS = 1.0
@@ -75,34 +70,6 @@ class AssetSource:
     to_capture: Similarity
     sphere_centre: tuple[float, float, float]
     track: Track | None = None
-
-
-def write_asset(
-    folder: str | Path,
-    meshes: Sequence[TexturedMesh],
-    windows: Sequence[Window],
-    textures: FrameStore,
-    source: AssetSource,
-    params: AssetSettings,
-) -> Manifest:
-    """Write the folder of an asset, whole or not at all; an older one is replaced.
-
-    Args:
-        meshes: N layers, outermost first.
-        windows: (u0, u1, v0, v1) of each layer's texture.
-        textures: layered texture store (camera := layer), N layers x K frames of (R, R, 4).
-        source: what the manifest tells of the capture.
-        params: codecs.
-
-    Raises:
-        UserError: if a mesh or the store cannot be an asset's, or the textures do not fit into one video.
-    """
-    frames = check_inputs(meshes, windows, textures)
-    layers = crop_layers(meshes, windows, textures, frames)
-    folder = Path(folder)
-    with atomic_folder(folder) as temporary:
-        level = write_level(temporary, FULL, LevelContent(layers, textures, frames, source.fps), params)
-        return write_manifest(manifest_of(source, [level], temporary), temporary / MANIFEST_NAME)
 
 
 def manifest_of(source: AssetSource, levels: Sequence[Level], folder: Path) -> Manifest:

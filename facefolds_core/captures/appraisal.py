@@ -12,8 +12,8 @@ import numpy as np
 
 from facefolds_core.captures.assembly import Plan, plan_scene
 from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.gathering import Recognised
 from facefolds_core.captures.looking import describe, look
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, shorten
 from facefolds_core.params import CaptureParams, FrameRange, HoldoutEvery, NormalizeParams, Subject

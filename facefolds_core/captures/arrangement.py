@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import closest_rotation
 from facefolds_core.captures.gathering import Calibration
 from facefolds_core.captures.normalization import nearest_to_axes
-from facefolds_core.captures.values import wrong
+from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import Camera
 
@@ -30,6 +30,12 @@ APART = 5.0
 """Times as far from the next camera a camera stands, at least, as its own poses differ."""
 FEWEST = 3
 """Cameras that poses which differ can be gathered into; fewer are one camera that moves."""
+REMEDY = "mend transforms.json, or make it again with the tool that wrote it"
+
+
+def wrong(path: Path, place: str, message: str, expected: object, found: object, remedy: str = REMEDY) -> UserError:
+    """The error for a value that is not what it should be."""
+    return UserError(message, file=path, place=place, expected=expected, found=found, remedy=remedy)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
-from queue import Empty, Full, Queue
 from typing import TypeVar
 
 import numpy as np
@@ -173,62 +172,23 @@ def _in_order(function: Callable[[Negative], T], items: Sequence[Negative], core
                 future.cancel()
 
 
-class _End:
-    """What a lane puts last: the exception that ended it, or None."""
-
-    def __init__(self, error: BaseException | None) -> None:
-        self.error = error
-
-
 def _in_turn(lanes: Sequence[Iterator[T]]) -> Iterator[T]:
     """One item of each lane in turn until all are at their end, each lane on its own thread."""
-    stop = threading.Event()
-    queues: list[Queue[T | _End]] = [Queue(_AHEAD) for _ in lanes]
-
-    def put(queue: Queue[T | _End], item: T | _End) -> None:
-        while not stop.is_set():
-            try:
-                return queue.put(item, timeout=0.2)
-            except Full:
-                continue
-
-    def run(lane: Iterator[T], queue: Queue[T | _End]) -> None:
-        error: BaseException | None = None
-        try:
-            for item in lane:
-                put(queue, item)
-                if stop.is_set():
-                    break
-        except BaseException as found:
-            error = found
-        put(queue, _End(error))
-
-    threads = [threading.Thread(target=run, args=pair, daemon=True) for pair in zip(lanes, queues, strict=True)]
-    for thread in threads:
-        thread.start()
+    pools = [ThreadPoolExecutor(1) for _ in lanes]
+    running = [
+        (pool, lane, deque(pool.submit(next, lane, None) for _ in range(_AHEAD)))
+        for pool, lane in zip(pools, lanes, strict=True)
+    ]
     try:
-        running = list(queues)
         while running:
-            for queue in list(running):
-                item = queue.get()
-                if not isinstance(item, _End):
-                    yield item
+            for one in list(running):
+                pool, lane, ahead = one
+                item = ahead.popleft().result()
+                if item is None:
+                    running.remove(one)
                     continue
-                if item.error is not None:
-                    raise item.error
-                running.remove(queue)
+                ahead.append(pool.submit(next, lane, None))
+                yield item
     finally:
-        stop.set()
-        for queue in queues:
-            _empty(queue)
-        for thread in threads:
-            thread.join()
-
-
-def _empty(queue: Queue[T]) -> None:
-    """Empty a queue, so that who waits to put something there goes on."""
-    try:
-        while True:
-            queue.get_nowait()
-    except Empty:
-        return
+        for pool in pools:
+            pool.shutdown(cancel_futures=True)

@@ -1,24 +1,23 @@
-"""From calibrated cameras and their pictures to a `Capture`: what the readers of folders have in common."""
+"""What the readers of folders have in common: from calibrated cameras and their pictures to a `Capture`."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
-from facefolds_core.captures.krt import scaled_intrinsics
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.captures.matching import cameras_with_pictures
 from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
 from facefolds_core.captures.videos import Video, check_together, frame_names
 from facefolds_core.errors import UserError
-from facefolds_core.facts import Fact, fact
+from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.params import FrameRange, Subject
 from facefolds_core.reading import is_folder
@@ -28,6 +27,21 @@ Photos = Mapping[str, Mapping[str, Picture]]
 """Camera -> frame -> picture."""
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """What a source module says of a folder that it would read.
+
+    Attributes:
+        what: in words, "a Multiface subject with 2 segments".
+        path: what `path` of the subject should be: the folder asked about, or the one of its parts that is meant.
+        keys: other keys that the subject needs, such as `segment`.
+    """
+
+    what: str
+    path: Path
+    keys: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,3 +186,72 @@ def view_of(calibration: Calibration, size: tuple[int, int], pixel_centres: floa
     )
     pinhole = K if lens is None else lens.pinhole
     return View(Camera(calibration.name, pinhole, closest_rotation(calibration.w2c), *size), lens)
+
+
+def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
+    """K of a layout -> K for the images at hand in continuous coordinates (docs/reference/conventions.md).
+
+    Args:
+        K: (3, 3) for images of size `reference`, whose first pixel has its centre at `pixel_centres`.
+        reference, image: (width, height).
+    """
+    shift = np.array([[1, 0, 0.5 - pixel_centres], [0, 1, 0.5 - pixel_centres], [0, 0, 1]])
+    scale = np.diag([image[0] / reference[0], image[1] / reference[1], 1.0])
+    return np.asarray(scale @ shift @ K)
+
+
+def cameras_with_pictures(
+    calibrations: Sequence[Calibration], photos: Mapping[str, Mapping[str, Any]], root: Path
+) -> tuple[list[Calibration], list[str], list[str]]:
+    """Cameras with both calibration and pictures; names of those without pictures; of those without a calibration.
+
+    Args:
+        photos: camera -> frame -> picture.
+
+    Raises:
+        UserError: if there is no such camera.
+    """
+    known = {one.name for one in calibrations}
+    used = [one for one in calibrations if photos.get(one.name)]
+    if not used:
+        raise UserError(
+            "no camera has both pictures and a calibration",
+            file=root,
+            expected=f"pictures of cameras named {shorten([one.name for one in calibrations], 5)}",
+            found=shorten(list(photos), 5) or "none",
+            remedy="copy calibration and pictures of the same subject",
+        )
+    bare = [one.name for one in calibrations if not photos.get(one.name)]
+    return used, bare, [name for name in photos if name not in known and photos[name]]
+
+
+def chosen_segment(names: Collection[str], wanted: str | None, place: Path, missing: str, kind: str = "segment") -> str:
+    """The segment that the subject names; the only one, where it names none.
+
+    Args:
+        names: of those that there are.
+        place: where they were looked for.
+        missing: remedy where there are none.
+        kind: what the layout calls one; in params.yaml it is `segment` all the same.
+
+    Raises:
+        UserError: if there is none, no such one, or several of which none is chosen.
+    """
+    if wanted in names:
+        return str(wanted)
+    if wanted is None and len(names) == 1:
+        return next(iter(names))
+    if not names:
+        problem, remedy = f"no {kind}s", missing
+    elif wanted is None:
+        problem, remedy = f"several {kind}s, and none is chosen", "set `segment` of this subject in params.yaml"
+    else:
+        problem, remedy = f"no such {kind}", "correct `segment` of this subject in params.yaml"
+    raise UserError(
+        problem,
+        file=place,
+        place="segment",
+        expected=f"one of {shorten(sorted(names), 100)}" if names else None,
+        found=wanted,
+        remedy=remedy,
+    )

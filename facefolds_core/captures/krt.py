@@ -7,40 +7,20 @@ For each camera eight lines: its name; the three rows of K; five distortion valu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from facefolds_core.captures.gathering import Calibration
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.reading import is_regular, read_text
 
-Array = NDArray[np.float64]
-
 FULL_SIZE = (1334, 2048)
 """(width, height) of Multiface's own images, v1 and v2."""
 _REMEDY = "copy KRT again from the dataset, or mend this line"
 _ROWS = (3, 3, 3, 5, 4, 4, 4)
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """One camera of KRT, as it stands there.
-
-    Attributes:
-        name: of the camera.
-        K: (3, 3) intrinsics.
-        distortion: (5,) k1, k2, p1, p2, k3.
-        w2c: (3, 4) world -> camera.
-    """
-
-    name: str
-    K: Array
-    distortion: Array
-    w2c: Array
 
 
 def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
@@ -108,8 +88,9 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
             found=f"{len(block)} lines",
             remedy=_REMEDY,
         )
-    camera = Calibration(name, np.array(rows[0:3]), np.array(rows[3]), np.array(rows[4:7]))
-    check_camera(Camera(name, camera.K, camera.w2c, 1, 1), path, f"camera {name}, lines {number} to {block[-1][0]}")
+    place = f"camera {name}, lines {number} to {block[-1][0]}"
+    camera = Calibration(name, np.array(rows[0:3]), np.array(rows[4:7]), path, place, np.array(rows[3]))
+    check_camera(Camera(name, camera.K, camera.w2c, 1, 1), path, place)
     return camera
 
 
@@ -158,15 +139,3 @@ def krt_reference(
         )
     kind = "krt_is_scaled" if best == image else "krt_is_of_full_size"
     return best, fact(kind, point=[float(x) for x in points], image=list(image))
-
-
-def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
-    """K of KRT -> K for the images at hand in continuous coordinates (docs/reference/conventions.md).
-
-    Args:
-        K: (3, 3) for images of size `reference`, whose first pixel has its centre at `pixel_centres`.
-        reference, image: (width, height).
-    """
-    shift = np.array([[1, 0, 0.5 - pixel_centres], [0, 1, 0.5 - pixel_centres], [0, 0, 1]])
-    scale = np.diag([image[0] / reference[0], image[1] / reference[1], 1.0])
-    return np.asarray(scale @ shift @ K)

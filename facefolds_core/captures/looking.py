@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from facefolds_core.captures.recognition import Recognised
+from facefolds_core.captures.gathering import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.reading import is_folder, is_regular

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.values import is_number, short
+from facefolds_core.captures.numbers import numbers_from, short
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.parsing import parse_yaml
 from facefolds_core.reading import read_text
 
@@ -60,7 +59,4 @@ def matrix_of(
     if shape not in shapes or len(data) != shape[0] * shape[1]:
         found = f"{shape[0]} x {shape[1]} of {len(data)} numbers"
         raise refuse(" or ".join(f"{rows} x {cols}" for rows, cols in shapes[:3]), found)
-    odd = [number for number in data if not is_number(number) or not abs(number) <= HUGE]
-    if odd:
-        raise refuse(f"finite numbers, none above {HUGE:g}", short(odd[0]))
-    return np.array(data, float).reshape(shape)
+    return numbers_from(data, path, key, REMEDY).reshape(shape)

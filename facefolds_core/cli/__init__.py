@@ -22,28 +22,21 @@ COMMANDS = {
     "vectors": "Tiny assets and the pictures that a player must show; compares a player's.",
     "export": "Write an asset as another program can read it.",
     "export-html": "One HTML file that plays an asset by itself.",
-    "export-godot": "The same as `export godot`.",
-    "submission": "Films of hidden cameras, packed for the NeRSemble NVS benchmark.",
     "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "run": "Many subjects, or a grid of parameters, at once: here or on a cluster.",
-    "waterfall": "What each step of the export loses; the report shows it.",
     "collect": "One table of the experiments of `dvc exp run`.",
-    "recommend": "The best configuration within a budget, of such a table.",
     "doctor": "Is all here that the pipeline needs? Mends what a killed DVC leaves. What is in a folder?",
 }
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
 
 
 EXTRAS = {
-    "submission": "train",
     "vectors": "train",
     "scores": "train",
     "report": "report",
-    "waterfall": "train",
     "run": "cluster",
     "collect": "pipeline",
-    "recommend": "pipeline",
 }
 """Commands that need more than the base -> the extra that brings it."""
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from facefolds_core.api.cameras import camera_named, cameras_of_asset
 from facefolds_core.asset.reader import Asset
 from facefolds_core.errors import UserError
 from facefolds_core.files import read_json
 from facefolds_core.geometry.cameras import Camera
-
-POSTER = "poster"
-MOST_LISTED = 20
 
 
 def named_camera(asset: Asset, name: str) -> Camera:
@@ -24,36 +21,9 @@ def named_camera(asset: Asset, name: str) -> Camera:
     """
     if name.endswith(".json"):
         return _from_file(Path(name))
-    known = []
-    for camera in _cameras(asset):
-        if camera.name == name:
-            return camera
-        known.append(camera.name)
-    names = list(dict.fromkeys(known))
-    expected = ", ".join(names[:MOST_LISTED]) + (
-        f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-    )
-    raise UserError(
-        "no such camera",
-        place="--camera",
-        expected=expected or "FILE.json: this asset names no camera, and there is no scene beside it",
-        found=name,
-        remedy="choose one of these, or give a JSON file with K, w2c, width and height",
-    )
-
-
-def _cameras(asset: Asset) -> Iterator[Camera]:
-    """Of the poster, of the photos, and of the scene that the asset was made of, where that lies beside it."""
-    poster = asset.manifest.poster
-    if poster is not None and poster.K is not None and poster.w2c is not None:
-        yield Camera(POSTER, np.array(poster.K), np.array(poster.w2c), poster.width, poster.height)
-    for photo in asset.manifest.photos:
-        yield Camera(photo.camera, np.array(photo.K), np.array(photo.w2c), photo.width, photo.height)
-    scene = asset.folder.resolve().parent / "scene"
-    if (scene / "scene.json").is_file():
-        from facefolds_core.captures.scene import read_scene  # playing an asset needs nothing of what makes one
-
-        yield from read_scene(scene).cameras
+    none = "FILE.json: this asset names no camera, and there is no scene beside it"
+    known = cameras_of_asset(asset, asset.folder.resolve().parent)
+    return camera_named(name, known, "--camera", none, ", or give a JSON file with K, w2c, width and height")
 
 
 def _from_file(path: Path) -> Camera:

@@ -12,7 +12,6 @@ from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.player import find_player
 from facefolds_core.reporting.build import make_report
-from facefolds_core.reporting.index import make_index
 
 
 def evaluated_subjects(data: Path) -> list[Path]:
@@ -43,24 +42,12 @@ def command(
         list[Path] | None, typer.Argument(help="Folders of subjects. Left out: all under --data that have scores.")
     ] = None,
     data: Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")] = Path("data"),
-    against: Annotated[
-        Path | None,
-        typer.Option(
-            help="Another run's metrics.json, kept earlier: the page says what is better and worse. "
-            "Left out: reference.json in the subject's folder, where there is one."
-        ),
-    ] = None,
 ) -> None:
-    """Write one self-contained page a subject, report.html in its folder: pictures, scores, layers, costs.
-
-    Without names, an index of all subjects too: report.html in the folder that holds theirs.
-    """
+    """Write one self-contained page a subject, report.html in its folder: pictures, scores, costs."""
     with report_user_errors("report"):
         player = built_player()
         for folder in subjects or evaluated_subjects(data):
             start = time.perf_counter()
-            path = make_report(SubjectFolders(folder), against, player)
+            path = make_report(SubjectFolders(folder), player)
             seconds = time.perf_counter() - start
             typer.echo(f"report: {path} ({path.stat().st_size / 1e6:.1f} MB, {seconds:.1f} s)")
-        if not subjects:
-            typer.echo(f"report: {make_index(data)}, all subjects")

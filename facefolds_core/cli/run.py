@@ -15,7 +15,6 @@ from facefolds_core.cli.mending import mend
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
 from facefolds_core.cluster.jobs import how_to_repeat, read_grid, record, subject_jobs, sweep_jobs
-from facefolds_core.cluster.parts import Parts
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files import write_text
 from facefolds_core.params_file import load_params
@@ -28,9 +27,6 @@ CELLS = LOGS.with_name("cells")
 
 def command(
     subjects: Annotated[str, typer.Option(help="Names, with commas. Left out: all of params.yaml.")] = "",
-    segments: Annotated[
-        str, typer.Option(help="Names, with commas: of long takes, whose segments are trained as jobs of their own.")
-    ] = "",
     sweep: Annotated[Path | None, typer.Option(help="YAML: keys and lists of values; every combination runs.")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="At once. 0: one for two cores.", min=0)] = 0,
     scheduler: Annotated[
@@ -48,18 +44,14 @@ def command(
         params = load_params("params.yaml")
         for line in mend(root):
             typer.echo(f"run: {line}")
-        if segments and (subjects or sweep):
-            raise UserError("--segments goes alone", remedy="name the subjects in it; leave --subjects and --sweep out")
-        chosen = subjects or segments
-        names = [name.strip() for name in chosen.split(",") if name.strip()] or list(params.subjects)
+        names = [name.strip() for name in subjects.split(",") if name.strip()] or list(params.subjects)
         cells = sweep_jobs(params, root, names, to, read_grid(sweep)) if sweep else {}
         todo = list(cells) or subject_jobs(params, root, names, to)
         try:
             needs = {"memory": float(parse_bytes(memory)), "gpu": float(gpu)}
         except ValueError as error:
             raise UserError("not an amount of memory", place="--memory", found=memory, expected="14GB") from error
-        parts = Parts(root, todo) if segments else None
-        outcomes = _run_all(root, todo, cells, parts, scheduler, jobs or default_jobs(), needs, remote)
+        outcomes = _run_all(root, todo, cells, scheduler, jobs or default_jobs(), needs, remote)
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
@@ -74,27 +66,22 @@ def _run_all(
     root: Path,
     todo: Sequence[Job],
     cells: Mapping[Job, Mapping[str, object]],
-    parts: Parts | None,
     scheduler: str | None,
     jobs: int,
     needs: Mapping[str, float],
     remote: bool,
 ) -> list[Outcome]:
-    """Outcomes in the order of `todo`, or, in parts, of subjects and of parts that failed; each is told of when it
-    comes."""
+    """Outcomes in the order of `todo`; each is told of when it comes."""
 
     def tell(event: Mapping[str, str]) -> None:
         typer.echo(f"run: {event['job']}: {event['stage']} on {event['host']}")
 
-    found = {}
-    first, at_once = (parts.first, jobs) if parts else (todo, min(jobs, len(todo)))
-    after = parts.after if parts else _nothing
+    found, at_once = {}, min(jobs, len(todo))
     with cluster_of(scheduler, at_once, root) as client:
         watch = f"dashboard: {client.dashboard_link}" if find_spec("bokeh") else "a dashboard: pip install bokeh"
         where = scheduler or f"this machine, {at_once} at once"
-        what = f"segments of {len(todo)} subjects" if parts else f"{len(todo)} jobs"
-        typer.echo(f"run: {what} on {where}; {watch}")
-        for outcome in run_jobs(client, root, first, needs=needs, remote=remote, tell=tell, after=after):
+        typer.echo(f"run: {len(todo)} jobs on {where}; {watch}")
+        for outcome in run_jobs(client, root, todo, needs=needs, remote=remote, tell=tell):
             found[outcome.job] = outcome
             log = LOGS / f"{outcome.job.name}.log"
             log.parent.mkdir(parents=True, exist_ok=True)
@@ -104,13 +91,7 @@ def _run_all(
                 told = outcome.error.replace("\n", "\n  ")
                 again = how_to_repeat(outcome.job, cells.get(outcome.job), CELLS)
                 typer.echo(f"  {told}\n  all of it in {log}; to repeat it: {again}")
-    if parts is None:
-        return [found[job] for job in todo]
-    return [outcome for job, outcome in found.items() if not job.part or outcome.error]
-
-
-def _nothing(outcome: Outcome) -> Sequence[Job]:
-    return ()
+    return [found[job] for job in todo]
 
 
 def _has_remote(root: Path) -> bool:
@@ -134,7 +115,7 @@ def _keep_sweep(out: Path, outcomes: Sequence[Outcome], cells: Mapping[Job, Mapp
         out,
         [Run(o.job.name, o.job.subject, "", cells[o.job], figures_of(o.metrics or {}), o.error) for o in outcomes],
     )
-    typer.echo(f"run: {out}; `facefolds recommend {out}` takes the best of it")
+    typer.echo(f"run: {out}")
 
 
 def _print_table(outcomes: Sequence[Outcome]) -> None:

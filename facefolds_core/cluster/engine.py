@@ -113,7 +113,6 @@ def run_jobs(
     needs: Mapping[str, float] | None = None,
     remote: bool = False,
     tell: Callable[[Mapping[str, str]], None] = lambda event: None,
-    after: Callable[[Outcome], Sequence[Job]] = lambda outcome: (),
 ) -> Iterator[Outcome]:
     """Run jobs on a cluster; outcomes in the order in which they come.
 
@@ -125,7 +124,6 @@ def run_jobs(
         needs: of each job: "memory" in bytes, "gpu".
         remote: see `project.snapshot`.
         tell: hears of each stage that begins: job, stage, host.
-        after: an outcome -> jobs that it makes possible.
 
     Raises:
         UserError: if the project is none, or no worker ever has what a job needs.
@@ -140,19 +138,13 @@ def run_jobs(
     try:
         client.register_plugin(project, name=run)
         client.subscribe_topic(run, lambda event: tell(event[1]))
-        futures: dict[Future[Any], Job] = {}
-
-        def submit(job: Job) -> Future[Any]:
-            future = client.submit(do, job, run, key=f"{job.name}-{run}", resources=needs or None, pure=False)
-            futures[future] = job
-            return future
-
+        futures = {
+            client.submit(do, job, run, key=f"{job.name}-{run}", resources=needs or None, pure=False): job
+            for job in jobs
+        }
         try:
-            coming = as_completed([submit(job) for job in jobs])
-            for future in coming:
-                outcome = _outcome(future, futures[future])
-                coming.update([submit(job) for job in after(outcome)])
-                yield outcome
+            for future in as_completed(list(futures)):
+                yield _outcome(future, futures[future])
         except BaseException:
             logging.getLogger("distributed.worker.state_machine").setLevel(logging.ERROR)  # it warns of what is ended
             client.cancel(list(futures))

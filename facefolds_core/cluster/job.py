@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +25,9 @@ from distributed import get_worker
 
 from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.lockfile import LOCK
-from facefolds_core.cluster.pointers import keep, made_by, put_pointers, read_pointers, take_folder
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
 from facefolds_core.processes import with_threads
-from facefolds_core.training.segments.names import BASE, PLAN
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
 LOST_RECORD = re.compile(r"^ERROR: .*\bruns\b.*\.tmp'", re.MULTILINE)
@@ -49,9 +47,6 @@ class Job:
         params: the text of params.yaml, where it is another one than the project's.
         links: paths relative to the project, and where they really are: captures outside it.
         lock: what the project's dvc.lock says of the subject.
-        part: of the subject's training, made after the target: "base", or the number of a segment; "" for none.
-        files: what other parts left, which is put there first: names, and what `dvc add` says of them.
-        at_once: so many jobs share a machine's cores at most; 0 for as many as the worker takes.
     """
 
     name: str
@@ -60,9 +55,6 @@ class Job:
     params: str | None
     links: tuple[tuple[str, str], ...]
     lock: str = ""
-    part: str = ""
-    files: tuple[tuple[str, str], ...] = ()
-    at_once: int = 0
 
 
 @dataclass(frozen=True)
@@ -75,8 +67,6 @@ class Outcome:
         metrics: metrics.json; {} where there is none.
         log: all that DVC and the stages said.
         lock: the job's own dvc.lock; "" if it failed.
-        files: what a part left: as of `Job`.
-        plan: of a base: what segments there are.
     """
 
     job: Job
@@ -87,8 +77,6 @@ class Outcome:
     metrics: Mapping[str, Any] | None = None
     log: str = ""
     lock: str = ""
-    files: Mapping[str, str] = field(default_factory=dict)
-    plan: Mapping[str, Any] | None = None
 
     @property
     def state(self) -> str:
@@ -112,7 +100,7 @@ def do(job: Job, run: str) -> Outcome:
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix=f"{job.name[:40]}-", dir=worker.local_directory) as temporary:
         try:
-            root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock, bool(job.part))
+            root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock)
         except UserError as error:
             return Outcome(job, str(error), host=socket.gethostname())
 
@@ -120,35 +108,22 @@ def do(job: Job, run: str) -> Outcome:
             if found := RUNNING.match(line):
                 worker.log_event(run, {"job": job.name, "stage": found[1], "host": socket.gethostname()})
 
-        shell = _Shell(run, root, _environment(worker, job), tell)
-        place = take_folder(root, job.subject)
-        pointers = put_pointers(place, root, job.files)
-        fetch = [["pull" if pull else "checkout", "--allow-missing", *pointers]] if pointers else []
-        status, log = repro(shell.dvc, *fetch, ["repro", *(["--pull"] if pull else []), job.target])
+        shell = _Shell(run, root, _environment(worker), tell)
+        status, log = repro(shell.dvc, ["repro", *(["--pull"] if pull else []), job.target])
         if pull:  # of a job that failed, too: what its first stages made
             pushed, said = shell.dvc(["push", "--run-cache", "--with-deps", job.target])
             if pushed and not status:
                 status, log = pushed, log + said
-        files: dict[str, str] = {}
-        if job.part and not status:
-            tell("Running stage 'train'")
-            status, said, files = _make_part(shell, place, job, pull, project.begun(job.subject))
-            log += said
         metrics = root / "data" / job.subject / "metrics.json"
         return Outcome(
             job,
             error=_last_lines(log) if status else "",
             seconds=time.perf_counter() - start,
             host=socket.gethostname(),
-            ran=(
-                *(stage for stage in dict.fromkeys(RUNNING.findall(log)) if stage != "configure"),
-                *filter(None, [job.part]),
-            ),
+            ran=tuple(stage for stage in dict.fromkeys(RUNNING.findall(log)) if stage != "configure"),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,
             lock="" if status else (root / LOCK).read_text(encoding="utf-8"),
-            files=files,
-            plan=json.loads((place / PLAN).read_text(encoding="utf-8")) if job.part == BASE and not status else None,
         )
 
 
@@ -164,28 +139,9 @@ def repro(dvc: Callable[..., tuple[int, str]], *commands: Sequence[str]) -> tupl
     return status, log
 
 
-def _make_part(shell: _Shell, place: Path, job: Job, push: bool, begun: Path) -> tuple[int, str, dict[str, str]]:
-    """Exit status, what was said, and `Outcome.files`.
-
-    Args:
-        push: the cache is not shared.
-        begun: folder of a base's checkpoint, in a shared cache.
-    """
-    module, words = "facefolds_core.training.segments.part", ["--subject", job.subject, "--part", job.part]
-    if job.part == BASE and not push:
-        words += ["--begun", str(begun)]
-    status, log = shell.python(module, *words)
-    if status:
-        return status, log, {}
-    made = made_by(place, job.part)
-    status, said = shell.dvc(*keep(place, shell.root, made, push))
-    return status, log + said, {} if status else read_pointers(place, made)
-
-
-def _environment(worker: Any, job: Job) -> dict[str, str]:
+def _environment(worker: Any) -> dict[str, str]:
     """Of the job's processes: its share of the threads, the programs of this environment."""
-    at_once = min(worker.state.nthreads, job.at_once or worker.state.nthreads)
-    threads = max(1, dask.system.CPU_COUNT // at_once)
+    threads = max(1, dask.system.CPU_COUNT // worker.state.nthreads)
     environment = {**with_threads(threads), **os.environ, "PYTHONUNBUFFERED": "1"}
     environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment.get('PATH', '')}"
     return environment
@@ -210,13 +166,9 @@ class _Shell:
     def dvc(self, *commands: Sequence[str]) -> tuple[int, str]:
         """Exit status of the last of some DVC commands, and what they said."""
         words = [word for command in commands for word in (THEN, *command)][1:]
-        return self.python("facefolds_core.cluster.dvc", *words)
-
-    def python(self, module: str, *words: str) -> tuple[int, str]:
-        """Exit status of a module's command and what it said."""
         lines = []
         with subprocess.Popen(
-            [sys.executable, "-m", module, *words],
+            [sys.executable, "-m", "facefolds_core.cluster.dvc", *words],
             cwd=self.root,
             env=dict(self.environment),
             stdin=subprocess.DEVNULL,

@@ -98,8 +98,6 @@ def how_to_repeat(job: Job, cell: Mapping[str, Any] | None, folder: Path) -> str
     Args:
         cell: the values of a sweep's job; they go into a file of `folder`, a sweep of this one cell.
     """
-    if job.part or job.files:
-        return f"facefolds run --segments {job.subject}"
     if cell is None:
         return f"dvc repro {job.target}"
     text = yaml.safe_dump({key: [value] for key, value in cell.items()})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,7 +35,6 @@ class Project(WorkerPlugin):
         mark: name of a file in it; who sees that shares the cache.
         remotes: of DVC's settings, with whole addresses.
         remote: DVC's default remote, through which results travel: where the cache is not shared, or `always`.
-        owner: of what lies in the cache beside DVC's own: the project's folder, as a digest.
     """
 
     name: str
@@ -46,7 +44,6 @@ class Project(WorkerPlugin):
     remotes: Mapping[str, Mapping[str, str]]
     remote: str | None
     always: bool
-    owner: str = ""
     scratch: Path | None = field(default=None, compare=False)
 
     def setup(self, worker: Any) -> None:
@@ -62,14 +59,7 @@ class Project(WorkerPlugin):
         assert self.scratch is not None
         return self.scratch / f"code-{self.name}"
 
-    def begun(self, subject: str) -> Path:
-        """Where the base of a subject's take leaves its checkpoint, in a cache that is shared: another worker goes on
-        from there when this one is lost."""
-        return self.cache / "begun" / self.owner / subject
-
-    def unfold(
-        self, place: Path, links: Mapping[str, str], params: str | None, lock: str, linked: bool = False
-    ) -> tuple[Path, bool]:
+    def unfold(self, place: Path, links: Mapping[str, str], params: str | None, lock: str) -> tuple[Path, bool]:
         """Make a project's folder for one job.
 
         Args:
@@ -77,7 +67,6 @@ class Project(WorkerPlugin):
             links: see `Job`.
             params: the text of params.yaml; None for the project's.
             lock: that of dvc.lock.
-            linked: what comes from the cache is not copied, even where DVC would: a segment needs a small part of it.
 
         Returns:
             its path, and whether results travel through a remote.
@@ -113,17 +102,15 @@ class Project(WorkerPlugin):
             path.symlink_to(target)
         cache = self.cache if shared else self.code.with_name("cache")
         drop_empty_runs(cache)
-        self._settle(root, place, cache, linked)
+        self._settle(root, place, cache)
         return root, not shared
 
-    def _settle(self, root: Path, place: Path, cache: Path, linked: bool) -> None:
+    def _settle(self, root: Path, place: Path, cache: Path) -> None:
         """DVC's settings for one job: no git, its own bookkeeping, and whole paths where the project's are relative."""
         path = root / ".dvc" / "config.local"
         settings = ConfigObj(str(path), encoding="utf-8", list_values=False)
         settings.setdefault("core", {}).update({"no_scm": "true", "site_cache_dir": str(place / "site")})
         settings.setdefault("cache", {})["dir"] = str(cache)
-        if linked:
-            settings["cache"].setdefault("type", "reflink,hardlink,symlink,copy")
         for name, values in self.remotes.items():
             settings.setdefault(f'remote "{name}"', {}).update(values)
         settings.write()
@@ -160,5 +147,4 @@ def snapshot(root: Path, run: str, always: bool) -> Project:
         remotes=remotes,
         remote=remote,
         always=always,
-        owner=hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:16],
     )

@@ -1,4 +1,4 @@
-"""One step of fitting texels to rendered targets, compiled for CPUs. Reference: `bake_reference` (torch)."""
+"""One step of fitting texels to rendered targets, compiled for CPUs. Tests hold it against plain torch."""
 
 from __future__ import annotations
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 
 @dataclass(frozen=True)
@@ -30,3 +32,16 @@ class TexturedMesh(Surface):
     """
 
     st: NDArray[np.float32]
+
+    def to_trimesh(self, texture: NDArray[np.uint8] | None = None) -> Any:
+        """The mesh as a `trimesh.Trimesh`, with texture coordinates from the bottom left, as trimesh has them.
+
+        Args:
+            texture: (h, w, 4) RGBA, as `asset.frame(k)[layer]`; None leaves it out.
+        """
+        import trimesh
+
+        uv = np.stack([self.st[:, 0], 1 - self.st[:, 1]], 1)
+        image = None if texture is None else Image.fromarray(texture)
+        visual: Any = trimesh.visual.TextureVisuals(uv=uv, image=image)  # type: ignore[no-untyped-call]
+        return trimesh.Trimesh(self.vertices, self.faces, visual=visual, process=False)

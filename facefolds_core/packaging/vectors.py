@@ -146,8 +146,8 @@ def _content() -> LevelContent:
 def _params() -> CompressParams:
     level = LevelParams(name="small", mesh_resolution=12, texture_resolution=TEXELS // 2, crf=16)
     return CompressParams(
-        mesh=MeshCodec(quantization_bits=14, texture_coordinate_bits=12, compression_level=7),
-        video=VideoCodec(crf=10, keyframe_interval=4),
+        mesh=MeshCodec(max_error_pixels=None, quantization_bits=14, texture_coordinate_bits=12, compression_level=7),
+        video=VideoCodec(crf=10, target_psnr=None, preset="slow", keyframe_interval=4),
         levels=(level,),
         stream=StreamParams(beyond=0, segment_seconds=3 / RATE),
     )

@@ -33,8 +33,8 @@ class CaptureParams(Section):
     clutter: Share = 0.0
     """Contrast of tiles of random colours on her room's walls; 0 leaves them as painted."""
 
-    plates: bool = False
-    """Film the empty room, too: a clean plate a camera."""
+    plates: bool = True
+    """Film the empty room, too, as studios do: a clean plate a camera."""
 
     mattes: bool = False
     """Offer the true opacity of all cameras to the training. Else it serves scoring only."""

@@ -24,7 +24,7 @@ def _one_or_several(value: Any) -> Any:
 class MeshCodec(Section):
     """Draco."""
 
-    max_error_pixels: Pixels | None = None
+    max_error_pixels: Pixels | None = 0.1
     """Takes the fewest bits with which no vertex moves by more pixels than this in any training camera, and no texture
     coordinate by more texels; at most 20. null takes the numbers of bits."""
 
@@ -34,8 +34,8 @@ class MeshCodec(Section):
     texture_coordinate_bits: Annotated[int, Field(ge=1, le=24)] = 12
     """Bits of texture coordinates, where positions are quantised."""
 
-    compression_level: Annotated[int, Field(ge=0, le=10)] = 0
-    """Draco's level, from 0 (fastest; keeps the order of vertices; the paper's) to 10."""
+    compression_level: Annotated[int, Field(ge=0, le=10)] = 10
+    """Draco's level, from 0 (fastest; keeps the order of vertices; the paper's) to 10 (smallest)."""
 
 
 class VideoCodec(Section):
@@ -48,7 +48,7 @@ class VideoCodec(Section):
     """Constant rate factor on x264's scale; smaller is better and larger. Other codecs take theirs of about the same
     quality."""
 
-    target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = None
+    target_psnr: Annotated[float, Field(gt=10, lt=80)] | None = 43.0
     """Quality of rendered training views against those of the uncoded textures, dB; takes the place of the full
     level's `crf`, which is searched for."""
 
@@ -56,7 +56,7 @@ class VideoCodec(Section):
     """No loss in the full level beyond 8 bits and 4:2:0. Few hardware decoders know H.264's profile for it."""
 
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
-        "slow"
+        "veryslow"
     )
     """Preset of libx264: slower ones make smaller files."""
 
@@ -129,7 +129,10 @@ class CompressParams(Section):
     video: VideoCodec = VideoCodec()
     """How textures are compressed."""
 
-    levels: Many[LevelParams] = ()
+    levels: Many[LevelParams] = (
+        LevelParams(name="small", mesh_resolution=16, texture_resolution=128, crf=31, max_error_pixels=0.5),
+        LevelParams(name="medium", mesh_resolution=32, texture_resolution=256, crf=28, max_error_pixels=0.2),
+    )
     """Coarser levels of detail, the coarsest first; the full one is always there."""
 
     photos: Natural = 0

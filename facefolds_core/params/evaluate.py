@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Natural, Section, Share
+from facefolds_core.params.base import Count, Section, Share
 
 
 class ScoreWarningParams(Section):
@@ -39,12 +39,6 @@ class EvaluateParams(Section):
 
     film_crf: ClassVar[int] = 18
     """Constant rate factor of the report's films, of libx264: smaller is finer."""
-
-    cvvdp_frames: ClassVar[int] = 60
-    """Frames of each camera that CVVDP judges, where it is installed, at most."""
-
-    fresh_views: Natural = 0
-    """New views of the embedded actor that are filmed and scored by their angle; 0 films none."""
 
     warnings: ClassVar[ScoreWarningParams] = ScoreWarningParams()
     """When scores are said not to be well."""

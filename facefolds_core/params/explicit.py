@@ -101,7 +101,7 @@ class ExplicitParams(Section):
     layers: Annotated[int, Field(ge=1, le=64)] = 12
     """Number of nested layers, N."""
 
-    iterations: Count = 460
+    iterations: Count = 300
     """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need
     them."""
 

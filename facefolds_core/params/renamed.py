@@ -82,7 +82,6 @@ FIXED: dict[str, str] = {
     "compress.attention.rays_per_camera": "packaging/attention.py",
     "evaluate.band": "params/evaluate.py",
     "evaluate.film_crf": "params/evaluate.py",
-    "evaluate.cvvdp_frames": "params/evaluate.py",
     "evaluate.warnings": "params/evaluate.py",
     **{f"train.{key}": file for file, keys in OF_THE_TRAINER.items() for key in keys.split()},
 }
@@ -128,6 +127,7 @@ GONE: dict[str, str] = {
     "compress.between": "an asset has the capture's frames",
     "compress.stream.encoders": "segments are encoded one after another, as each encoder uses all cores",
     "compress.stream.megabytes": "segments are encoded one after another",
+    "evaluate.fresh_views": "the held-out cameras are scored",
     "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
 }
 """Old key or section -> why nothing of its name took its place."""

@@ -1,7 +1,7 @@
-"""Nearest hit of rays with a triangle mesh: with Embree, and, slow and plain, by trying every triangle.
+"""Nearest hit of rays with a triangle mesh, by Embree.
 
-Both are two-sided (no culling). Embree works in float32 and only says which triangle is hit; where in the triangle is
-computed again in float64, by the same formula as in the plain version (Moeller and Trumbore 1997).
+Two-sided (no culling). Embree works in float32 and only says which triangle is hit; where in the triangle is computed
+again in float64 (Moeller and Trumbore 1997).
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 MISS = -1
-_PAIRS_AT_ONCE = 2_000_000
-"""Ray-triangle pairs that `brute_force_hits` works on together: bounds its memory."""
 
 
 @dataclass(frozen=True)
@@ -72,29 +70,14 @@ class EmbreeMesh:
     def nearest(self, origins: Array, directions: Array) -> TriangleHits:
         """Nearest hits of rays; origins, directions: (R, 3)."""
         if not len(self.triangles):
-            return _hits_in(self.triangles, np.full(len(origins), MISS, np.int32), origins, directions)
+            return hits_in(self.triangles, np.full(len(origins), MISS, np.int32), origins, directions)
         triangle = self._scene.run(
             np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
         )
-        return _hits_in(self.triangles, np.asarray(triangle, np.int32), origins, directions)
+        return hits_in(self.triangles, np.asarray(triangle, np.int32), origins, directions)
 
 
-def brute_force_hits(vertices: Array, faces: Indices, origins: Array, directions: Array) -> TriangleHits:
-    """The same by trying every triangle for every ray, in float64: the reference for `EmbreeMesh`."""
-    triangles = np.asarray(vertices, np.float64)[faces]
-    nearest = np.full(len(origins), MISS, np.int32)
-    if len(triangles):
-        step = max(1, _PAIRS_AT_ONCE // len(triangles))
-        for start in range(0, len(origins), step):
-            part = slice(start, start + step)
-            t, u, v = moeller_trumbore(origins[part, None], directions[part, None], triangles)
-            inside = (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1)
-            t = np.where(inside, t, np.inf)
-            nearest[part] = np.where(inside.any(1), t.argmin(1), MISS)
-    return _hits_in(triangles, nearest, origins, directions)
-
-
-def _hits_in(triangles: Array, triangle: Indices, origins: Array, directions: Array) -> TriangleHits:
+def hits_in(triangles: Array, triangle: Indices, origins: Array, directions: Array) -> TriangleHits:
     """Where in the triangles that they hit (R,) rays (R, 3) pass."""
     barycentric = np.zeros((len(origins), 3))
     hit = triangle != MISS

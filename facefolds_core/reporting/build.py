@@ -17,11 +17,10 @@ from facefolds_core.files import write_text
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.face import face
-from facefolds_core.reporting.facts import Facts, read_facts
-from facefolds_core.reporting.films import films
-from facefolds_core.reporting.history import Comparison, compared
+from facefolds_core.reporting.facts import Facts, finite, read_facts
 from facefolds_core.scoring.panels import HEADLINES
 from facefolds_core.scoring.record import Record, View, read_record
+from facefolds_core.scoring.report import headline
 from facefolds_core.scoring.sheets import MAX_ERROR
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
@@ -30,6 +29,8 @@ MOST_PIXELS = 2_500_000
 """Of all compared pictures together, but for the worst: keeps the page below 5 MB."""
 MOST_VIEWS = 24
 TEXTURE_SIDE = 320
+MOST_FILM_BYTES = 8_000_000
+"""Of all films in the page together."""
 
 
 @dataclass(frozen=True)
@@ -47,33 +48,30 @@ class Subject:
     scene: Scene | None
     record: Record | None
     views: tuple[View, ...]
-    runs: list[Comparison]
     player: Path | None
 
 
-def make_report(folders: SubjectFolders, reference: Path | None = None, player: Path | None = None) -> Path:
+def make_report(folders: SubjectFolders, player: Path | None = None) -> Path:
     """Write `report.html` into the subject's folder; returns its path.
 
     Args:
-        reference: metrics.json of another run, to be compared with.
         player: folder of the built web player, to show the asset with.
 
     Raises:
         UserError: if the folder is not an evaluated subject's, or something in it is damaged.
     """
-    page = render_page(gather(folders, reference, player), folders.root.resolve().name)
+    page = render_page(gather(folders, player), folders.root.resolve().name)
     path = folders.root / REPORT_NAME
     write_text(path, page)
     return path
 
 
-def gather(folders: SubjectFolders, reference: Path | None, player: Path | None) -> Subject:
+def gather(folders: SubjectFolders, player: Path | None) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
     record = read_record(folders.evaluation, asset)
-    runs = compared(folders, facts.metrics, now(), reference)
-    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), runs, player)
+    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), player)
 
 
 def now() -> str:
@@ -121,22 +119,20 @@ def _source(environment: Environment, name: str) -> str:
 def context(subject: Subject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
     facts, manifest, scene, record = subject.facts, subject.asset.manifest, subject.scene, subject.record
-    key = words.quality_key(facts.metrics)
+    key = headline(facts.metrics)
     places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
     pairs = {(view.camera, view.frame): i for i, view in enumerate(subject.views)}
-    seen = record.seen if record else None
-    compared = comparisons(subject, places)
+    compared, poster = comparisons(subject, places), subject.asset.folder / "poster.jpg"
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
         "made": now(),
         "face": face(subject.asset, subject.player),
+        "poster": pictures.jpeg(poster) if poster.is_file() else None,
         "generator": manifest.generator,
         "of_what": HEADLINE_WORDS[key],
         "warnings": warnings(facts.metrics),
-        "runs": subject.runs,
         **films(record, scene),
         "tiles": tiles(subject, key),
-        "summary": words.summary(facts, manifest, scene, seen),
         "scores": tables.scores(facts.metrics),
         "comparisons": compared,
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
@@ -144,17 +140,11 @@ def context(subject: Subject) -> dict[str, Any]:
         "camera_map": camera_map(scene) if scene else None,
         "validating": scene is not None and "validate" in scene.splits,
         "cameras": tables.cameras(scene, facts.images, key) if scene else [],
-        "angles": tables.angles(seen) if seen else [],
         "worst": next((one for one in compared if one["worst"]), None),
         "patch": patch(subject),
-        "views": record.on_sheet if record else 0,
-        "masked": seen is not None and seen.masked,
-        **layers(subject),
         "textures": textures(subject),
         "curves": curves(facts),
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
-        "waterfall": tables.waterfall(facts.waterfall),
-        "waterfall_on": words.waterfall_words(facts.waterfall_on),
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
         "config": tables.configuration(facts.config),
@@ -169,39 +159,28 @@ def warnings(metrics: dict[str, Any]) -> list[str]:
 
 
 def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
-    """The figures at the head of the page."""
-    metrics, manifest = subject.facts.metrics, subject.asset.manifest
+    """The figures at the head of the page: those that there are."""
+    metrics = subject.facts.metrics
     asset, cost = metrics.get("asset", {}), metrics.get("cost", {})
-    files = sum(layer.bytes for layer in manifest.full.layers) + manifest.full.texture.videos[0].bytes
-    return [
-        {
-            "name": "PSNR",
-            "value": number_unit(asset.get(key), "dB"),
-            "note": f"{words.region_words(metrics)}; held-out cameras",
-        },
-        *optional_tile("Worst patch", asset.get("worst_patch"), "of any held-out picture"),
-        *optional_tile("What moves", asset.get("psnr_moving"), "where and when the photos change"),
-        {"name": "Size", "value": words.size(files), "note": "meshes and video"},
-        {
-            "name": "Triangles",
-            "value": words.count(cost.get("triangles")),
-            "note": f"{manifest_layers(subject)} layers",
-        },
-        {"name": "Training", "value": words.duration(cost.get("train_seconds")), "note": str(cost.get("device", ""))},
+    decibels = [
+        ("PSNR", asset.get(key), f"{words.region_words(metrics)}; held-out cameras"),
+        ("Worst patch", asset.get("worst_patch"), "of any held-out picture"),
+        ("What moves", asset.get("psnr_moving"), "where and when the photos change"),
     ]
-
-
-def optional_tile(name: str, value: float | None, note: str) -> list[dict[str, str]]:
-    """A tile in dB, or none where there is no figure."""
-    return [] if value is None else [{"name": name, "value": number_unit(value, "dB"), "note": note}]
+    others = [
+        ("Size", words.asset_bytes(metrics), words.size, "meshes, video and reflection"),
+        ("Triangles", cost.get("triangles"), words.count, f"{words.count(subject.asset.num_layers)} layers"),
+        ("Training", cost.get("train_seconds"), words.duration, str(cost.get("device") or "")),
+    ]
+    found = [(name, value, number_unit(value, "dB"), note) for name, value, note in decibels]
+    found += [(name, value, form(value), note) for name, value, form, note in others]
+    return [
+        {"name": name, "value": text, "note": note} for name, value, text, note in found if finite(value) is not None
+    ]
 
 
 def number_unit(value: Any, unit: str) -> str:
     return f"{words.number(value)}\u00a0{unit}"
-
-
-def manifest_layers(subject: Subject) -> str:
-    return words.count(subject.asset.num_layers)
 
 
 def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
@@ -257,6 +236,32 @@ def patch(subject: Subject) -> dict[str, Any] | None:
     }
 
 
+def films(record: Record | None, scene: Scene | None) -> dict[str, Any]:
+    """Films of the held-out cameras, as many as the page has room for, and the worst picture beside them."""
+    if record is None:
+        return {"films": [], "films_left": 0, "film_size": (2, 1)}
+    places = {camera.name: tables.place_of(camera).angle for camera in scene.cameras} if scene else {}
+    kept, room = [], MOST_FILM_BYTES
+    for film in sorted(record.films, key=lambda one: places.get(one.camera, 0.0)):
+        path = record.folder / film.file
+        size = path.stat().st_size if path.is_file() else room + 1
+        if size <= room:
+            room -= size
+            labels = [words.frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
+            kept.append(
+                {
+                    "camera": film.camera,
+                    "fps": film.fps,
+                    "frames": film.frames,
+                    "labels": labels,
+                    "src": pictures.film(path),
+                }
+            )
+    view = record.views[record.worst]
+    width, height = view.truth.shape[1], view.truth.shape[0]
+    return {"films": kept, "films_left": len(record.films) - len(kept), "film_size": (2 * width, height)}
+
+
 def place_words(place: tables.Place | None) -> list[str]:
     return [f"{place.angle:.0f}° from front"] if place else []
 
@@ -282,35 +287,13 @@ def camera_map(scene: Scene) -> Markup:
     )
 
 
-def layers(subject: Subject) -> dict[str, Any]:
-    """The layers' table and their sections."""
-    manifest, record = subject.asset.manifest, subject.record
-    scale = manifest.coordinates.to_capture.scale
-    spacing = record.shape.spacing if record else ()
-    sections = record.shape.sections if record else {}
-    return {
-        "layers": tables.layers(manifest.full, spacing, scale, record.seen if record else None),
-        "sections": [{"name": name, "svg": charts.section(list(cut), name)} for name, cut in sections.items()],
-        "scale": words.number(scale, 3),
-    }
-
-
-def frame_name(subject: Subject, frame: int) -> str:
-    """Of a frame of the asset: as everywhere; frames between those of the capture have numbers only."""
-    scene, asset = subject.scene, subject.asset
-    step = asset.num_frames // scene.num_frames if scene else 0
-    if scene is None or not step or frame % step:
-        return f"number {frame + 1} of {asset.num_frames}"
-    return words.frame_label(scene.frame_ids, scene.frame_ids[frame // step])
-
-
 def textures(subject: Subject) -> dict[str, Any]:
     """Every layer's texture of the middle frame."""
     asset = subject.asset
-    frame = asset.num_frames // 2
+    frames, frame = subject.scene.frame_ids if subject.scene else (), asset.num_frames // 2
     texture = asset.manifest.full.texture
     return {
-        "frame": frame_name(subject, frame),
+        "frame": words.frame_label(frames, frames[frame]) if frame < len(frames) else f"number {frame + 1}",
         "frames": asset.num_frames,
         "picture": f"{texture.width} × {texture.height}",
         "layers": [

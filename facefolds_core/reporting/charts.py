@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,7 +11,6 @@ from matplotlib import colormaps
 from matplotlib.ticker import MaxNLocator
 
 from facefolds_core.captures.scene import Split
-from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.terminal import SPLIT_WORDS
 
 WIDTH, HEIGHT = 320, 190
@@ -102,38 +100,6 @@ def camera_map(dots: Sequence[Dot]) -> Markup:
             label = f'<text class="name" x="{x:.1f}" y="{y - 10:.1f}" text-anchor="middle">{escape(dot.name)}</text>'
             marks.append(label)
     return _svg("Where the cameras stand", _axes(frame, "azimuth"), "".join(marks))
-
-
-def section(lines: Sequence[Array], label: str) -> Markup:
-    """Layers cut by a plane, to scale: (M, 2) points each, x right and y up; NaN interrupts a line."""
-    points = np.concatenate(lines)
-    points = points[np.isfinite(points).all(-1)]
-    if not len(points):
-        return Markup("")
-    low, high = points.min(0), points.max(0)
-    size = np.maximum(high - low, 1e-6)
-    scale = 300 / float(size.max())
-    width, height = (size * scale + 16).tolist()
-    parts = []
-    for i, line in enumerate(lines):
-        pixels = (line - low) * scale
-        colour = heat_colour(0.28 + 0.57 * i / max(1, len(lines) - 1))  # seen on light and on dark
-        runs = "".join(_run(np.stack([8 + pixels[:, 0], height - 8 - pixels[:, 1]], -1)))
-        parts.append(f'<path class="layer" stroke="{colour}" d="{runs}"><title>layer {i + 1}</title></path>')
-    head = f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{escape(label)}">'
-    return Markup(head + "".join(parts) + "</svg>")
-
-
-def _run(pixels: Array) -> list[str]:
-    """An SVG path, with a new start after each NaN."""
-    parts, pen = [], "M"
-    for x, y in pixels.tolist():
-        if math.isfinite(x) and math.isfinite(y):
-            parts.append(f"{pen}{x:.1f} {y:.1f}")
-            pen = "L"
-        else:
-            pen = "M"
-    return parts
 
 
 def heat_colour(share: float) -> str:

@@ -89,8 +89,6 @@ class Facts:
         training: model/training.json.
         fit: model/fit.json, of presets that fit the scene first.
         curves: the training log.
-        waterfall: steps of waterfall/waterfall.json.
-        waterfall_on: the rest of it: which pictures, and which pixels of them.
         stages: in the order in which they run.
         config: the subject's parameters, by section.
         versions: (what, version); of the environment in which the report is made.
@@ -101,8 +99,6 @@ class Facts:
     training: dict[str, Any] | None
     fit: dict[str, Any] | None
     curves: tuple[Curve, ...]
-    waterfall: tuple[dict[str, Any], ...]
-    waterfall_on: dict[str, Any]
     stages: tuple[StageCost, ...]
     config: dict[str, dict[str, Any]]
     versions: tuple[tuple[str, str], ...]
@@ -123,15 +119,12 @@ def read_facts(folders: SubjectFolders) -> Facts:
             remedy=f"name a folder like data/actor; if nothing is in it yet, {REMEDY}",
         )
     metrics = read_metrics(folders.metrics)
-    waterfall = read_mapping(folders.waterfall) or {}
     return Facts(
         metrics=metrics,
         images=read_images(folders.evaluation / "per_image.parquet"),
         training=read_mapping(folders.model / "training.json"),
         fit=read_mapping(folders.model / "fit.json"),
         curves=read_curves(folders.training_log / "plots" / "metrics"),
-        waterfall=tuple(waterfall.pop("steps", ())),
-        waterfall_on=waterfall,
         stages=tuple(stage_cost(folders, name) for name in STAGE_OUTPUTS),
         config={path.stem: read_mapping(path) or {} for path in sorted(folders.config.glob("*.json"))},
         versions=versions(Path(__file__).resolve().parents[2]),

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.asset.manifest import Level, Manifest
+from facefolds_core.asset.manifest import Manifest
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
 from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
-from facefolds_core.reporting.words import NONE, count, duration, image_psnr, number, percent, size, span
+from facefolds_core.reporting.words import count, duration, number, size
 from facefolds_core.scoring.panels import VARIANTS
-from facefolds_core.scoring.record import Seen, Spacing
 
 Row = dict[str, Any]
 
@@ -57,7 +56,6 @@ GROUPS: dict[str, dict[str, tuple[str, int]]] = {
         "psnr_moving": ("PSNR of what moves, dB", 2),
         "temporal": ("share explained", 2),
         "flicker": ("flicker", 4),
-        "cvvdp": ("CVVDP, JOD", 2),
     },
     "error of opacity": {
         "opacity_inside": ("inside", 3),
@@ -104,7 +102,7 @@ def heat_map(
     Args:
         pairs: index of the comparison of (camera, frame), where the page shows one.
     """
-    values = {(image.camera, image.frame): image_psnr(image, key) for image in images}
+    values = {(image.camera, image.frame): getattr(image, key) for image in images}
     known = [value for value in values.values() if value is not None]
     low, high = (min(known), max(known)) if known else (0.0, 0.0)
     middle, half = (low + high) / 2, max(HEAT_RANGE, high - low) / 2
@@ -142,7 +140,7 @@ def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
     rows = []
     held = [scene.cameras[index] for index in scene.indices("holdout")]
     for camera, place in sorted(((c, place_of(c)) for c in held), key=lambda one: one[1].angle):
-        own = [value for i in images if i.camera == camera.name and (value := image_psnr(i, key)) is not None]
+        own = [value for i in images if i.camera == camera.name and (value := getattr(i, key)) is not None]
         rows.append(
             {
                 "name": camera.name,
@@ -150,51 +148,6 @@ def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
                 "azimuth": number(place.azimuth, 0) + "°",
                 "elevation": number(place.elevation, 0) + "°",
                 "psnr": number(np.mean(own) if own else None),
-            }
-        )
-    return rows
-
-
-def angles(seen: Seen) -> list[Row]:
-    """By angle; pixels without a surface where masks show that there should be one."""
-    bins = [(span(one), one) for one in seen.angles]
-    bins += [("no layer met", seen.bare)] if seen.masked else []
-    most = max((one.rms for _, one in bins if one.rms is not None), default=0.0)
-    return [
-        {
-            "name": name,
-            "share": percent(one.share),
-            "mean": number(one.mean, 3),
-            "rms": number(one.rms, 3),
-            "bar": share(one.rms, most),
-        }
-        for name, one in bins
-    ]
-
-
-def layers(level: Level, spacing: Sequence[Spacing], scale: float, seen: Seen | None) -> list[Row]:
-    """One row a layer, outermost first.
-
-    Args:
-        spacing: from each layer to the next inwards, N - 1 of them.
-        scale: capture units a unit of the normalised world.
-    """
-    most = max(seen.contribution) if seen else 0.0
-    rows = []
-    for i, layer in enumerate(level.layers):
-        gap = spacing[i] if i < len(spacing) else Spacing(None, None)
-        rows.append(
-            {
-                "name": str(i + 1),
-                "contribution": percent(seen.contribution[i]) if seen else NONE,
-                "bar": share(seen.contribution[i], most) if seen else 0.0,
-                "reach": percent(seen.reach[i], 0) if seen else NONE,
-                "greatest": number(seen.greatest[i]) if seen else NONE,
-                "gap": number(None if gap.mean is None else 1000 * gap.mean),
-                "gap_capture": number(None if gap.mean is None else gap.mean * scale),
-                "least": number(None if gap.least is None else 1000 * gap.least),
-                "triangles": count(layer.triangles),
-                "bytes": size(layer.bytes),
             }
         )
     return rows
@@ -235,33 +188,6 @@ def stages(costs: Sequence[StageCost]) -> list[Row]:
         }
         for cost in costs
     ]
-
-
-def waterfall(steps: Sequence[dict[str, Any]]) -> list[Row]:
-    """Steps of the export; bars start 1 dB below the least value. Figures that an older file lacks are dashes."""
-    values = [finite(step.get("psnr")) for step in steps]
-    known = [value for value in values if value is not None]
-    floor = min(known, default=0.0) - 1
-    rows = []
-    for i, step in enumerate(steps):
-        value, before = values[i], values[i - 1] if i else None
-        change = None if value is None or before is None else value - before
-        total = (finite(step.get("mesh_bytes")) or 0) + (finite(step.get("texture_bytes")) or 0)
-        rows.append(
-            {
-                "name": step.get("name", NONE),
-                "psnr": number(value),
-                "change": NONE if change is None else f"{change:+.2f}".replace("-", "−"),
-                "worse": change is not None and change < -0.005,
-                "ssim": number(step.get("ssim"), 3),
-                "ssim_high": number(step.get("ssim_high"), 3),
-                "st_lpips": number(step.get("st_lpips"), 4),
-                "bar": share(None if value is None else value - floor, max(known, default=0.0) - floor),
-                "bytes": size(total) if total else NONE,
-                "triangles": count(step.get("triangles")) if step.get("triangles") else NONE,
-            }
-        )
-    return rows
 
 
 def configuration(config: dict[str, dict[str, Any]]) -> list[Row]:

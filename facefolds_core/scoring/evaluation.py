@@ -1,7 +1,4 @@
 """Score the shipped asset, and the model it came from, on cameras that did not train (docs/reference/metrics.md).
-
-An asset at a multiple of the capture's frame rate is scored on the frames that have photos.
-
 One camera at a time, one frame at a time: memory is bounded by one camera's crossings, whatever the number of images.
 """
 
@@ -9,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene, Split
@@ -22,22 +17,17 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.params import EvaluateParams
 from facefolds_core.progress import progress
-from facefolds_core.rendering import AssetCaster
-from facefolds_core.scoring.analysis import Sums as SeenSums
-from facefolds_core.scoring.cvvdp import Screening, mean_jod
 from facefolds_core.scoring.films import FilmFile, FilmFolder
-from facefolds_core.scoring.images import Rendering, Values, cutout_of, region_of, score_renderings
-from facefolds_core.scoring.kept_scores import KeptScores, digest_of_metrics
+from facefolds_core.scoring.images import Rendering, cutout_of, region_of, score_renderings
 from facefolds_core.scoring.metrics import Array, shown
 from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.patches import WorstPatch, find_patch
 from facefolds_core.scoring.perceptual import Perceptual
 from facefolds_core.scoring.posed import PosedView
-from facefolds_core.scoring.record import Seen
 from facefolds_core.scoring.temporal import Change, Film, Sums, change_of
 from facefolds_core.scoring.training_scores import TrainingView
 from facefolds_core.scoring.training_views import training_views
-from facefolds_core.scoring.truths import MatteKind, Truth, Truths
+from facefolds_core.scoring.truths import MatteKind, Truths
 from facefolds_core.spacing import spread
 
 SCORED: tuple[Split, ...] = ("holdout", "validate")
@@ -53,7 +43,6 @@ class Evaluation:
         worst: the held-out picture on which the asset's PSNR is lowest (of the subject, where that is known).
         patch: the worst window of all held-out pictures of the asset; None where the subject's opacity is not known.
         training: what the training cameras see of the asset.
-        seen: what the asset's layers do in the pictures of the contact sheet.
         matte: which opacity says where the subject is.
         changes: split -> variant -> what it shows of what changes from frame to frame.
         films: of the held-out cameras, where they were asked for.
@@ -62,7 +51,6 @@ class Evaluation:
     scores: list[ImageScore]
     panels: list[Panel]
     worst: Panel
-    seen: Seen
     patch: WorstPatch | None = None
     training: Sequence[TrainingView] = ()
     matte: MatteKind = "true"
@@ -72,12 +60,11 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class _Shot:
-    """A scored picture: textures of the asset, pictures by variant, and where the asset is worst in it."""
+    """A scored picture, by variant, and where the asset is worst in it."""
 
     panel: Panel
     patch: WorstPatch | None
     scores: list[ImageScore]
-    textures: Sequence[NDArray[np.uint8]]
     pictures: dict[str, Array]
 
 
@@ -88,44 +75,38 @@ def evaluate(
     params: EvaluateParams,
     perceptual: Perceptual,
     films: Path | None = None,
-    kept: Path | None = None,
 ) -> Evaluation:
     """Render and score every frame of every camera that did not train; shows a progress bar.
 
     Args:
         films: folder in which films of the held-out cameras are put; None makes none.
-        kept: file of the scores of an earlier run, which pictures that are the same have again; or None.
 
     Raises:
         UserError: if there is no held-out camera, the three do not belong together, or a picture has NaN in it.
     """
-    _check(scene, model, scene.indices("holdout"))
-    scorer = _Scorer(scene, model, asset, params, perceptual, kept)
-    show = _Show(asset, set(spread(range(scene.num_frames), params.sheet_frames)))
+    _check(scene, model, asset)
+    scorer = _Scorer(scene, model, asset, params, perceptual)
+    show = _Show(set(spread(range(scene.num_frames), params.sheet_frames)))
     rolls = FilmFolder(films if params.films else None, scene.fps, params.film_crf)
     found, changes = [], {}
     with progress(total=len(scorer.keys), desc="evaluate", unit="image") as bar:
         for split in SCORED:
-            sums, judged = [], []
+            sums = []
             for index in scene.indices(split):
                 film, view = Film(), scorer.view(scene.cameras[index])
-                screening = Screening(perceptual.cvvdp, params.cvvdp_frames)
                 shown_split = FilmFolder(None, 0, 0) if split == "validate" else rolls
                 with shown_split.roll(scene.cameras[index].name) as roll:
                     for k, shot in scorer.shots(split, index, view):
                         found += shot.scores
                         if shot.panel.mask is not None:
                             film.add(k, shot.pictures, shot.panel.truth, shot.panel.mask)
-                            screening.add(shot.pictures, shot.panel.truth, shot.panel.mask)
                         if split == "holdout":
-                            show.add(k, shot, view, scorer.kind)
+                            show.add(k, shot)
                         if roll is not None:
                             roll.add(shot.panel.frame, shot.panel.truth, shot.panel.shown)
                         bar.update()
                 sums.append(film.sums())
-                judged.append(screening.judge(scene.fps))
-            changes[split] = _changes(sums, mean_jod(judged))
-    scorer.kept.keep()
+            changes[split] = _changes(sums)
     if show.worst is None:
         raise UserError(
             "no held-out camera has a photo: there is nothing to score on",
@@ -136,7 +117,6 @@ def evaluate(
         scores=found,
         panels=show.panels,
         worst=show.worst,
-        seen=show.seen.result(),
         patch=show.patch,
         training=training_views(scene, asset, params),
         matte=scorer.kind,
@@ -148,33 +128,25 @@ def evaluate(
 class _Show:
     """What is kept of the held-out cameras' pictures: those of the contact sheet, the worst, and the worst patch."""
 
-    def __init__(self, asset: Asset, on_sheet: set[int]) -> None:
+    def __init__(self, on_sheet: set[int]) -> None:
         self._on_sheet = on_sheet
-        self._caster = AssetCaster(asset)
         self.panels: list[Panel] = []
         self.worst: Panel | None = None
         self.patch: WorstPatch | None = None
-        self.seen = SeenSums(asset.layers)
 
-    def add(self, frame: int, shot: _Shot, view: PosedView, kind: MatteKind) -> None:
+    def add(self, frame: int, shot: _Shot) -> None:
         panel = shot.panel
         self.worst = panel if self.worst is None else min(self.worst, panel, key=lambda one: one.rank)
         if shot.patch is not None and (self.patch is None or shot.patch.place.psnr < self.patch.place.psnr):
             self.patch = shot.patch
         if frame in self._on_sheet:
             self.panels.append(panel)
-            known = None if kind == "found" else panel.mask
-            hits = self._caster.cast(view.seen_by)
-            self.seen.add_picture(view.seen_by, hits, shot.textures, panel.asset - panel.truth, known)
 
 
-def _changes(films: Sequence[dict[str, Sums]], jod: Mapping[str, float]) -> dict[str, Change]:
+def _changes(films: Sequence[dict[str, Sums]]) -> dict[str, Change]:
     """By variant, over all cameras."""
     variants = dict.fromkeys(variant for film in films for variant in film)
-    return {
-        variant: change_of((film[variant] for film in films if variant in film), jod.get(variant))
-        for variant in variants
-    }
+    return {variant: change_of(film[variant] for film in films if variant in film) for variant in variants}
 
 
 class _Scorer:
@@ -183,7 +155,6 @@ class _Scorer:
     Attributes:
         keys: (camera, frame) of all photos that are scored.
         kind: which opacity says where the subject is in them.
-        kept: scores of an earlier run.
     """
 
     def __init__(
@@ -193,28 +164,25 @@ class _Scorer:
         asset: Asset,
         params: EvaluateParams,
         perceptual: Perceptual,
-        kept: Path | None,
     ) -> None:
         self._scene, self._model, self._asset = scene, model, asset
         self._params, self._perceptual = params, perceptual
-        self._step = frame_rate_factor(scene, asset)
         self._truths = Truths(scene)
         self.keys = scored_keys(scene, self._truths)
         self.kind = self._truths.matte_kind(self.keys)
-        self.kept = KeptScores(kept, digest_of_metrics(perceptual, self.kind, params.background, params.band))
 
     def view(self, camera: Camera) -> PosedView:
         """Of a camera of the world."""
-        return PosedView(self._scene, self._model, self._asset, camera, self._step)
+        return PosedView(self._scene, self._model, self._asset, camera)
 
     def shots(self, split: Split, index: int, view: PosedView) -> Iterator[tuple[int, _Shot]]:
         """All frames of a camera that have a photo."""
         camera, params = self._scene.cameras[index], self._params
         frames = [k for c, k in self.keys if c == index]
-        for k, textures, renderings in rendered(view, self._asset, frames, self._step):
+        for k, renderings in rendered(view, self._asset, frames):
             frame, truth = self._scene.frame_ids[k], self._truths.at(index, k)
             _check_finite(renderings, camera.name, frame)
-            values = self.kept.of(renderings, truth, partial(self._scores, renderings, truth))
+            values = score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
             group = {variant: ImageScore(camera.name, frame, variant, values[variant], split) for variant in values}
             pictures = {variant: shown(one.over(params.background)) for variant, one in renderings.items()}
             region = region_of(self.kind, truth, renderings)
@@ -222,11 +190,7 @@ class _Scorer:
             over = None if truth.plate is None else shown(renderings["asset"].over(truth.plate))
             panel = Panel(camera.name, frame, truth.picture, *both, region, over)
             patch = find_patch(camera.name, frame, renderings["asset"], cutout_of(self.kind, truth))
-            yield k, _Shot(panel, patch, list(group.values()), textures, pictures)
-
-    def _scores(self, renderings: Mapping[str, Rendering], truth: Truth) -> dict[str, Values]:
-        params = self._params
-        return score_renderings(renderings, truth, self.kind, params.background, params.band, self._perceptual)
+            yield k, _Shot(panel, patch, list(group.values()), pictures)
 
 
 def scored_keys(scene: Scene, truths: Truths) -> list[tuple[int, int]]:
@@ -235,11 +199,10 @@ def scored_keys(scene: Scene, truths: Truths) -> list[tuple[int, int]]:
     return [(c, k) for c in cameras for k in range(scene.num_frames) if (c, k) in truths]
 
 
-def rendered(
-    view: PosedView, asset: Asset, frames: list[int], step: int
-) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]], dict[str, Rendering]]]:
-    """The asset's textures, and the variants' renderings, of each of the scene's `frames`."""
-    for k, textures in shipped(asset, frames, step):
+def rendered(view: PosedView, asset: Asset, frames: list[int]) -> Iterator[tuple[int, dict[str, Rendering]]]:
+    """The variants' renderings of each of the `frames`; the asset's are decoded in one go if all have photos."""
+    whole = len(frames) == asset.num_frames
+    for k, textures in enumerate(asset.frames()) if whole else ((k, asset.frame(k)) for k in frames):
         view.turn(k)
         with_view, without_view, alpha = view.model.render(float(k))
         images = {
@@ -248,40 +211,24 @@ def rendered(
             "asset": Rendering(*view.asset.composite(textures)),
             "asset_diffuse": Rendering(*view.asset.composite(textures, lit=False)),
         }
-        yield k, textures, images
+        yield k, images
 
 
-def shipped(asset: Asset, frames: list[int], step: int) -> Iterator[tuple[int, Sequence[NDArray[np.uint8]]]]:
-    """The textures of the scene's `frames`; decoded in one go if that is all that have photos."""
-    if len(frames) * step == asset.num_frames:
-        return ((k // step, textures) for k, textures in enumerate(asset.frames()) if k % step == 0)
-    return ((k, asset.frame(k * step)) for k in frames)
-
-
-def frame_rate_factor(scene: Scene, asset: Asset) -> int:
-    """Frames of the asset a frame of the scene, whose frame k is the asset's k times this.
-
-    Raises:
-        UserError: if it is not a whole number.
-    """
-    factor, rest = divmod(asset.num_frames, scene.num_frames)
-    if rest or not factor:
-        raise _wrong_frames("asset", f"{scene.num_frames} frames, as in the scene, or a multiple", asset, scene)
-    return factor
-
-
-def _wrong_frames(what: str, expected: str, found: Asset | RadianceManifolds, scene: Scene) -> UserError:
-    return UserError(
+def check_frames(what: str, found: Asset | RadianceManifolds, scene: Scene) -> None:
+    """UserError unless an asset, or a model, has as many frames as the scene; `what` says which it is."""
+    if found.num_frames == scene.num_frames:
+        return
+    raise UserError(
         f"the {what} and the scene have different numbers of frames",
         file=scene.folder / "scene.json",
-        expected=expected,
+        expected=f"{scene.num_frames} frames, as in the scene",
         found=f"{found.num_frames} in the {what}",
         remedy="run `dvc repro`, which makes both from the same scene",
     )
 
 
-def _check(scene: Scene, model: RadianceManifolds, held_out: list[int]) -> None:
-    if not held_out:
+def _check(scene: Scene, model: RadianceManifolds, asset: Asset) -> None:
+    if not scene.indices("holdout"):
         raise UserError(
             "no held-out camera: there is nothing to score on",
             file=scene.folder / "scene.json",
@@ -289,8 +236,8 @@ def _check(scene: Scene, model: RadianceManifolds, held_out: list[int]) -> None:
             found=f"{len(scene.cameras)} cameras, all for training",
             remedy="name held-out cameras under subjects.<name>.holdout in params.yaml, or set {every: n} there",
         )
-    if model.num_frames != scene.num_frames:
-        raise _wrong_frames("model", f"{scene.num_frames} frames, as in the scene", model, scene)
+    check_frames("model", model, scene)
+    check_frames("asset", asset, scene)
 
 
 def _check_finite(images: Mapping[str, Rendering], camera: str, frame: str) -> None:

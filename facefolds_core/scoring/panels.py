@@ -25,7 +25,7 @@ ALL_METRICS = (
 """Of each picture; docs/reference/metrics.md defines them."""
 LEAST = ("worst_patch",)
 """Of these the least of all pictures is given in place of their mean."""
-FILM_METRICS = ("temporal", "psnr_moving", "flicker", "cvvdp")
+FILM_METRICS = ("temporal", "psnr_moving", "flicker")
 """Of each variant, over all frames of its cameras."""
 HEADLINES = ("psnr_any", "psnr_over_plate", "psnr_subject", "psnr_found", "psnr")
 """The first that is there says most of the asset."""

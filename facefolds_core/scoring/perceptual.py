@@ -13,14 +13,10 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 TRUNK_NAME = "alexnet-owt-7be5be79.pth"
@@ -131,13 +127,6 @@ def _enlarged(images: Tensor) -> Tensor:
     return nn.functional.interpolate(images, size=size, mode="bilinear", align_corners=False)
 
 
-VideoDistance = Callable[[NDArray[np.uint8], NDArray[np.uint8], float], float]
-"""CVVDP of a film (F, H, W, 3) from the true one, at so many frames a second, in JOD."""
-
-DISPLAY = "standard_4k"
-"""CVVDP's name of a 30-inch screen of 200 cd/m^2 seen from 0.75 m: it is part of the metric."""
-
-
 @dataclass(frozen=True)
 class Perceptual:
     """The perceptual metrics that this machine's files allow; `missing` says in words what was not found."""
@@ -145,7 +134,6 @@ class Perceptual:
     lpips: PerceptualDistance | None
     st_lpips: PerceptualDistance | None
     missing: tuple[str, ...]
-    cvvdp: VideoDistance | None = None
 
 
 def find_perceptual(device: torch.device | str = "cpu") -> Perceptual:
@@ -166,26 +154,7 @@ def find_perceptual(device: torch.device | str = "cpu") -> Perceptual:
         None if lpips is None else lpips.to(device),
         None if st_lpips is None else st_lpips.to(device),
         tuple(missing),
-        find_cvvdp(device),
     )
-
-
-def find_cvvdp(device: torch.device | str) -> VideoDistance | None:
-    """ColorVideoVDP (Mantiuk et al. 2024); None where the package cvvdp, or what it imports, is not there or fails."""
-    if importlib.util.find_spec("pycvvdp") is None:
-        return None
-    try:
-        metric: Any = importlib.import_module("pycvvdp").cvvdp(
-            display_name=DISPLAY, quiet=True, device=torch.device(device)
-        )
-    except Exception:  # a torchvision that does not belong to this torch raises RuntimeError
-        return None
-
-    def distance(film: NDArray[np.uint8], truth: NDArray[np.uint8], fps: float) -> float:
-        with torch.no_grad():
-            return float(metric.predict(film, truth, dim_order="FHWC", frames_per_second=fps)[0])
-
-    return distance
 
 
 def load_lpips() -> PerceptualDistance | None:

@@ -21,17 +21,15 @@ class PosedView:
 
     Args:
         camera: in the world.
-        step: frames of the asset a frame of the scene.
 
     Attributes:
-        seen_by: the camera in the frame of the asset's meshes.
         asset: the asset's view, its reflection with it.
         model: the model's view.
     """
 
-    def __init__(self, scene: Scene, model: RadianceManifolds, asset: Asset, camera: Camera, step: int) -> None:
+    def __init__(self, scene: Scene, model: RadianceManifolds, asset: Asset, camera: Camera) -> None:
         self._poses, self._model, self._files = scene.poses, model, asset
-        self._camera, self._step = camera, step
+        self._camera = camera
         self._turn_model(0)
         self._turn_asset(0)
 
@@ -50,6 +48,4 @@ class PosedView:
             self.model = ModelView(self._model, camera, to_room)
 
     def _turn_asset(self, frame: int) -> None:
-        time = frame * self._step
-        self.seen_by = self._files.camera_in_head(self._camera, time)
-        self.asset = view_of(self._files.full, self._camera, time)
+        self.asset = view_of(self._files.full, self._camera, frame)

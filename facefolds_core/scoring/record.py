@@ -24,74 +24,11 @@ from facefolds_core.scoring.panels import HEADLINES, Panel
 from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.training_scores import TrainingView
 
-VERSION = 1
+VERSION = 2
 NAME = "analysis.json"
 PICTURES = "pictures"
 DECIMALS = 6
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
-
-
-@dataclass(frozen=True)
-class AngleBin:
-    """Pixels of the subject whose surface is seen at `low` to `high` degrees from its normal.
-
-    Attributes:
-        share: of all pixels of the subject.
-        mean, rms: absolute and root mean square error of R, G and B in [0, 1]; None where there are no such pixels.
-    """
-
-    low: float
-    high: float
-    share: float
-    mean: float | None
-    rms: float | None
-
-
-@dataclass(frozen=True)
-class Spacing:
-    """From a layer to the next one inwards, along rays from the sphere centre; units of the normalised world.
-
-    Attributes:
-        mean, least: None where the two are never met by one ray. A negative `least` means that they cross.
-    """
-
-    mean: float | None
-    least: float | None
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Sums over the pictures of the contact sheet.
-
-    Attributes:
-        angles: by the angle, rising.
-        bare: pixels of the subject that meet no visible layer, as a bin of all angles.
-        contribution: (N,) share of each layer in what is seen of the subject, sums to 1.
-        reach: (N,) share of the subject's pixels to which the layer adds at least 1/255.
-        greatest: (N,) largest weight in any pixel: leaving the layer out changes no colour by more.
-        masked: whether the subject is known from masks; else it is where the asset is opaque.
-    """
-
-    angles: tuple[AngleBin, ...]
-    bare: AngleBin
-    contribution: tuple[float, ...]
-    reach: tuple[float, ...]
-    greatest: tuple[float, ...]
-    masked: bool
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Where the layers lie.
-
-    Attributes:
-        spacing: from each layer to the next one inwards, N - 1 of them.
-        sections: name of a cut through the sphere centre -> (N, M, 2) points of each layer, x right and y up as it is
-            seen; NaN where the layer is not met.
-    """
-
-    spacing: tuple[Spacing, ...]
-    sections: dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -137,7 +74,6 @@ class Record:
         views: those of the contact sheet in its order, then the worst where it is not among them.
         on_sheet: how many of them are of the contact sheet.
         worst: index of the view with the lowest PSNR of all held-out pictures.
-        seen, shape: of the asset.
         films: of the held-out cameras, in `folder`.
         folder: of the evaluation.
         patch: where the asset is worst; None where that is not known.
@@ -146,8 +82,6 @@ class Record:
     views: tuple[View, ...]
     on_sheet: int
     worst: int
-    seen: Seen
-    shape: Shape
     films: tuple[FilmFile, ...] = ()
     folder: Path = Path()
     patch: Crop | None = None
@@ -157,8 +91,6 @@ def write_record(
     folder: Path,
     panels: Sequence[Panel],
     worst: Panel,
-    seen: Seen,
-    shape: Shape,
     asset: Asset,
     films: Sequence[FilmFile] = (),
     patch: WorstPatch | None = None,
@@ -171,23 +103,12 @@ def write_record(
     """
     listed = panels if any(panel is worst for panel in panels) else [*panels, worst]
     (folder / PICTURES).mkdir()
-    layers = [
-        {"contribution": part, "reach": reach, "greatest": greatest, "to_next": asdict(gap) if gap else None}
-        for part, reach, greatest, gap in zip(
-            seen.contribution, seen.reach, seen.greatest, [*shape.spacing, None], strict=True
-        )
-    ]
     value = {
         "version": VERSION,
         "asset": digest_of(asset),
         "views": [_write_view(folder, i, panel) for i, panel in enumerate(listed)],
         "on_sheet": len(panels),
         "worst": next(i for i, panel in enumerate(listed) if panel is worst),
-        "masked": seen.masked,
-        "angles": [asdict(one) for one in seen.angles],
-        "no_layer": asdict(seen.bare),
-        "layers": layers,
-        "sections": {name: points.tolist() for name, points in shape.sections.items()},
         "films": [asdict(film) for film in films],
         "patch": None if patch is None else _write_patch(folder, patch),
     }
@@ -251,23 +172,11 @@ def read_record(folder: Path, asset: Asset) -> Record | None:
             raise UserError("of another version", file=path, expected=VERSION, found=value["version"], remedy=REMEDY)
         if value["asset"] != digest_of(asset):
             raise UserError("the evaluation is of another asset", file=path, expected=asset.folder, remedy=REMEDY)
-        layers = value["layers"]
-        columns = {name: tuple(float(row[name]) for row in layers) for name in ("contribution", "reach", "greatest")}
         views = tuple(_read_view(folder, entry) for entry in value["views"])
         return Record(
             views=views,
             on_sheet=int(value["on_sheet"]),
             worst=range(len(views))[value["worst"]],
-            seen=Seen(
-                angles=tuple(AngleBin(**one) for one in value["angles"]),
-                bare=AngleBin(**value["no_layer"]),
-                masked=bool(value["masked"]),
-                **columns,
-            ),
-            shape=Shape(
-                spacing=tuple(Spacing(**row["to_next"]) for row in layers[:-1]),
-                sections={name: np.array(p, float) for name, p in value["sections"].items()},
-            ),
             films=tuple(_read_film(one) for one in value.get("films", ())),
             folder=folder,
             patch=_read_patch(folder, value.get("patch")),

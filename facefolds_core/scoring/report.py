@@ -65,7 +65,6 @@ class Circumstances:
         changes: split -> variant -> what it shows of what changes from frame to frame.
         patch: the worst window of all held-out pictures of the asset.
         training: what the training cameras see of it.
-        fresh_views: means on views that were filmed for the purpose.
         warnings: what is not well.
     """
 
@@ -74,7 +73,6 @@ class Circumstances:
     changes: Mapping[Split, Mapping[str, Change]] = field(default_factory=dict)
     patch: WorstPatch | None = None
     training: Sequence[TrainingView] = ()
-    fresh_views: Mapping[str, Any] | None = None
     warnings: Sequence[Fact] = ()
 
 
@@ -96,8 +94,6 @@ def metrics_json(
     }
     if checked["images"]:
         content["validate"] = {"headline": headline(checked), **checked}
-    if about.fresh_views is not None:
-        content["fresh_views"] = about.fresh_views
     return {**content, "warnings": [one.to_json() for one in about.warnings], "cost": cost}
 
 

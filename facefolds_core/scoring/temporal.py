@@ -47,17 +47,15 @@ class Change:
         changes.
     flicker: RMS of the error's change from frame to frame, colours in [0, 1]; None with less than two frames.
     truth_change: RMS of what the photos differ from their mean over time; None with less than two frames.
-    cvvdp: of the film, JOD, mean over the cameras; None where it cannot be had.
     """
 
     temporal: float | None
     psnr_moving: float | None
     flicker: float | None
     truth_change: float | None
-    cvvdp: float | None = None
 
 
-def change_of(sums: Iterable[Sums], cvvdp: float | None = None) -> Change:
+def change_of(sums: Iterable[Sums]) -> Change:
     """Of all cameras together."""
     total = sum(sums, Sums())
     return Change(
@@ -65,7 +63,6 @@ def change_of(sums: Iterable[Sums], cvvdp: float | None = None) -> Change:
         psnr_moving=decibels(total.moving / total.truth) if total.truth > 0 else None,
         flicker=float(np.sqrt(total.steps / total.pairs)) if total.pairs > 0 else None,
         truth_change=float(np.sqrt(total.truth / total.values)) if total.pairs > 0 else None,
-        cvvdp=cvvdp,
     )
 
 

@@ -54,7 +54,6 @@ ROWS = (
     ("st_lpips_found", "ST-LPIPS within the found matte", "{:.3f}"),
     ("matte_iou", "matte: intersection over union", "{:.3f}"),
     ("flicker", "flicker of the error", "{:.4f}"),
-    ("cvvdp", "CVVDP of the film, JOD (10 is best)", "{:.2f}"),
     ("psnr", "PSNR of the whole frame, without the room", "{:.2f}"),
 )
 """Metric -> its words and its form; the whole frame comes last: it rewards whoever paints the room."""

@@ -20,13 +20,12 @@ from facefolds_core.scoring.truths import Truth, Truths
 def training_views(scene: Scene, asset: Asset, params: EvaluateParams) -> list[TrainingView]:
     """The scene's middle frame from every training camera that has a photo of it; shows a progress bar."""
     truths, frame = Truths(scene), scene.num_frames // 2
-    time = frame * (asset.num_frames // scene.num_frames)
-    textures = asset.frame(time)
+    textures = asset.frame(frame)
     cameras = [index for index in scene.indices("train") if (index, frame) in truths]
     found = []
     with progress(total=len(cameras), desc="training views", unit="image") as bar:
         for index in cameras:
-            seen = Rendering(*view_of(asset.full, scene.cameras[index], time).composite(textures))
+            seen = Rendering(*view_of(asset.full, scene.cameras[index], frame).composite(textures))
             truth = truths.at(index, frame)
             over = shown(seen.over(params.background if truth.plate is None else truth.plate))
             values = score(seen, truth, params)

@@ -12,7 +12,7 @@ from facefolds_core.captures.scene import REACH, Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.density import longest_axes
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.sight import seen_share
+from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float32]
@@ -79,7 +79,7 @@ def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) 
     params = params or BodyParams()
     inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or REACH)
     cameras = scene.views_of("train")
-    seen = np.rint(len(cameras) * seen_share(cameras, splats.means.astype(np.float64)))
+    seen = seen_by(cameras, splats.means.astype(np.float64))
     return np.asarray(inside & (seen >= min(params.views, len(cameras))))
 
 

@@ -1,4 +1,5 @@
-"""Looking at a grid of density and colour: rays through it, and outlines from a centre. Compiled for CPUs."""
+"""Looking at a grid of density and colour: rays through it, outlines from a centre, what lies near layers. Compiled for
+CPUs."""
 
 from __future__ import annotations
 
@@ -115,3 +116,45 @@ def profile(grid, lower, voxel, origins, directions, farthest, step, shares):  #
             f = (wanted - reached[n - 1]) / max(reached[n] - reached[n - 1], np.float32(1e-9))
             radius[r, k] = farthest - (n - 1 + min(max(f, 0.0), 1.0)) * step
     return opacity, rgb, radius
+
+
+@kernel(parallel=True)
+def shells(grid, lower, voxel, origins, directions, radii, step, beyond):  # type: ignore[no-untyped-def]
+    """Optical depth of the grid, shared out among layers: each sample among the two that it lies between.
+
+    Along rays, origins and directions (R, 3), from `beyond` outside of the outermost of radii (R, N) to `beyond` inside
+    of the innermost. Returns (R, N, 4): optical depth, and the colour of it that is seen from outside, 0 where there is
+    none.
+    """
+    count, layers = radii.shape
+    found = np.zeros((count, layers, 4), np.float32)
+    for r in prange(count):
+        near, s, light = 0, radii[r, 0] + beyond, 1.0
+        seen = np.zeros(layers)
+        while s > radii[r, layers - 1] - beyond:
+            x = (origins[r, 0] + s * directions[r, 0] - lower[0]) / voxel
+            y = (origins[r, 1] + s * directions[r, 1] - lower[1]) / voxel
+            z = (origins[r, 2] + s * directions[r, 2] - lower[2]) / voxel
+            inside = min(x, y, z) >= 0 and x <= grid.shape[0] - 1 and y <= grid.shape[1] - 1 and z <= grid.shape[2] - 1
+            if inside:
+                v0, v1, v2, v3 = sample(grid, x, y, z)
+                while near < layers - 1 and s < radii[r, near + 1]:
+                    near += 1
+                share = 0.0
+                if near < layers - 1 and s < radii[r, near]:
+                    share = (radii[r, near] - s) / (radii[r, near] - radii[r, near + 1])
+                depth = v0 * step / voxel
+                weight = max(light, CLEAR) * (1 - math.exp(-depth))
+                light *= math.exp(-depth)
+                for k in range(near, min(near + 2, layers)):
+                    part = 1 - share if k == near else share
+                    found[r, k, 0] += depth * part
+                    found[r, k, 1] += weight * part * v1
+                    found[r, k, 2] += weight * part * v2
+                    found[r, k, 3] += weight * part * v3
+                    seen[k] += weight * part
+            s -= step
+        for k in range(layers):
+            for c in range(1, 4):
+                found[r, k, c] /= max(seen[k], 1e-12)
+    return found

@@ -19,6 +19,9 @@ from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
+BEYOND = 3.0
+"""Voxels: a surface between two voxels is blurred by so much."""
+
 
 @dataclass(frozen=True)
 class Profile:
@@ -66,9 +69,34 @@ def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
     return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))
 
 
+def shells(volume: Volume, chart: Chart, uv: Array, radii: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What the volume puts on each of N layers.
+
+    Args:
+        uv: (..., 2).
+        radii: (..., N) of the layers there, outermost first, units.
+
+    Returns:
+        opacity (..., N) and rgb (..., N, 3): composited over one another the layers show what the volume shows, seen
+        along the chart's rays. What lies farther than `BEYOND` voxels outside of all of them or behind is left out.
+    """
+    rays = (np.ascontiguousarray(of(uv).reshape(-1, 3)) for of in (chart.origins, chart.directions))
+    flat = np.ascontiguousarray(radii.reshape(-1, radii.shape[-1]), np.float64)
+    step, beyond = 0.5 * volume.voxel, BEYOND * volume.voxel
+    found = look_kernel.shells(volume.grid, volume.lower, volume.voxel, *rays, flat, step, beyond)
+    return -np.expm1(-found[..., 0]).reshape(radii.shape), found[..., 1:].reshape(*radii.shape, 3)
+
+
 def window_uv(window: Window, rows: int, columns: int) -> Array:
     """(rows, columns, 2) of the nodes of a radius map: they include the window's borders."""
     u, v = np.linspace(window[1], window[0], rows), np.linspace(window[2], window[3], columns)
+    return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
+
+
+def texel_uv(window: Window, rows: int, columns: int) -> Array:
+    """(rows, columns, 2) of the middles of a texture's texels."""
+    u = window[1] + (window[0] - window[1]) * (np.arange(rows) + 0.5) / rows
+    v = window[2] + (window[3] - window[2]) * (np.arange(columns) + 0.5) / columns
     return np.stack(np.meshgrid(u, v, indexing="ij"), -1)
 
 

@@ -12,13 +12,13 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.jit import kernel
 
 
-def seen_share(cameras: Sequence[Camera], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(P,) share of the cameras in whose images points (P, 3) lie."""
+def seen_by(cameras: Sequence[Camera], points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(P,) in how many of the cameras' images points (P, 3) lie."""
     poses = np.stack([camera.w2c for camera in cameras]).astype(np.float64)
     lenses = np.stack([camera.K for camera in cameras]).astype(np.float64)
     sizes = np.array([(camera.width, camera.height) for camera in cameras], np.float64)
-    share: NDArray[np.float64] = _count(np.ascontiguousarray(points, np.float64), poses, lenses, sizes) / len(cameras)
-    return share
+    count: NDArray[np.int64] = _count(np.ascontiguousarray(points, np.float64), poses, lenses, sizes)
+    return count
 
 
 @kernel(parallel=True)

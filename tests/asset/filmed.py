@@ -13,10 +13,10 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.package import Export, package
-from facefolds_core.params import CompressParams
+from facefolds_core.params import CompressParams, merged
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import composite
-from tests.assets import CENTRE, WINDOW, cap_mesh, cap_textures, radius_of, write_store
+from tests.assets import CENTRE, PLAIN, WINDOW, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
 SIZE, LAYERS, FRAMES, R = 48, 3, 3, 64
@@ -67,4 +67,4 @@ def packaged(
 
     levels = {level["mesh_resolution"] for level in section.get("levels", ())}
     export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels}, reflection)
-    package(folder, export, scene, CompressParams.model_validate(section), kept)
+    package(folder, export, scene, CompressParams.model_validate(merged(PLAIN.model_dump(), section)), kept)

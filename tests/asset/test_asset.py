@@ -10,12 +10,22 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.asset.writer import write_asset
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import CompressParams, MeshCodec
-from tests.assets import CENTRE, SOURCE, WINDOW, cap_crops, cap_mesh, cap_textures, make_asset, write_store
+from tests.assets import (
+    CENTRE,
+    PLAIN,
+    SOURCE,
+    WINDOW,
+    cap_crops,
+    cap_mesh,
+    cap_textures,
+    make_asset,
+    write_asset,
+    write_store,
+)
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +109,7 @@ def test_failure_leaves_the_old_asset(folder: Path, tmp_path: Path) -> None:
     write_frames(tmp_path / "part.arrow", (64, 64, 4), [(0, 0, cap_textures(1, 0, 64)[0])])
     store = write_store(tmp_path / "one.arrow", cap_textures(1, 0, 64)[None])
     with pytest.raises(UserError, match="not complete"):
-        write_asset(tmp_path / "asset", [cap_mesh(0.4), cap_mesh(0.3)], [WINDOW] * 2, store, SOURCE, CompressParams())
+        write_asset(tmp_path / "asset", [cap_mesh(0.4), cap_mesh(0.3)], [WINDOW] * 2, store, SOURCE, PLAIN)
     assert {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()} == before
 
 
@@ -116,5 +126,5 @@ def test_bad_meshes_are_refused(tmp_path: Path) -> None:
     }
     for word, mesh in bad.items():
         with pytest.raises(UserError, match=word):
-            write_asset(tmp_path / "asset", [mesh], [WINDOW], store, SOURCE, CompressParams())
+            write_asset(tmp_path / "asset", [mesh], [WINDOW], store, SOURCE, PLAIN)
     assert not (tmp_path / "asset").exists()

@@ -21,10 +21,10 @@ from facefolds_core.files import write_text
 from facefolds_core.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.poster import BACKGROUND
-from facefolds_core.params import CompressParams, MeshCodec
+from facefolds_core.params import CompressParams, merged
 from facefolds_core.paths import SubjectFolders
-from stages.compress import compress
-from tests.assets import CENTRE, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
+from facefolds_core.pipeline.compress import compress
+from tests.assets import CENTRE, PLAIN, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin
 
 FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([0.1, -0.2, 0.3]))
@@ -34,7 +34,7 @@ FROM_CAPTURE = Similarity(0.5, np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np
 def folders(tmp_path: Path) -> SubjectFolders:
     """Three layers and two frames, as `normalize`, `sample`, `decimate` and `texture` leave them."""
     subject = SubjectFolders(tmp_path / "caps")
-    write_text(subject.config / "compress.json", CompressParams().model_dump_json())
+    write_text(subject.config / "compress.json", PLAIN.model_dump_json())
     cameras = (look_at_origin("cam0", 0, 5, 48),)  # held out: nothing that a camera decides
     scene = Scene("caps", cameras, ("holdout",), ("a", "b"), np.arange(2) / 25, 25.0, FROM_CAPTURE, (), subject.scene)
     write_scene(scene, subject.scene)
@@ -65,7 +65,8 @@ def rig(folders: SubjectFolders, **params: object) -> None:
     write_scene(scene, folders.scene)
     image = np.zeros((48, 48, 3), np.uint8)
     write_frames(folders.scene / "frames.arrow", image.shape, [(1, 0, image), (1, 1, image), (0, 0, image)])
-    write_text(folders.config / "compress.json", CompressParams.model_validate(params).model_dump_json())
+    section = CompressParams.model_validate(merged(PLAIN.model_dump(), params))
+    write_text(folders.config / "compress.json", section.model_dump_json())
 
 
 def test_quality_by_target(folders: SubjectFolders) -> None:
@@ -103,7 +104,7 @@ def test_mesh_error_in_pixels(folders: SubjectFolders) -> None:
         for camera in cameras:
             ours, theirs = (camera.project(mesh.vertices.astype(float))[0] for mesh in (crop.mesh, layer))
             assert np.linalg.norm(ours[:, None] - theirs[None], axis=-1).min(1).max() <= 0.05
-    exact = sum(len(encode_mesh(crop.mesh, MeshCodec())[0]) for crop in cap_crops(3, 2, 64))
+    exact = sum(len(encode_mesh(crop.mesh, PLAIN.mesh)[0]) for crop in cap_crops(3, 2, 64))
     assert sum(layer.bytes for layer in asset.manifest.full.layers) < exact / 2
 
 

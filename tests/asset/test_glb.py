@@ -16,9 +16,11 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.glb import write_glb
+from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.sphere_uv import uv_to_directions
 from facefolds_core.params import CompressParams, MeshCodec
-from tests.assets import make_asset
+from tests.assets import CENTRE, make_asset
 
 ROOT = Path(__file__).parents[2]
 VALIDATE = """
@@ -50,18 +52,45 @@ def part(document: dict[str, Any], binary: bytes, view: int) -> bytes:
     return binary[entry["byteOffset"] : entry["byteOffset"] + entry["byteLength"]]
 
 
-def test_layers_come_back_innermost_first(asset: Asset, tmp_path: Path) -> None:
+def test_each_layer_shows_its_texture(asset: Asset, tmp_path: Path) -> None:
+    """At the places where vertices are, in the one picture."""
     write_glb(tmp_path / "a.glb", asset.full, "caps", frame=2)
     document, binary = opened(tmp_path / "a.glb")
-    textures = asset.frame(2)
-    for place, index in enumerate((2, 1, 0)):
-        (primitive,) = document["meshes"][document["nodes"][place]["mesh"]]["primitives"]
-        layer = asset.layers[index]
-        accessor = document["accessors"][primitive["attributes"]["POSITION"]]
-        assert part(document, binary, accessor["bufferView"]) == layer.vertices.tobytes()
-        image = document["images"][document["textures"][place]["source"]]
-        pixels = np.asarray(Image.open(io.BytesIO(part(document, binary, image["bufferView"]))))
-        np.testing.assert_array_equal(pixels, textures[index])
+    pixels = np.asarray(Image.open(io.BytesIO(part(document, binary, document["images"][0]["bufferView"]))))
+    height, width = pixels.shape[:2]
+    positions, places = values(document, binary, "POSITION", 3), values(document, binary, "TEXCOORD_0", 2)
+    np.testing.assert_array_equal(positions, np.concatenate([layer.vertices for layer in asset.layers]))
+    start = 0
+    for layer, texture in zip(asset.layers, asset.frame(2), strict=True):
+        st = places[start : start + len(layer.vertices)] * (width, height)
+        start += len(layer.vertices)
+        origin = np.rint((st - layer.st * texture.shape[1::-1])[0]).astype(int)
+        x, y = origin
+        found = pixels[y : y + texture.shape[0], x : x + texture.shape[1]]
+        np.testing.assert_array_equal(found[..., :3], texture[..., :3])
+        assert ((found[..., 3] == texture[..., 3]) | (found[..., 3] == 255)).all()
+        np.testing.assert_array_equal(pixels[y - 1, x : x + texture.shape[1]], found[0])  # the gutter repeats it
+
+
+def test_places_on_the_chart_are_those_of_the_directions(asset: Asset, tmp_path: Path) -> None:
+    write_glb(tmp_path / "a.glb", asset.full, "caps")
+    document, binary = opened(tmp_path / "a.glb")
+    chart = values(document, binary, "TEXCOORD_1", 2).astype(np.float64)
+    uv = np.stack([2 - 4 * chart[:, 1], 4 * chart[:, 0] - 2], -1)
+    towards = values(document, binary, "POSITION", 3) - np.array(CENTRE)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    assert np.abs(uv_to_directions(uv) - towards).max() < 2e-3
+
+
+def values(document: dict[str, Any], binary: bytes, name: str, width: int) -> np.ndarray[Any, Any]:
+    """An attribute of all vertices (V, width)."""
+    accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"][name]]
+    return np.frombuffer(part(document, binary, accessor["bufferView"]), "<f4").reshape(-1, width)
+
+
+def faces_of(document: dict[str, Any], binary: bytes, primitive: int) -> np.ndarray[Any, Any]:
+    accessor = document["accessors"][document["meshes"][0]["primitives"][primitive]["indices"]]
+    return np.frombuffer(part(document, binary, accessor["bufferView"]), "<u4").reshape(-1, 3)
 
 
 def test_the_subject_looks_to_z_with_y_up(asset: Asset, tmp_path: Path) -> None:
@@ -78,16 +107,47 @@ def test_a_frame_that_is_not_there(asset: Asset, tmp_path: Path) -> None:
         write_glb(tmp_path / "a.glb", asset.full, "caps", frame=3)
 
 
-def test_backs_are_left_out_and_triangles_come_from_the_back_to_the_front(asset: Asset, tmp_path: Path) -> None:
+def test_the_shell_comes_from_within_and_from_the_back_without_backs(asset: Asset, tmp_path: Path) -> None:
     write_glb(tmp_path / "a.glb", asset.full, "caps")
     document, binary = opened(tmp_path / "a.glb")
-    assert not any(material.get("doubleSided") for material in document["materials"])
-    for place, layer in enumerate(reversed(asset.layers)):
-        (primitive,) = document["meshes"][place]["primitives"]
-        view = document["accessors"][primitive["indices"]]["bufferView"]
-        faces = np.frombuffer(part(document, binary, view), "<u4").reshape(-1, 3)
-        assert (np.diff(layer.vertices[faces, 0].mean(1)) >= 0).all()
-        assert sorted(map(tuple, faces)) == sorted(map(tuple, layer.faces))
+    assert [material["alphaMode"] for material in document["materials"]] == ["MASK", "BLEND"]
+    assert not any(material["doubleSided"] for material in document["materials"])
+    faces = faces_of(document, binary, 1)
+    starts = np.cumsum([0] + [len(layer.vertices) for layer in asset.layers])
+    for index in reversed(range(3)):
+        layer = asset.layers[index]
+        own, faces = faces[: len(layer.faces)] - starts[index], faces[len(layer.faces) :]
+        assert (np.diff(layer.vertices[own, 0].mean(1)) >= 0).all()
+        assert sorted(map(tuple, own)) == sorted(map(tuple, layer.faces))
+    assert len(faces) == 0
+
+
+def test_the_core_has_the_triangles_with_opaque_texels(asset: Asset, tmp_path: Path) -> None:
+    write_glb(tmp_path / "a.glb", asset.full, "caps")
+    document, binary = opened(tmp_path / "a.glb")
+    core = {tuple(face) for face in faces_of(document, binary, 0)}
+    assert 0 < len(core) < sum(len(layer.faces) for layer in asset.layers)
+    textures = opaque_where_covered(asset.frame(0), asset.windows)
+    starts = np.cumsum([0] + [len(layer.vertices) for layer in asset.layers])
+    for layer, texture, start in zip(asset.layers, textures, starts[:-1], strict=True):
+        for face in layer.faces:
+            column, row = (layer.st[face].mean(0) * texture.shape[1::-1]).astype(int)
+            assert tuple(face + start) in core or texture[row, column, 3] < 255
+
+
+def test_what_is_covered_becomes_opaque() -> None:
+    """Alpha of two layers in one window: 0.8 over 0.8 lets 4 % through, 0.5 over 0.5 a quarter, 1 over 0.05 nothing."""
+    outer, inner = np.zeros((2, 1, 3, 4), np.uint8)
+    outer[0, :, 3], inner[0, :, 3] = (204, 128, 255), (204, 128, 13)
+    changed = opaque_where_covered([outer, inner], [(-1, 1, -1, 1)] * 2)
+    assert [layer[0, :, 3].tolist() for layer in changed] == [[204, 128, 255], [255, 128, 13]]
+
+
+def test_windows_are_minded_where_layers_are_compared() -> None:
+    """The outer layer covers the inner one's left half alone."""
+    outer, inner = np.full((1, 1, 4), 255, np.uint8), np.full((1, 2, 4), 100, np.uint8)
+    _, changed = opaque_where_covered([outer, inner], [(-1, 1, -1, 0), (-1, 1, -1, 1)])
+    assert changed[0, :, 3].tolist() == [255, 100]
 
 
 def test_khronos_validator(asset: Asset, tmp_path: Path) -> None:
@@ -99,4 +159,4 @@ def test_khronos_validator(asset: Asset, tmp_path: Path) -> None:
     report = json.loads(done.stdout)
     worse = [message for message in report["issues"]["messages"] if message["severity"] <= 1]
     assert worse == [], worse
-    assert report["info"]["totalTriangleCount"] == sum(len(layer.faces) for layer in asset.layers)
+    assert report["info"]["drawCallCount"] == 2

@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 
 from bench.large import enlarge, enlarged_krt
-from facefolds_core.captures.krt import Calibration, read_krt, scaled_intrinsics
+from facefolds_core.captures.gathering import Calibration, scaled_intrinsics
+from facefolds_core.captures.krt import read_krt
 
 K = np.array([[500.0, 0, 63.5], [0, 510, 40], [0, 0, 1]])
 W2C = np.eye(3, 4)
 
 
+def calibration(name: str) -> Calibration:
+    return Calibration(name, K, W2C, Path("KRT"), "", np.zeros(5))
+
+
 def test_cameras_see_points_as_many_times_farther_from_the_corner(tmp_path: Path) -> None:
     path = tmp_path / "KRT"
-    path.write_text(enlarged_krt([Calibration("a", K, np.zeros(5), W2C), Calibration("b", K, np.zeros(5), W2C)], 4))
+    path.write_text(enlarged_krt([calibration("a"), calibration("b")], 4))
     cameras = read_krt(path)
     small, large = (scaled_intrinsics(one, (1, 1), (1, 1), 0.0) for one in (K, cameras[1].K))
     assert [camera.name for camera in cameras] == ["a", "b"]
@@ -29,7 +34,7 @@ def test_pictures_of_all_kinds_are_enlarged_and_the_rest_copied(tmp_path: Path) 
     for name in ("images/S/a/1.png", "masks/S/a/1.png", "plates/a.png"):
         (source / name).parent.mkdir(parents=True, exist_ok=True)
         cv2.imwrite(str(source / name), np.zeros((3, 2), np.uint8))
-    (source / "KRT").write_text(enlarged_krt([Calibration("a", K, np.zeros(5), W2C)], 1))
+    (source / "KRT").write_text(enlarged_krt([calibration("a")], 1))
     (source / "frame_list.txt").write_text("S 1\n")
     enlarge(source, tmp_path / "large", 4)
     pictures = sorted((tmp_path / "large").rglob("*.png"))

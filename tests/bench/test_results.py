@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from PIL import Image
 
 from bench import charts
 from bench.results import ROOT, Cell, Conditions, Measurement, Row, Scores, Store, commit_name
-from bench.tables import AXES, RATES, hazard_tables, rate_tables, waterfall_rows
+from bench.tables import AXES, RATES, hazard_tables, rate_tables
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json
 
 KEPT = ROOT / "bench" / "results"
 CONDITIONS = Conditions(commit="aaa", clock="wall", threads=2, machine="one", frames=3)
@@ -84,38 +81,12 @@ def rates() -> list[Row]:
         (charts.hazards, film),
         (charts.sweeps, lambda: [row for row in rows() if row.sweep in AXES]),
         (lambda kept, path: charts.rate(kept, path, "actor"), rates),
-        (charts.waterfall, lambda: read_json(KEPT / "waterfall.json")),
     ],
-    ids=["speed", "hazards", "sweeps", "rate", "waterfall"],
+    ids=["speed", "hazards", "sweeps", "rate"],
 )
 def test_all_that_is_kept_is_drawn(draw: Callable[..., None], kept: Callable[[], object], tmp_path: Path) -> None:
     draw(kept(), tmp_path / "chart.png")
     assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_st_lpips_of_the_exports_steps_is_drawn_where_all_have_it(tmp_path: Path) -> None:
-    rows, heights = read_json(KEPT / "waterfall.json"), []
-    for name in (None, "actor"):
-        measured = [row | {"st_lpips": 0.05 if row["subject"] == name else None} for row in rows]
-        charts.waterfall(measured, tmp_path / "chart.png")
-        with Image.open(tmp_path / "chart.png") as picture:
-            heights.append(picture.height)
-    assert heights[0] < heights[1]
-
-
-@pytest.mark.parametrize(
-    ("of", "title"),
-    [
-        ({"split": "validate", "images": 6}, "somebody, 6 pictures for validation"),
-        ({"split": "holdout", "images": 24}, "somebody, 24 pictures held out"),
-        ({}, "somebody"),  # of an older file
-    ],
-)
-def test_the_exports_steps_say_which_pictures_they_were_measured_on(of: dict[str, Any], title: str) -> None:
-    step = {"name": "model", "psnr": 30.0, "mesh_bytes": 0, "texture_bytes": 0}
-    (row,) = waterfall_rows({"subject": "somebody", "steps": [step]} | of)
-    assert charts.waterfall_title(row) == title
-    assert row == {"subject": "somebody"} | of | step
 
 
 def test_figures_that_stand_in_the_docs_are_those_that_are_kept() -> None:

@@ -15,9 +15,9 @@ from facefolds_core.errors import UserError
 from facefolds_core.files import read_json, write_json
 from facefolds_core.params import CaptureParams
 from facefolds_core.paths import SubjectFolders
-from stages.capture import capture
+from facefolds_core.pipeline.capture import capture
 
-PARAMS = CaptureParams(cameras=3, frames=2, height=48, width=32)
+PARAMS = CaptureParams(cameras=3, frames=2, height=48, width=32, plates=False)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ ENTRIES: list[tuple[str, Edit, str, str]] = [
     ("ragged", {"transform_matrix": [[1, 0], [0]]}, "wrong shape", "transform_matrix"),
     ("words", {"transform_matrix": "identity"}, "wrong shape", "transform_matrix"),
     ("singular", {"transform_matrix": np.diag([1, 1, 0, 1]).tolist()}, "no rotation", "transform_matrix"),
-    ("nan", {"transform_matrix": (np.eye(4) * np.nan).tolist()}, "not finite", "transform_matrix"),
+    ("nan", {"transform_matrix": (np.eye(4) * np.nan).tolist()}, "not a number", "transform_matrix"),
     ("no focal length", {"fl_x": None, "fl_y": None}, "no focal length", "frames[1]"),
     ("focal length 0", {"fl_x": 0}, "singular", "frames[1]"),
     ("focal word", {"fl_x": "long"}, "not a number", "fl_x"),

@@ -22,8 +22,8 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import Subject
 from facefolds_core.params_file import Params, write_configs
 from facefolds_core.paths import SubjectFolders
-from stages.capture import capture
-from stages.normalize import normalize
+from facefolds_core.pipeline.capture import capture
+from facefolds_core.pipeline.normalize import normalize
 from tests.captures.fixtures import (
     RING,
     SEGMENT,

@@ -19,7 +19,7 @@ from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
-from stages.normalize import left_out
+from facefolds_core.pipeline.normalize import left_out
 from tests.captures.fixtures import (
     FACES,
     HEAD,

@@ -73,6 +73,6 @@ def test_the_actor_has_them_when_asked_and_they_agree_with_its_pictures(tmp_path
         assert np.abs(image[matte[..., 0] == 255].astype(int) - plate[matte[..., 0] == 255]).mean() > 10
 
 
-def test_by_default_the_actor_has_none(tmp_path: Path) -> None:
-    write_capture(tmp_path, CaptureParams(cameras=3, frames=1, height=16, width=16))
+def test_the_actor_has_none_without_being_asked(tmp_path: Path) -> None:
+    write_capture(tmp_path, CaptureParams(cameras=3, frames=1, height=16, width=16, plates=False))
     assert not (tmp_path / "plates").exists() and not (tmp_path / "mattes").exists()

@@ -19,7 +19,7 @@ from facefolds_core.paths import (
     subject_folders,
     subject_of_dvc_stage,
 )
-from stages.capture import capture
+from facefolds_core.pipeline.capture import capture
 from stages.common import run_stage
 from stages.configure import configure
 from tests.hostile.damage import fingerprint

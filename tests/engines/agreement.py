@@ -1,11 +1,13 @@
 """How near an engine comes to the reference on an asset: the figures and pictures of docs/guide/engines.md.
 
 python -m tests.engines.agreement blender data/actor/asset --picture docs/images/blender.jpg
+python -m tests.engines.agreement model_viewer data/actor/asset      # or three: the GLB, after `make package`
 """
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,6 +16,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from PIL import Image
+from playwright.sync_api import sync_playwright
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
@@ -22,8 +25,10 @@ from facefolds_core.cli.render import pick_level
 from facefolds_core.engines.godot import write_godot
 from facefolds_core.engines.usd import STAGE, write_usd
 from facefolds_core.geometry.cameras import Camera
+from tests.chromium import FLAGS, chromium
 from tests.engines import blender, godot
-from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr
+from tests.pictures import GREY_VALUE, expected_pictures, five_cameras, psnr, turned_cameras
+from tests.viewer import gltf_viewers
 
 Found = dict[tuple[str, int], NDArray[np.float64]]
 SHOWN = ("front", "left", "grazing")
@@ -52,19 +57,35 @@ def in_blender_by_usd(level: AssetLevel, cameras: list[Camera], frames: list[int
     return {(name, frames[0]): picture for name, picture in pictures.items()}
 
 
+def in_the_web(level: AssetLevel, cameras: list[Camera], place: Path, viewer: gltf_viewers.GltfViewer) -> Found:
+    """The GLB of the first frame in a viewer of glTF."""
+    write_glb(place / "a.glb", level, "head")
+    gltf_viewers.build(place, viewer)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+        found = gltf_viewers.pictures(browser, place, place / "a.glb", cameras)
+        browser.close()
+    return {(name, 0): picture for name, picture in found.items()}
+
+
 def main(
-    engine: Annotated[Literal["blender", "godot", "usd"], typer.Argument()],
+    engine: Annotated[Literal["blender", "godot", "usd", "three", "model_viewer"], typer.Argument()],
     asset: Annotated[Path, typer.Argument(help="Folder of the asset.")],
     size: Annotated[int, typer.Option(help="Pixels of a side.")] = 320,
     level: Annotated[str | None, typer.Option(help="Level of detail; the full one if left out.")] = None,
     picture: Annotated[Path | None, typer.Option(help="JPEG to write: front, 45 degrees, side.")] = None,
 ) -> None:
-    """PSNR to the reference, five cameras, first, middle and last frame."""
+    """PSNR to the reference, five cameras, first, middle and last frame (GLB and USD: the first)."""
     whole = read_asset(asset)
     shown = pick_level(whole, level)
-    render = {"blender": in_blender, "godot": in_godot, "usd": in_blender_by_usd}[engine]
-    frames = [0] if engine == "usd" else sorted({0, whole.num_frames // 2, whole.num_frames - 1})
-    cameras = five_cameras(size)
+    web = engine in ("three", "model_viewer")
+    render: Callable[..., Found]
+    if web:
+        render = lambda level, cameras, _, place: in_the_web(level, cameras, place, engine)  # noqa: E731
+    else:
+        render = {"blender": in_blender, "godot": in_godot, "usd": in_blender_by_usd}[engine]
+    frames = [0] if web or engine == "usd" else sorted({0, whole.num_frames // 2, whole.num_frames - 1})
+    cameras = turned_cameras(size) if web else five_cameras(size)
     with tempfile.TemporaryDirectory() as place:
         found = render(shown, cameras, frames, Path(place))
     expected = expected_pictures(shown, cameras, frames)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.export import bake_reference
 from facefolds_core.export.bake import MIN_LIGHT, Baker, cast_codes, gather_rays, reproject, reprojection
 from facefolds_core.export.bake_kernel import accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
@@ -19,6 +18,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.hit_codes import SCALE
 from tests.ellipsoids import Ellipsoids
+from tests.export import bake_reference
 from tests.scenes import look_at_origin
 
 WINDOW: Window = (-0.6, 0.6, -0.6, 0.6)

@@ -27,10 +27,10 @@ from facefolds_core.params import (
     ReconstructParams,
     TextureParams,
 )
+from facefolds_core.pipeline.choices import write_choice
 from facefolds_core.rendering import composite
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reflection import reflected_colours
-from stages.common import write_choice
 from tests.ellipsoids import Ellipsoids
 from tests.scenes import make_scene
 

@@ -20,19 +20,19 @@ import numpy as np
 from facefolds_core.errors import as_user_error
 from facefolds_core.files import PREFIX, write_json
 from facefolds_core.paths import SubjectFolders
+from facefolds_core.pipeline.bake import bake
+from facefolds_core.pipeline.capture import capture
+from facefolds_core.pipeline.compress import compress
+from facefolds_core.pipeline.decimate import decimate
+from facefolds_core.pipeline.evaluate import evaluate
+from facefolds_core.pipeline.normalize import normalize
+from facefolds_core.pipeline.reconstruct import reconstruct
+from facefolds_core.pipeline.sample import sample
+from facefolds_core.pipeline.subject import subject
+from facefolds_core.pipeline.texture import texture
+from facefolds_core.pipeline.train import train
 from facefolds_core.training import patience
-from stages.bake import bake
-from stages.capture import capture
-from stages.compress import compress
 from stages.configure import configure
-from stages.decimate import decimate
-from stages.evaluate import evaluate_subject
-from stages.normalize import normalize
-from stages.reconstruct import reconstruct
-from stages.sample import sample
-from stages.subject import subject
-from stages.texture import texture
-from stages.train import train_stage
 from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, fingerprint, outcome
 
@@ -43,14 +43,14 @@ STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
     "capture": (capture, ("capture",)),
     "normalize": (normalize, ("scene",)),
     "subject": (subject, ("subject",)),
-    "train": (train_stage, ("model",)),
+    "train": (train, ("model",)),
     "sample": (sample, ("samples",)),
     "reconstruct": (reconstruct, ("surfaces",)),
     "decimate": (decimate, ("meshes",)),
     "texture": (texture, ("resampled",)),
     "bake": (bake, ("textures",)),
     "compress": (compress, ("asset", "asset.glb")),
-    "evaluate": (evaluate_subject, ("evaluation", "metrics.json")),
+    "evaluate": (evaluate, ("evaluation", "metrics.json")),
 }
 PARAMS = """\
 subjects:
@@ -68,7 +68,7 @@ reconstruct: {}
 decimate: {resolution: 8}
 texture: {resolution: 16}
 bake: {hold: 0.02}
-compress: {photos: 1, video: {codec: [h264, vp9]}}
+compress: {photos: 1, levels: [], video: {codec: [h264, vp9], target_psnr: null, preset: slow}}
 evaluate: {}
 """
 DISK = 32 * 2**20

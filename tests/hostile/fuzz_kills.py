@@ -47,7 +47,7 @@ reconstruct: {method: poisson}
 decimate: {resolution: 12}
 texture: {resolution: 32}
 bake: {}
-compress: {}
+compress: {levels: [], video: {target_psnr: null, preset: slow}}
 evaluate: {}
 """
 

@@ -41,9 +41,9 @@ def test_sizes_that_cannot_be(asset: Path, tmp_path: Path, size: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["x" * 5000, "/dev/null", "nowhere", "a\nb"])
-@pytest.mark.parametrize("command", ["validate", "render", "export-godot", "export glb", "view"])
+@pytest.mark.parametrize("command", ["validate", "render", "export godot", "export glb", "view"])
 def test_folders_that_are_none(tmp_path: Path, command: str, name: str) -> None:
-    more = {command: [tmp_path / "out"] for command in ("export-godot", "export glb")}
+    more = {command: [tmp_path / "out"] for command in ("export godot", "export glb")}
     more |= {"render": ["--out", tmp_path / "a.png"], "view": ["--no-browser"]}
     assert "no such folder" in refused(*command.split(), name, *more.get(command, []))
 
@@ -54,7 +54,7 @@ def test_an_exporter_that_is_none(asset: Path, tmp_path: Path) -> None:
 
 def test_a_file_in_place_of_the_folder_to_write(asset: Path, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
-    assert "a file stands" in refused("export-godot", asset, tmp_path / "out")
+    assert "a file stands" in refused("export", "godot", asset, tmp_path / "out")
     assert (tmp_path / "out").read_text() == "mine"
 
 

@@ -43,5 +43,5 @@ def test_bits_of_a_mesh_follow_from_the_error_that_is_allowed() -> None:
     assert coarse.mesh.quantization_bits < fine.mesh.quantization_bits <= 20
     assert coarse.mesh.compression_level == 3
     assert asked.fitted(layers, []) == asked  # nobody sees it
-    exact = LevelSetting.of(PARAMS.model_copy(update={"mesh": MeshCodec(quantization_bits=11)}))
+    exact = LevelSetting.of(PARAMS.model_copy(update={"mesh": MeshCodec(max_error_pixels=None, quantization_bits=11)}))
     assert exact.fitted(layers, cameras) == exact

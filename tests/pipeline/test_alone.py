@@ -12,11 +12,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-import stages.common
 from facefolds_core.errors import UserError
 from facefolds_core.locks import try_lock
 from facefolds_core.paths import SubjectFolders
-from stages.common import alone
+from facefolds_core.pipeline import running
+from facefolds_core.pipeline.running import alone
 
 STAGE = """
 import os, sys, time
@@ -70,7 +70,7 @@ def has_ended(pid: int, within: float) -> bool:
 
 
 def test_a_second_run_is_told_who_is_at_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stages.common, "LOCK_WAIT", 0.2)
+    monkeypatch.setattr(running, "LOCK_WAIT", 0.2)
     folders = SubjectFolders(tmp_path / "x")
     says = f"another run of train is at work: process {os.getpid()}"
     with (

@@ -15,9 +15,6 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from facefolds_core.cli import COMMANDS, app, view
-from facefolds_core.files import read_json
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.scoring.waterfall import STEPS
 from facefolds_core.sweeps.table import read_runs
 from tests.pipeline.tiny import TinyProject
 
@@ -37,7 +34,7 @@ def facefolds(*words: str | Path) -> str:
     return done.output
 
 
-ELSEWHERE = ["vectors", "export-html", "submission", "run"]
+ELSEWHERE = ["vectors", "export-html", "run"]
 
 
 def test_all_commands_are_here() -> None:
@@ -69,7 +66,7 @@ def test_render_a_film(tmp_path: Path) -> None:
 def test_export(tmp_path: Path) -> None:
     facefolds("export", "glb", ASSET, tmp_path / "a.glb")
     assert (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
-    facefolds("export-godot", ASSET, tmp_path / "godot", "--level", "small")
+    facefolds("export", "godot", ASSET, tmp_path / "godot", "--level", "small")
     assert len(list((tmp_path / "godot").glob("layer_*.mesh"))) == 3
 
 
@@ -88,17 +85,6 @@ def test_scores(project: TinyProject) -> None:
     scores = json.loads((project.root / "data" / "actor" / "metrics.json").read_text())
     said = facefolds("scores")
     assert f"{scores['asset']['psnr_subject']:.2f}" in said and "data/actor/asset" in said
-
-
-def test_waterfall(project: TinyProject) -> None:
-    said = facefolds("waterfall", "data/actor", "--frames", "1")
-    written = read_json(SubjectFolders(project.root / "data" / "actor").waterfall)
-    steps = written["steps"]
-    assert f"pictures: {written['images']}, " in said and f"region: {written['region']}, " in said
-    assert [step["name"] for step in steps] == list(STEPS)
-    assert all(0 < step["ssim_high"] < 1 and f"{step['ssim']:.4f}" in said for step in steps)
-    shipped = json.loads((project.root / ASSET / "manifest.json").read_text())["levels"][-1]
-    assert steps[-1]["mesh_bytes"] == sum(layer["bytes"] for layer in shipped["layers"])
 
 
 def test_view(project: TinyProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,12 +116,11 @@ def checkout(project: TinyProject) -> Iterator[TinyProject]:
     subprocess.run(["rm", "-rf", ".git", ".gitignore"], cwd=project.root, check=True)
 
 
-def test_collect_and_recommend(checkout: TinyProject, tmp_path: Path) -> None:
+def test_collect(checkout: TinyProject, tmp_path: Path) -> None:
     facefolds("collect", "--out", tmp_path / "sweep.parquet")
     (own,) = (run for run in read_runs(tmp_path / "sweep.parquet") if run.subject == "actor")
     scores = json.loads((checkout.root / "data" / "actor" / "metrics.json").read_text())
     assert own.figures["psnr_subject"] == scores["asset"]["psnr_subject"]
-    assert "workspace" in facefolds("recommend", tmp_path / "sweep.parquet", "--subject", "actor", "--max-bytes", "1e9")
 
 
 def test_doctor() -> None:

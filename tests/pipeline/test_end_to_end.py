@@ -83,11 +83,6 @@ def test_a_stabilised_capture_runs_to_the_end(project: TinyProject) -> None:
     assert metrics_of(project, "stabilised")["images"] == 4  # two held-out cameras, two frames
 
 
-def test_what_its_export_loses_is_measured_where_cameras_move(project: TinyProject) -> None:
-    status, output = project.run("python", "-m", "facefolds_core", "waterfall", "data/stabilised", "--frames", "1")
-    assert status == 0, output
-
-
 def test_the_explicit_model_runs_to_the_end(project: TinyProject) -> None:
     assert metrics_of(project, "fast")["asset"]["psnr_subject"] > 10
 

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
@@ -47,9 +48,13 @@ class GridProject:
         # Not PYTHONPATH: an experiment's own copy of the project must be the one that runs.
         kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
         variables = {**kept, "PATH": path, "RAN": str(self.ran), "DVC_NO_ANALYTICS": "1"}
-        done = subprocess.run(command, cwd=self.root, env=variables, capture_output=True, text=True, timeout=300)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
+        # Not a pipe: a queue's workers may hold on to it after their command's end.
+        with tempfile.TemporaryFile("w+") as printed:
+            done = subprocess.run(command, cwd=self.root, env=variables, stdout=printed, stderr=printed, timeout=300)
+            printed.seek(0)
+            text = printed.read()
+        assert done.returncode == 0, text
+        return text
 
     def stages_run(self) -> Counter[str]:
         """How often each stub ran since this was last asked."""

@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.errors import UserError
 from facefolds_core.files import write_json
-from stages.sample import _key_frames
+from facefolds_core.pipeline.sample import _key_frames
 from tests.scoring.fakes import flat_scene
 
 

@@ -56,10 +56,10 @@ def test_words_in_the_code_rerun_configure_alone(project: TinyProject) -> None:
 
 
 def test_code_that_the_stage_does_not_use_does_not_rerun_it(project: TinyProject) -> None:
-    change(project, "stages/train.py", "PSNR {report", "psnr {report")
+    change(project, "facefolds_core/pipeline/train.py", "PSNR {report", "psnr {report")
     assert ran(project) == ["configure"]
 
 
 def test_code_that_it_uses_does(project: TinyProject) -> None:
-    change(project, "stages/capture.py", "a note of", "noted")
+    change(project, "facefolds_core/pipeline/capture.py", "a note of", "noted")
     assert ran(project) == ["capture@one", "capture@two", "configure"]

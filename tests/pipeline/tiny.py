@@ -32,7 +32,7 @@ subjects:
       preset: fast
       layers: 3
       iterations: 130
-capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true}
+capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true, plates: false}
 subject: {iterations: 150}
 train: {preset: quick}
 sample: {resolution: 64}

@@ -5,7 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.rendering.intersection import MISS, EmbreeMesh, brute_force_hits
+from facefolds_core.rendering.intersection import MISS, EmbreeMesh, TriangleHits, hits_in, moeller_trumbore
+
+
+def brute_force_hits(
+    vertices: np.ndarray, faces: np.ndarray, origins: np.ndarray, directions: np.ndarray
+) -> TriangleHits:
+    """Nearest hits by trying every triangle for every ray, in float64: the reference for `EmbreeMesh`."""
+    triangles = np.asarray(vertices, np.float64)[faces]
+    nearest = np.full(len(origins), MISS, np.int32)
+    if len(triangles):
+        t, u, v = moeller_trumbore(origins[:, None], directions[:, None], triangles)
+        inside = (t > 0) & (u >= 0) & (v >= 0) & (u + v <= 1)
+        nearest = np.where(inside.any(1), np.where(inside, t, np.inf).argmin(1), MISS).astype(np.int32)
+    return hits_in(triangles, nearest, origins, directions)
 
 
 def folded_sheet(rng: np.random.Generator, n: int = 12) -> tuple[np.ndarray, np.ndarray]:

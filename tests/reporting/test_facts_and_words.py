@@ -15,8 +15,7 @@ from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import charts, tables, words
 from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts, read_images
 from facefolds_core.reporting.pictures import as_scored
-from facefolds_core.reporting.verdicts import verdicts
-from facefolds_core.scoring.record import AngleBin, Seen, View
+from facefolds_core.scoring.record import View
 from facefolds_core.scoring.report import write_per_image
 from tests.reporting.tiny import FRAMES, make_subject, scores
 from tests.scenes import look_at_origin
@@ -49,7 +48,7 @@ def test_garbled_scores_are_named(tmp_path: Path, text: str) -> None:
 def test_scores_alone_are_enough_to_read(tmp_path: Path) -> None:
     write_text(tmp_path / "metrics.json", '{"asset": {}, "cost": {}}')
     facts = read_facts(SubjectFolders(tmp_path))
-    assert (facts.images, facts.curves, facts.waterfall, facts.config) == ((), (), (), {})
+    assert (facts.images, facts.curves, facts.config) == ((), (), {})
     assert facts.training is None
     assert all(stage.seconds is None for stage in facts.stages)
 
@@ -93,77 +92,16 @@ def test_a_curve_of_one_point_is_none(tmp_path: Path) -> None:
         (words.duration(389), "6\u00a0min 29\u00a0s"),
         (words.duration(None), "–"),
         (words.percent(0.125), "12.5\u00a0%"),
-        (words.listed(["5", "6", "7"]), "5, 6 and 7"),
     ],
 )
 def test_figures_as_people_read_them(found: str, expected: str) -> None:
     assert found == expected
 
 
-METRICS = {
-    "images": 3,
-    "images_with_mask": 2,
-    "asset": {"psnr": 11.0, "ssim": 0.5, "psnr_subject": 24.5, "ssim_subject": 0.9},
-    "diffuse": {"psnr": 11.5, "psnr_subject": 24.75},
-    "cost": {"train_seconds": 95.5, "device": "cpu", "iterations": 460},
-}
-
-
-def test_the_summary_tells_the_loss_of_the_export() -> None:
-    assert words.quality_words(METRICS) == (
-        "On 2 held-out pictures the asset reaches 24.50 dB PSNR and 0.900 SSIM of the subject. The model without its "
-        "view branch, of which the asset is made, reaches 24.75 dB: the export costs 0.25 dB."
-    )
-
-
-def test_the_summary_without_masks_speaks_of_the_whole_frame() -> None:
-    metrics = METRICS | {"asset": {"psnr": 11.75, "ssim": 0.5, "psnr_subject": None}}
-    text = words.quality_words(metrics)
-    assert "over the whole frame" in text
-    assert "adds 0.25 dB" in text
-    assert "not known where the subject is" in text
-
-
-@pytest.mark.parametrize(
-    ("before", "now", "word"), [(30.0, 30.04, "the same"), (30.0, 30.06, "better"), (30.0, 29.9, "worse")]
-)
-def test_a_reference_run_is_compared_as_the_eye_would(before: float, now: float, word: str) -> None:
-    (row,) = verdicts({"asset": {"psnr_subject": now, "psnr": 1.0}}, {"asset": {"psnr_subject": before, "psnr": 9.0}})
-    assert (row["name"], row["word"]) == ("PSNR of the subject, dB", word)
-
-
-def test_less_is_better_of_flicker_and_bytes() -> None:
-    now = {"asset": {"flicker": 0.02}, "cost": {"mesh_bytes": 50, "texture_bytes": 40}}
-    before = {"asset": {"flicker": 0.03}, "cost": {"mesh_bytes": 60, "texture_bytes": 40}}
-    assert [row["word"] for row in verdicts(now, before)] == ["better", "better"]
-    assert [row["word"] for row in verdicts(before, now)] == ["worse", "worse"]
-
-
 def test_cameras_for_validation_are_not_in_the_heat_map(tmp_path: Path) -> None:
     checked = [replace(one, split="validate") for one in scores(True)]
     write_per_image([*scores(True), *checked], tmp_path / "per_image.parquet")
     assert len(read_images(tmp_path / "per_image.parquet")) == FRAMES
-
-
-def test_the_summary_names_the_layers_that_make_up_half() -> None:
-    seen = Seen((), AngleBin(0, 90, 0, None, None), (0.1, 0.4, 0.3, 0.2), (1,) * 4, (0.5,) * 4, True)
-    text = words.layer_words(seen)
-    assert text.startswith("70\u00a0% of what is seen comes from layers 2 and 3, counted from outside; layer 1 adds")
-
-
-def test_the_summary_names_the_angles_of_least_and_greatest_error() -> None:
-    bins = (AngleBin(0, 15, 0.5, 0.1, 0.2), AngleBin(15, 30, 0.4, 0.1, 0.1), AngleBin(30, 45, 0.001, 0.9, 0.9))
-    seen = Seen(bins, AngleBin(0, 90, 0.0, None, None), (1.0,), (1,), (1,), True)
-    text = str(words.angle_words(seen))
-    assert "least at 15°–30° (0.100 of the full range) and greatest at 0°–15° (0.200). None of" in text
-    assert "pixels" not in str(words.angle_words(replace(seen, masked=False)))
-
-
-def test_the_summary_names_the_step_that_loses_most() -> None:
-    steps = tuple({"name": name, "psnr": psnr} for name, psnr in (("a", 25.0), ("b", 24.0), ("c", 24.5), ("d", None)))
-    assert words.export_words(steps) == "Of the export's steps, “b” loses most: 1.00 dB."
-    assert words.export_words(steps[1:3]) == "No step of the export loses PSNR."
-    assert words.export_words(()) is None
 
 
 def test_a_heat_map_with_gaps() -> None:
@@ -198,12 +136,6 @@ def test_a_line_chart_of_any_range_is_finite(values: tuple[float, float]) -> Non
     assert svg.count("<polyline") == 1
 
 
-def test_a_section_breaks_where_a_layer_is_not_met() -> None:
-    line = np.array([[0.0, 0], [1, 1], [np.nan, np.nan], [2, 2], [3, 3]])
-    assert charts.section([line], "x").count("M") == 2
-    assert charts.section([np.full((2, 2), np.nan)], "x") == ""
-
-
 def test_ink_is_read_on_any_colour() -> None:
     assert (charts.ink_on(0.0), charts.ink_on(1.0)) == ("#ffffff", "#000000")
 
@@ -212,13 +144,6 @@ def test_the_place_of_a_camera() -> None:
     found = tables.place_of(look_at_origin("left", 30, 20, 8))
     expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
     assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
-
-
-def test_figures_that_an_older_measurement_of_the_export_lacks_are_dashes() -> None:
-    old = {"name": "model", "psnr": 25.0, "triangles": 0, "mesh_bytes": 0, "texture_bytes": 0}
-    new = old | {"name": "sampled", "ssim": 0.91234, "ssim_high": 0.85, "st_lpips": 0.04567}
-    cells = [[row[key] for key in ("ssim", "ssim_high", "st_lpips")] for row in tables.waterfall([old, new])]
-    assert cells == [["–", "–", "–"], ["0.912", "0.850", "0.0457"]]
 
 
 def test_the_asset_is_held_against_the_photo_where_it_is_scored() -> None:

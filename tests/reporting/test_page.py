@@ -19,11 +19,9 @@ from facefolds_core.files import read_json, write_json
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.reporting import build
 from facefolds_core.reporting.build import make_report
-from facefolds_core.reporting.history import HISTORY_NAME
-from facefolds_core.reporting.index import make_index
 from facefolds_core.scoring.record import NAME
 from tests.assets import make_asset
-from tests.reporting.tiny import FRAMES, LAYERS, STEPS, make_subject
+from tests.reporting.tiny import FRAMES, LAYERS, make_subject
 
 
 @pytest.fixture(scope="module")
@@ -58,25 +56,10 @@ def test_nothing_is_missing_and_nothing_is_no_number(subject: SubjectFolders) ->
 
 
 def test_figures_that_are_no_numbers_are_dashes(copy: SubjectFolders) -> None:
-    for path in (copy.metrics, copy.waterfall, copy.timing("train")):
+    for path in (copy.metrics, copy.timing("train")):
         path.write_text(re.sub(r"(\d+\.\d+|300)(?=[,\n])", "NaN", path.read_text()))
     page = page_of(copy)
     assert not re.search(r"\b(nan|None|inf)\b", re.sub(r"data:image[^\"]*|<script>.*</script>", "", page, flags=re.S))
-    assert "reaches – dB" in page
-
-
-def test_each_step_of_the_export_has_its_figures(subject: SubjectFolders) -> None:
-    cells = r"<td>0\.900</td><td>0\.800</td><td>0\.0456</td>"
-    assert len(re.findall(cells, page_of(subject))) == len(STEPS)
-
-
-def test_the_steps_of_the_export_say_which_pictures_and_pixels_they_are_of(copy: SubjectFolders) -> None:
-    assert "6 pictures of cameras for validation, the pixels of the masks; each step" in page_of(copy)
-    found = json.loads(copy.waterfall.read_text())
-    write_json(copy.waterfall, found | {"split": "holdout", "region": "found", "images": 1})
-    assert "1 picture of cameras held out, the pixels of the model&#39;s own opacity; each step" in page_of(copy)
-    write_json(copy.waterfall, {"steps": found["steps"]})  # of an earlier version
-    assert '<p class="caption">Each step' in page_of(copy)
 
 
 def test_the_headline_says_over_which_pixels_it_is(copy: SubjectFolders) -> None:
@@ -87,7 +70,6 @@ def test_the_headline_says_over_which_pixels_it_is(copy: SubjectFolders) -> None
     write_json(copy.metrics, metrics | {"headline": "psnr_found", "matte": "found"})
     page = page_of(copy)
     assert "within the matte that was found, the pixels of the model&#39;s own opacity; held-out cameras" in page
-    assert "dB PSNR within the matte that was found, the pixels of the model&#39;s own opacity" in page
 
 
 def test_words_from_files_are_escaped(subject: SubjectFolders) -> None:
@@ -104,7 +86,6 @@ def test_what_was_fitted_is_worded(subject: SubjectFolders) -> None:
         ("scene", "dvc repro normalize@somebody"),
         ("evaluation", "dvc repro evaluate@somebody"),
         ("training", "dvc repro train@somebody"),
-        ("waterfall", "facefolds waterfall data/somebody"),
         ("../.config", "dvc repro configure"),
     ],
 )
@@ -119,13 +100,12 @@ def test_with_scores_and_asset_alone_there_is_a_page(copy: SubjectFolders) -> No
         if path.is_dir() and path != copy.asset:
             shutil.rmtree(path)
     shutil.rmtree(copy.config)
-    assert page_of(copy).count('class="missing"') == 7
+    assert page_of(copy).count('class="missing"') == 5
 
 
 def test_without_masks_the_whole_frame_is_spoken_of(tmp_path: Path) -> None:
     page = page_of(make_subject(tmp_path / "bare", masks=False))
-    assert "not known where the subject is" in page
-    assert "no layer met" not in page
+    assert "over the whole frame" in page
 
 
 def test_what_is_not_well_stands_at_the_head(copy: SubjectFolders) -> None:
@@ -138,37 +118,25 @@ def test_what_is_not_well_stands_at_the_head(copy: SubjectFolders) -> None:
     assert page.index("not well") < page.index('class="tiles"')
 
 
+def test_the_asset_has_one_size(copy: SubjectFolders) -> None:
+    """Meshes, video and reflection, as the scores count them."""
+    assert '<dt>Size</dt><dd class="value">7\u00a0KB</dd>' in page_of(copy)
+
+
+def test_a_figure_that_is_not_there_leaves_no_empty_tile(copy: SubjectFolders) -> None:
+    metrics = json.loads(copy.metrics.read_text())
+    del metrics["cost"]["train_seconds"], metrics["cost"]["device"]
+    write_json(copy.metrics, metrics)
+    tiles = page_of(copy).split('class="tiles"')[1].split("</dl>")[0]
+    assert "<dt>Triangles</dt>" in tiles and "<dt>Training</dt>" not in tiles
+    assert 'class="value">–' not in tiles and 'class="note"></dd>' not in tiles
+
+
 def test_the_film_of_every_held_out_camera_is_in_it(subject: SubjectFolders) -> None:
     page = page_of(subject)
     listed = json.loads(page.split('id="films-data">')[1].split("</script>")[0])
     assert [(film["camera"], len(film["frames"])) for film in listed] == [("cam3", FRAMES)]
     assert page.index('id="compare"') < page.index("<video")
-
-
-def test_a_reference_run_gets_a_verdict(copy: SubjectFolders, tmp_path: Path) -> None:
-    reference = json.loads(copy.metrics.read_text())
-    reference["asset"]["psnr_subject"] += 1
-    write_json(tmp_path / "before.json", reference)
-    page = make_report(copy, tmp_path / "before.json").read_text()
-    assert "Beside the reference: <a" in page and ">worse in PSNR of the subject</a>" in page and ">worse</td>" in page
-    assert "Beside the reference" not in page_of(copy)
-    shutil.copy(tmp_path / "before.json", copy.root / "reference.json")
-    assert ">worse in PSNR of the subject</a>" in page_of(copy)
-
-
-def test_the_run_before_gets_a_verdict(copy: SubjectFolders) -> None:
-    assert "the run before" not in page_of(copy)
-    metrics = json.loads(copy.metrics.read_text())
-    metrics["asset"]["psnr_subject"] += 1
-    write_json(copy.metrics, metrics)
-    for page in (page_of(copy), page_of(copy)):  # made again, it is no other run
-        assert "Beside the run before (" in page and ">better in PSNR of the subject</a>" in page
-
-
-def test_garbled_notes_of_earlier_runs_are_named(copy: SubjectFolders) -> None:
-    write_json(copy.root / HISTORY_NAME, [{"made": "today"}])
-    with pytest.raises(UserError, match="notes of earlier runs are garbled"):
-        make_report(copy)
 
 
 def test_frames_have_one_name_everywhere(subject: SubjectFolders) -> None:
@@ -180,25 +148,6 @@ def test_frames_have_one_name_everywhere(subject: SubjectFolders) -> None:
     assert [f"cam3, frame {name}" in page for name in names] == [True] * FRAMES
     assert f"Frame {names[FRAMES // 2]}, decoded" in page
     assert f"camera cam3, frame {names[0]};" in page  # the worst, at the head
-
-
-def test_the_index_lists_all_subjects(subject: SubjectFolders) -> None:
-    page_of(subject)
-    page = make_index(subject.root.parent).read_text()
-    assert f'href="{subject.root.name}/report.html"' in page and "of the subject" in page and ">evaluated<" in page
-
-
-def test_the_index_says_how_far_the_others_are(tmp_path: Path) -> None:
-    for name in ("waiting", "trained"):
-        write_json(tmp_path / ".config" / name / "entry.json", {})
-    for stage, seconds in (("capture", 2.0), ("normalize", 3.0), ("train", 70.0)):
-        write_json(tmp_path / ".timings" / "trained" / f"{stage}.json", {"seconds": seconds})
-    page = make_index(tmp_path).read_text()
-    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", line) for line in page.splitlines() if '<th scope="row"' in line]
-    assert [(row[0], row[2], row[-2]) for row in rows] == [
-        ("trained", "made up to train", "75\N{NO-BREAK SPACE}s"),
-        ("waiting", "not begun", "–"),
-    ]
 
 
 def test_an_asset_of_another_run_is_refused(copy: SubjectFolders) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from PIL import Image
+
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.facts import fact
@@ -11,7 +13,6 @@ from facefolds_core.files import write_json, write_text
 from facefolds_core.params import section_of
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.scoring.analysis import Sums, shape_of
 from facefolds_core.scoring.films import FilmFolder
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
@@ -22,7 +23,6 @@ from tests.scenes import make_scene
 
 FRAMES = 3
 LAYERS = 3
-STEPS = ("model", "sampled", "shipped")
 
 
 def scores(subject: bool) -> list[ImageScore]:
@@ -43,13 +43,12 @@ def write_seen(folders: SubjectFolders, masks: bool) -> None:
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     (index,) = scene.indices("holdout")
     truths, opacity = scene.open_frames(), scene.open_masks()
-    hits, sums, panels = AssetCaster(asset).cast(scene.cameras[index]), Sums(asset.layers), []
+    hits, panels = AssetCaster(asset).cast(scene.cameras[index]), []
     found = {(s.frame, s.variant): s for s in scores(masks)}
     for k, textures in enumerate(asset.frames()):
         frame = scene.frame_ids[k]
         picture, truth = shown(composite(hits, textures)[0]), truths.image(index, k) / 255.0
         mask = None if opacity is None else opacity.image(index, k)[..., 0] / 255.0
-        sums.add_picture(scene.cameras[index], hits, textures, picture - truth, mask)
         both = found[frame, "model"], found[frame, "asset"]
         panels.append(Panel(scene.cameras[index].name, frame, truth, picture, picture, *both, mask))
     rolls = FilmFolder(folders.evaluation, 30.0, 18)
@@ -57,7 +56,7 @@ def write_seen(folders: SubjectFolders, masks: bool) -> None:
         assert roll is not None
         for panel in panels:
             roll.add(panel.frame, panel.truth, panel.shown)
-    write_record(folders.evaluation, panels, panels[0], sums.result(), shape_of(asset), asset, rolls.files)
+    write_record(folders.evaluation, panels, panels[0], asset, rolls.files)
 
 
 def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
@@ -67,7 +66,9 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
     if not masks:
         (folders.scene / "masks.arrow").unlink()
     make_asset(folders.asset, layers=LAYERS, frames=FRAMES, resolution=32)
+    Image.new("RGB", (24, 32), (90, 60, 40)).save(folders.asset / "poster.jpg")
     cost = {"train_seconds": 12.5, "iterations": 300, "device": "cpu (2 threads)", "triangles": 726}
+    cost |= {"mesh_bytes": 1000, "texture_bytes": 2000, "reflection_bytes": 4000}
     write_json(folders.metrics, metrics_json("spheres", scores(masks), cost))
     folders.evaluation.mkdir()
     write_per_image(scores(masks), folders.evaluation / "per_image.parquet")
@@ -80,12 +81,4 @@ def make_subject(root: Path, masks: bool = True) -> SubjectFolders:
         write_json(folders.timing(stage), {"stage": stage, "seconds": 10.0 + i})
     for name in ("train", "evaluate"):
         write_json(folders.config / f"{name}.json", section_of(name, {}).model_dump(mode="json"))
-    steps = [
-        {"name": name, "psnr": 25.0 - i, "triangles": 0, "mesh_bytes": 0, "texture_bytes": i}
-        | {"ssim": 0.9, "ssim_high": 0.8, "st_lpips": 0.0456}
-        for i, name in enumerate(STEPS)
-    ]
-    write_json(
-        folders.waterfall, {"subject": "spheres", "region": "true", "split": "validate", "images": 6} | {"steps": steps}
-    )
     return folders

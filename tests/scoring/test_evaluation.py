@@ -142,13 +142,6 @@ def test_an_asset_with_another_number_of_frames_is_refused(tmp_path: Path) -> No
         evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(pictures()[:2]), EvaluateParams(), NO_PERCEPTUAL)
 
 
-def test_frames_between_the_photos_are_not_scored(tmp_path: Path) -> None:
-    between = 255 - pictures()
-    twice = np.stack([pictures(), between], 1).reshape(2 * FRAMES, SIZE, SIZE, 3)
-    found = evaluate(flat_scene(tmp_path), tiny_model(), flat_asset(twice), EvaluateParams(), NO_PERCEPTUAL)
-    assert [s.values["psnr"] for s in found.scores if s.variant == "asset"] == [MAX_PSNR] * FRAMES
-
-
 def test_nan_in_a_rendering_is_caught(tmp_path: Path) -> None:
     model = tiny_model(view_bias=float("nan"))
     with pytest.raises(UserError, match="not finite") as error:
@@ -174,12 +167,6 @@ def test_the_worst_picture_is_kept_though_it_is_not_on_the_sheet(tmp_path: Path)
     assert [panel.frame for panel in found.panels] == ["000000", "000002"]
     assert found.worst.frame == "000001"
     np.testing.assert_array_equal(found.worst.asset, shown[1] / 255)
-
-
-def test_one_opaque_layer_is_all_that_is_seen(tmp_path: Path) -> None:
-    seen = run(tmp_path, masks={k: half_mask() for k in range(FRAMES)}).seen
-    assert (seen.contribution, seen.reach, seen.greatest, seen.masked) == ((1.0,), (1.0,), (1.0,), True)
-    assert sum(one.share for one in seen.angles) == pytest.approx(1)
 
 
 def test_without_a_photo_there_is_nothing_to_score(tmp_path: Path) -> None:

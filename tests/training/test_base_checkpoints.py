@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -58,9 +57,9 @@ def counted(most: int = 1000) -> Iterator[list[int]]:
         yield done
 
 
-def make(scene: Scene, plan: TakePlan, folder: Path, begun: Path | None = None, **segments: object) -> dict[str, bytes]:
+def make(scene: Scene, plan: TakePlan, folder: Path, **segments: object) -> dict[str, bytes]:
     """Train the base; its files, but for the times."""
-    base = base_of(plan, scene, params(**segments), folder, folder / "log", begun)
+    base = base_of(plan, scene, params(**segments), folder, folder / "log")
     files = [path for path in sorted(base.folder.rglob("*")) if path.is_file() and path.name != "training.json"]
     return {str(path.relative_to(base.folder)): path.read_bytes() for path in files}
 
@@ -104,7 +103,7 @@ def test_a_base_with_a_reflection_goes_on_where_it_was(
     )
 
     def base(folder: Path) -> bytes:
-        made = base_of(plan, scene, lit, folder, folder / "log", None)
+        made = base_of(plan, scene, lit, folder, folder / "log")
         assert made.textures.reflection is not None
         return (made.folder / "model.safetensors").read_bytes()
 
@@ -119,20 +118,6 @@ def test_a_base_with_a_reflection_goes_on_where_it_was(
             with counted() as left:
                 assert base(tmp_path / f"{after}") == expected
             assert len(left) == STEPS - after
-
-
-def test_another_machine_goes_on_from_a_folder_that_is_shared(
-    whole: tuple[Scene, TakePlan, dict[str, bytes]], tmp_path: Path
-) -> None:
-    scene, plan, expected = whole
-    shared = tmp_path / "shared"
-    with counted(most=15), pytest.raises(KeyboardInterrupt):
-        make(scene, plan, tmp_path / "lost", shared, **OFTEN)
-    shutil.rmtree(tmp_path / "lost")
-    with counted() as left:
-        assert make(scene, plan, tmp_path / "other", shared, **OFTEN) == expected
-    assert len(left) == STEPS - 15
-    assert list(shared.glob("begun-*")) == []
 
 
 def test_it_is_not_written_more_often_than_asked(

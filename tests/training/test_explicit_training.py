@@ -19,6 +19,7 @@ from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.subject.outline import Profile
+from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import train_explicit
 from facefolds_core.training.explicit.plan import plan
@@ -152,7 +153,8 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    chosen = fit.Fit(Chart((0, 0, 0)), window, ones, ones, ones, ones, np.ones((4, 4, 3)), (128, 96), (), (), {}, 30.0)
+    maps, volume = (ones, ones, ones, ones, np.ones((4, 4, 3))), Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
+    chosen = fit.Fit(Chart((0, 0, 0)), window, *maps, (128, 96), (), (), volume, {}, 30.0)
     levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)

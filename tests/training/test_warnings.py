@@ -9,10 +9,12 @@ import numpy as np
 
 from facefolds_core.facts import fact
 from facefolds_core.geometry.chart import Chart
+from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.warnings import warnings_of
 from tests.scenes import make_scene
 
+EMPTY = Volume(np.zeros((2, 2, 2, 4), np.float32), np.zeros(3), 1.0)
 BACK, FARTHER = Chart((-0.3, 0.0, 0.0)), Chart((-0.4, 0.0, 0.0))
 
 WELL = Fit(
@@ -26,6 +28,7 @@ WELL = Fit(
     texels=(16, 16),
     reasons=(),
     notes=(),
+    volume=EMPTY,
     losses={BACK: 0.02, FARTHER: 0.3},
     start_psnr=30.0,
 )

@@ -22,7 +22,7 @@ from facefolds_core.params import CompressParams, VideoCodec
 from tests.assets import make_asset
 from tests.scenes import look_at_origin
 
-THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, keyframe_interval=4))
+THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, preset="slow", keyframe_interval=4))
 
 
 def file_entry(path: Path) -> dict[str, Any]:

@@ -7,7 +7,9 @@ import { Player } from "./player.js";
 import { Recovery } from "./recovery.js";
 import { KINDS } from "./shaders.js";
 import { asFile, linkTo } from "./sharing.js";
+import { surfaceUnder } from "./surface.js";
 import { connectControls } from "./ui/controls.js";
+import { Hotspots } from "./ui/hotspots.js";
 import { Overlays, showOwnPoster } from "./ui/overlays.js";
 import { PICTURE, STYLE, TEMPLATE } from "./ui/template.js";
 import { isOrbit } from "./viewstate.js";
@@ -154,6 +156,8 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#ends.push(watchSight(this, (seen) => player.setOnScreen(seen)));
     this.overlays.connect(player);
     this.#ends.push(connectControls(this));
+    const hotspots = new Hotspots(this, player);
+    this.#ends.push(() => hotspots.end());
     player.addEventListener("ready", () => this.#ready());
     player.addEventListener("error", ({ detail }) => this.#failed(detail));
     for (const name of FORWARDED) {
@@ -416,6 +420,19 @@ export class FacefoldsPlayer extends HTMLElement {
   /** @param {object} [camera] as for `setCamera` @returns {Promise<Blob>} the same as a PNG */
   async screenshot(camera) {
     return asFile(this.capture(camera));
+  }
+
+  /**
+   * What lies at a place of the window, for `data-surface` of a hotspot. @param {number} x @param {number} y CSS pixels, as
+   * `clientX` and `clientY` of an event @returns {string | null} u, v and depth; null: nothing is there
+   */
+  surfaceFromPoint(x, y) {
+    if (!this.ready) return null;
+    const { left, top, width, height } = this.#player.canvas.getBoundingClientRect();
+    const found = surfaceUnder(this.#player, [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height]);
+    if (!found) return null;
+    const deep = found.layer / Math.max(1, this.layers.length - 1);
+    return [...found.place, deep].map((number) => number.toFixed(4)).join(" ");
   }
 
   /** What is seen, as a file. @param {{mimeType?: string, qualityArgument?: number}} [options] by default a PNG */

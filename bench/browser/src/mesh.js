@@ -1,18 +1,20 @@
-// The floor: one opaque textured mesh, a layer of the asset's GLB. ?layer=NUMBER
+// The floor: one opaque textured mesh, a layer of the asset's GLB. ?first=INDEX&count=INDICES of its shell
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { offer, position } from "./common.js";
 
-const wanted = Number(new URLSearchParams(location.search).get("layer"));
+const [first, count] = ["first", "count"].map((name) => Number(new URLSearchParams(location.search).get(name)));
 const renderer = new THREE.WebGLRenderer({ antialias: false });
 renderer.setSize(innerWidth, innerHeight);
 document.body.append(renderer.domElement);
 const camera = new THREE.PerspectiveCamera(30, innerWidth / innerHeight, 0.01, 10);
 const { scene } = await new GLTFLoader().loadAsync("/heads/head.glb");
-const layers = [];
-scene.traverse((node) => node.isMesh && layers.push(node));
-layers.forEach((layer, i) => (layer.visible = i === wanted));
-Object.assign(layers[wanted].material, { transparent: false, depthWrite: true });
+const meshes = [];
+scene.traverse((node) => node.isMesh && meshes.push(node));
+meshes.forEach((mesh) => (mesh.visible = mesh.material.transparent));
+const shell = meshes.find((mesh) => mesh.visible);
+shell.geometry.setDrawRange(first, count);
+Object.assign(shell.material, { transparent: false, depthWrite: true });
 addEventListener("resize", () => {
   renderer.setSize(innerWidth, innerHeight);
   camera.aspect = innerWidth / innerHeight;

@@ -58,18 +58,6 @@ def camera_at(name: str, azimuth: float, elevation: float, width: int, height: i
     return Camera(name, K, np.concatenate([R, (-R @ centre)[:, None]], 1), width, height)
 
 
-def new_views(count: int) -> list[tuple[float, float]]:
-    """(azimuth, elevation) in degrees of views all over the rig, none of which it has: for scores on fresh pictures.
-
-    They walk in equal steps of azimuth, as the rig does; their elevations are half a turn of the golden ratio away.
-    """
-    low, high = _ELEVATIONS
-    return [
-        (_MAX_AZIMUTH * (2 * (k + 0.5) / count - 1), low + (high - low) * ((1.0 + (k + 0.5) * _GOLDEN) % 1.0))
-        for k in range(count)
-    ]
-
-
 def make_rig(params: CaptureParams) -> ActorRig:
     """The rig of a capture: a nearly frontal camera, inner views at every twelfth place, the rest spread evenly.
 

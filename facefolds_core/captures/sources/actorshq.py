@@ -22,9 +22,8 @@ import cv2
 import numpy as np
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, gather, inside, pictures_in
+from facefolds_core.captures.gathering import Calibration, Recognised, gather, inside, pictures_in
 from facefolds_core.captures.picture import Picture
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.params import CaptureParams, Subject

@@ -25,13 +25,10 @@ import numpy as np
 from trimesh.exchange.ply import load_ply
 
 from facefolds_core.captures.capture import Capture, Tracking
-from facefolds_core.captures.gathering import Array, Calibration, gather, inside
-from facefolds_core.captures.matching import chosen_segment
-from facefolds_core.captures.numbers import matrix_from
+from facefolds_core.captures.gathering import Array, Calibration, Recognised, chosen_segment, gather, inside
+from facefolds_core.captures.numbers import is_number, matrix_from, short
 from facefolds_core.captures.picture import Picture, ZipPicture, open_zip, read_member
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.tracked import check_extent, parse_pose, read_obj
-from facefolds_core.captures.values import is_number, short
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files import read_json

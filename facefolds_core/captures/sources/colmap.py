@@ -17,9 +17,8 @@ from pathlib import Path, PurePosixPath
 from facefolds_core.captures.arrangement import Shot, arrange, jitter, mean_calibration
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.colmap_model import ModelCamera, ModelImage, model_folder, read_model
-from facefolds_core.captures.gathering import Calibration, gather, inside, pictures_in
+from facefolds_core.captures.gathering import Calibration, Recognised, gather, inside, pictures_in
 from facefolds_core.captures.picture import FilePicture, Picture
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.params import CaptureParams, Subject

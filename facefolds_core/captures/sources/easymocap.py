@@ -24,12 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, footage, gather, inside, pictures_in
+from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside, pictures_in
 from facefolds_core.captures.images import decode_mask
+from facefolds_core.captures.numbers import short
 from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
 from facefolds_core.captures.picture import FilePicture, Picture
-from facefolds_core.captures.recognition import Recognised
-from facefolds_core.captures.values import short
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.params import CaptureParams, Subject

@@ -18,12 +18,18 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.captures.capture import Capture, Sound, View, closest_rotation, frame_rate, select_frames
+from facefolds_core.captures.gathering import (
+    Calibration,
+    Recognised,
+    cameras_with_pictures,
+    chosen_segment,
+    inside,
+    scaled_intrinsics,
+)
 from facefolds_core.captures.images import image_size
-from facefolds_core.captures.krt import Calibration, krt_reference, read_krt, scaled_intrinsics
+from facefolds_core.captures.krt import krt_reference, read_krt
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.captures.matching import cameras_with_pictures, chosen_segment
 from facefolds_core.captures.picture import FilePicture, Picture
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
@@ -40,7 +46,7 @@ def recognise(root: Path) -> Recognised | None:
     rest = is_folder(root / "images") and (is_folder(root / "tracked_mesh") or is_there(root / "frame_list.txt"))
     if not rest and not is_there(root / "KRT"):
         return None
-    segments = [path.name for path in _inside(root / "images") if path.is_dir()] if is_folder(root / "images") else []
+    segments = [path.name for path in inside(root / "images") if path.is_dir()] if is_folder(root / "images") else []
     if len(segments) < 2:
         return Recognised("a Multiface subject", root)
     return Recognised(f"a Multiface subject, segments {shorten(segments)}", root, {"segment": segments[0]})
@@ -113,22 +119,17 @@ def _segment(root: Path, wanted: str | None) -> str:
     folder = root / "images"
     for place in (root, folder):
         check_folder(place, "point `path` at a Multiface subject's folder, which holds KRT and images")
-    segments = [path.name for path in _inside(folder) if path.is_dir()] if folder.is_dir() else []
+    segments = [path.name for path in inside(folder) if path.is_dir()] if folder.is_dir() else []
     return chosen_segment(segments, wanted, folder, "download some: images/SEGMENT/CAMERA/FRAME.png")
 
 
 def _photos(folder: Path) -> dict[str, dict[str, Path]]:
     """Camera -> frame -> file, of what is there."""
     return {
-        camera.name: {path.stem: path for path in _inside(camera) if path.suffix.lower() == ".png"}
-        for camera in _inside(folder)
+        camera.name: {path.stem: path for path in inside(camera) if path.suffix.lower() == ".png"}
+        for camera in inside(folder)
         if camera.is_dir()
     }
-
-
-def _inside(folder: Path) -> list[Path]:
-    """What lies there, but for hidden files: a Mac leaves `._x.png` beside every x.png on disks of other systems."""
-    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
 
 
 def _listed(path: Path, segment: str) -> list[str]:
@@ -155,7 +156,7 @@ def _views(
     views = []
     for calibration, size in zip(used, sizes, strict=True):
         K = scaled_intrinsics(calibration.K, reference, size, centres)
-        lens = make_lens(K, calibration.distortion, *size, root / "KRT", f"camera {calibration.name}")
+        lens = make_lens(K, calibration.coefficients, *size, root / "KRT", f"camera {calibration.name}")
         pinhole = K if lens is None else lens.pinhole
         views.append(View(Camera(calibration.name, np.array(pinhole), closest_rotation(calibration.w2c), *size), lens))
     return tuple(views), note

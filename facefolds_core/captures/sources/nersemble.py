@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,17 +36,21 @@ from typing import Any
 import numpy as np
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, footage, gather, inside, pictures_in, view_of
+from facefolds_core.captures.gathering import (
+    Calibration,
+    Recognised,
+    chosen_segment,
+    footage,
+    gather,
+    inside,
+    pictures_in,
+)
 from facefolds_core.captures.images import Colour
-from facefolds_core.captures.matching import chosen_segment
-from facefolds_core.captures.numbers import matrix_from, read_npy
+from facefolds_core.captures.numbers import matrix_from, read_npy, short
 from facefolds_core.captures.picture import Picture
-from facefolds_core.captures.recognition import Recognised
-from facefolds_core.captures.values import short
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files import read_json
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import check_folder, check_regular, is_folder, is_regular
 
@@ -102,25 +106,6 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
         plates={c: plates[view.name] for c, view in enumerate(capture.views) if view.name in plates},
         left_out=(*capture.left_out, *facts),
     )
-
-
-def cameras_of(root: Path, names: Sequence[str], size: tuple[int, int]) -> list[Camera]:
-    """Cameras of the calibration, with or without pictures, for pictures of `size` (width, height).
-
-    Raises:
-        UserError: if the calibration is missing or garbled, or does not have one of the names.
-    """
-    known = {one.name: one for one in _calibrations(root, size)}
-    missing = [name for name in names if name not in known]
-    if missing:
-        raise UserError(
-            "cameras that the calibration does not have",
-            file=_calibration_file(root),
-            expected=f"some of {shorten(sorted(known), 30)}",
-            found=shorten(missing),
-            remedy="correct the names",
-        )
-    return [view_of(known[name], size, PIXEL_CENTRES).camera for name in names]
 
 
 def _calibration_file(root: Path) -> Path | None:

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, footage, gather, inside
+from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside
 from facefolds_core.captures.numbers import read_npy
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.geometry.cameras import HUGE

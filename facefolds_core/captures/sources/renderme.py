@@ -26,13 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.gathering import Calibration, gather, inside
-from facefolds_core.captures.matching import chosen_segment
+from facefolds_core.captures.gathering import Calibration, Recognised, chosen_segment, gather, inside
+from facefolds_core.captures.numbers import numbers_from
 from facefolds_core.captures.picture import Hdf5Picture, Picture, open_hdf5
-from facefolds_core.captures.recognition import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
-from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.reading import is_folder, is_regular
 
@@ -157,14 +155,4 @@ def _matrix(file: Path, place: str, group: Any, key: str, shapes: list[tuple[int
         raise UserError(
             "no such numbers", file=file, place=f"{place}/{key}", expected=expected, found=what, remedy=_REMEDY
         )
-    if not (np.abs(found) <= HUGE).all():
-        expected = f"finite numbers, none above {HUGE:g}"
-        raise UserError(
-            "numbers beyond sense",
-            file=file,
-            place=f"{place}/{key}",
-            expected=expected,
-            found=str(found.ravel()[:9].tolist()),
-            remedy=_REMEDY,
-        )
-    return found.astype(float)
+    return numbers_from(found.ravel().tolist(), file, f"{place}/{key}", _REMEDY).reshape(found.shape)

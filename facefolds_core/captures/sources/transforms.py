@@ -20,14 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.arrangement import Shot, arrange, jitter, mean_calibration
+from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, jitter, mean_calibration, wrong
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
-from facefolds_core.captures.gathering import Calibration
+from facefolds_core.captures.gathering import Calibration, Recognised
 from facefolds_core.captures.images import image_size
 from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
-from facefolds_core.captures.recognition import Recognised
-from facefolds_core.captures.values import json_matrix, json_number, short, wrong
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
@@ -72,7 +71,7 @@ class Entry:
 
 def _number(entry: Entry, key: str) -> float:
     limit = LATEST if key == "time" else HUGE
-    return json_number(entry.values[key], entry.file, f"{entry.place}, {key}", limit)
+    return float(numbers_from([entry.values[key]], entry.file, f"{entry.place}, {key}", REMEDY, limit)[0])
 
 
 def recognise(root: Path) -> Recognised | None:
@@ -172,7 +171,9 @@ def _find(folder: Path, label: str) -> Path | None:
 def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
     """(3, 4) world -> camera with OpenCV axes, from camera -> world with OpenGL axes."""
     place = f"{place}, transform_matrix"
-    c2w = json_matrix(value["transform_matrix"], path, place)
+    c2w = matrix_from(value["transform_matrix"], ((4, 4), (3, 4)), path, place, REMEDY)
+    if len(c2w) == 4 and not np.allclose(c2w[3], [0, 0, 0, 1]):
+        raise wrong(path, place, "a camera matrix whose last row is not 0 0 0 1", "[0, 0, 0, 1]", c2w[3].tolist())
     rotation = c2w[:3, :3] @ np.diag([1.0, -1.0, -1.0])
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
         raise wrong(

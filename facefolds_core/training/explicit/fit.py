@@ -25,7 +25,7 @@ from facefolds_core.subject.outline import (
     whole_window,
     window_uv,
 )
-from facefolds_core.subject.sight import seen_share
+from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii, trusted_surface
@@ -61,6 +61,7 @@ class Fit:
         texels: (H, W) of the finest textures.
         reasons: one a choice, and the notes.
         notes: what a user should know at once.
+        volume: the subject, for what each layer begins with.
         losses: of the candidates for the chart, the share of the visible surface that each loses.
         start_psnr: of the subject's Gaussians over the training pictures, dB.
     """
@@ -75,6 +76,7 @@ class Fit:
     texels: tuple[int, int]
     reasons: tuple[Fact, ...]
     notes: tuple[Fact, ...]
+    volume: Volume
     losses: dict[Chart, float]
     start_psnr: float
 
@@ -103,7 +105,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
     else:
         mesh = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
-        unseen = seen_share(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE
+        unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, MESH.reach)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH.opacity), opacity)
@@ -125,6 +127,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         texels=texels,
         reasons=(*_reasons(params, losses[chart], source, most), *notes),
         notes=notes,
+        volume=volume,
         losses=losses,
         start_psnr=subject.psnr,
     )

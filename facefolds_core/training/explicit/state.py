@@ -24,11 +24,8 @@ from facefolds_core.training.explicit.views import Rays, Views
 UNSEEN_LOGIT = -9.0
 """Of texels that no training ray has met: transparent. `adam_kernel` keeps logits within 9 of 0."""
 
-MIN_OPACITY = 0.02
-"""Least opacity of all layers together at the start."""
-
-MAX_OPACITY = 0.9
-"""Largest opacity of all layers together at the start, so that inner layers are seen."""
+MIN_OPACITY, MAX_OPACITY = 0.003, 0.995
+"""Bounds of a layer's opacity at the start: a logit can return from there within a level."""
 
 MIN_LIGHT = 0.002
 """Layers behind less transmittance are skipped: speed, half a code of a pixel."""
@@ -76,7 +73,6 @@ class TextureState:
         self.start = start
         self.colour[0] = self._start()[:, :3]
         self.shine = np.zeros((0, 3), np.float32)
-        self.reset_alpha()
         self._allocate()
 
     def _allocate(self) -> None:
@@ -85,15 +81,16 @@ class TextureState:
         self.texture = torch.empty(m, n, 4)
         self.gradient = torch.zeros(n, m, 4)
 
-    def reset_alpha(self) -> None:
-        """Back to the initial opacity; colours stay. For layers that have moved."""
-        self.layers[..., 3] = 0
-        self.layers[1:, ..., :3] = 0
-        n = self.layers.shape[2]
-        weight = self._start()[:, 3:].clamp(MIN_OPACITY, MAX_OPACITY) / n
-        alpha = weight / (1 - weight * torch.arange(n))
+    def fill(self, opacity: NDArray[np.float32], rgb: NDArray[np.float32] | None = None) -> None:
+        """Begin with this opacity (M, N) of the layers, and colours (M, N, 3) of their own; None keeps those that were
+        learnt, for layers that have moved."""
+        alpha = torch.from_numpy(opacity).clamp(MIN_OPACITY, MAX_OPACITY)
+        self.layers[1:] = 0
         self.layers[0, ..., 3] = torch.logit(alpha)
         self.frame_alpha.zero_()
+        if rgb is not None:
+            own = torch.from_numpy(rgb) - self.colour[0][:, None]
+            self.layers[0, ..., :3] = torch.where(alpha[..., None] > MIN_OPACITY, own, 0.0)
 
     def _start(self) -> Tensor:
         """[M, 4]: `start` at the texels."""

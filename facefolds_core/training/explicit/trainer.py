@@ -18,6 +18,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
+from facefolds_core.subject.outline import shells, texel_uv
 from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
@@ -118,12 +119,13 @@ class Trainer:
         if new_rays:
             self._trace(level)
         assert self.views is not None
+        begun = self.state is None
         if self.state is None:
             self.state = self._new_state(level.texels)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
-        if moved:
-            self.state.reset_alpha()
+        if begun or moved:
+            self._fill(colours=begun)
         if new_rays:
             self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
@@ -145,6 +147,18 @@ class Trainer:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
         shape = (self.params.layers, self.scene.num_frames)
         return state_type(self.device.gpu)(texels, *shape, start, self.params)
+
+    def _fill(self, colours: bool) -> None:
+        """Give each layer what the subject's Gaussians put there; without `colours` its opacity alone."""
+        assert self.state is not None
+        shape = self.state.shape
+        with on_one_thread():
+            nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
+            radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
+        places = radii[0].permute(1, 2, 0).double().numpy()
+        opacity, rgb = shells(self.fit.volume, self.fit.chart, texel_uv(self.fit.window, *shape), places)
+        flat = shape[0] * shape[1], places.shape[-1]
+        self.state.fill(opacity.reshape(flat), rgb.reshape(*flat, 3) if colours else None)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""

@@ -132,16 +132,11 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
     return digest.hexdigest()[:16]
 
 
-def train_base(
-    scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
-) -> None:
+def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
     """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
     folder, whole or not at all; the checkpoint stays (`forget_begun`).
-
-    Args:
-        begun: folder of the checkpoint, of this subject alone; by default the base's.
     """
-    kept = (folder.parent if begun is None else begun) / f"{BEGUN}{folder.name}"
+    kept = folder.parent / f"{BEGUN}{folder.name}"
     forget_begun(kept.parent, kept.name)
     trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder, kept)
 

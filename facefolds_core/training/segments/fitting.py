@@ -1,4 +1,4 @@
-"""A segment fitted and written: in this process, in one of its own, or on another machine."""
+"""A segment fitted and written: in this process, or in one of its own."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ class _Take:
         paths = [cache.path(frames) for frames in segments]
         cache.keep_only(paths)
         for other in self.folder.glob("base-*"):
-            if other != base.folder and other.is_dir():  # no pointer of DVC's
+            if other != base.folder and other.is_dir():
                 shutil.rmtree(other)
         return self._trained(base, paths, psnr)
 
@@ -188,10 +188,8 @@ class _SegmentLog:
         return sum(has)
 
 
-def base_of(
-    plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, log: Path, begun: Path | None = None
-) -> Base:
-    """The base of a take, trained if it is not in `folder`, and the log of its training. `begun`: see `train_base`."""
+def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, log: Path) -> Base:
+    """The base of a take, trained if it is not in `folder`, and the log of its training."""
     place = folder / f"base-{plan.base}"
     if not place.exists():
         tqdm.write(f"train: the base of {len(plan.keys)} key frames first")
@@ -200,8 +198,8 @@ def base_of(
                 "train: it is another one than before (other key frames, pictures, parameters or code), and all frames "
                 "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
             )
-        train_base(scene, list(plan.keys), params, place, log, begun)
-    forget_begun(begun or folder)  # here: a kill may have come after the base was written
+        train_base(scene, list(plan.keys), params, place, log)
+    forget_begun(folder)  # here: a kill may have come after the base was written
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)

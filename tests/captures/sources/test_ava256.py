@@ -174,7 +174,7 @@ def change_calibration(root: Path, change: Callable[[list[dict[str, Any]]], Any]
         (lambda krt: krt.clear(), "no cameras"),
         (lambda krt: krt[1].pop("cameraId"), "no camera"),
         (lambda krt: krt[1].update(K=[[1, 2, 3]]), "a matrix of the wrong shape"),
-        (lambda krt: krt[1].update(T=[["x"] * 4] * 4), "something that is no number"),
+        (lambda krt: krt[1].update(T=[["x"] * 4] * 4), "not a number"),
         (lambda krt: krt[1].update(distortion="strong"), "no distortion"),
     ],
 )

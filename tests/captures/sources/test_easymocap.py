@@ -168,7 +168,7 @@ BAD = [
     ("no translation", INTRI, EXTRI.replace("T_1:", "T_7:"), "a key is missing", "T_1"),
     ("cut off", INTRI, EXTRI[:130], "", "extri.yml"),
     ("too few numbers", INTRI, EXTRI.replace("2.]", "]", 1), "not a matrix", "T_1"),
-    ("not finite", INTRI.replace("51.,", ".nan,"), EXTRI, "not a matrix", "K_Camera_B2"),
+    ("not finite", INTRI.replace("51.,", ".nan,"), EXTRI, "not a number", "K_Camera_B2"),
     ("turned numbers", INTRI, EXTRI.replace("rows: 3\n  cols: 1", "rows: 2\n  cols: 2", 1), "not a matrix", "R_1"),
     ("twice", INTRI.replace("Camera_B2", "1"), EXTRI, "", "intri.yml"),
     ("no names", "%YAML:1.0\n---\n", EXTRI, "not OpenCV's YAML", "intri.yml"),

@@ -197,7 +197,7 @@ def test_a_video_that_is_cut_off_is_named(copied: Path) -> None:
         ({"world_2_cam": {}}, "no calibration", None),
         ({"intrinsics": {"A000": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}, "cameras without intrinsics", "intrinsics"),
         ({"intrinsics": [[1, 2], [3, 4]]}, "a matrix of the wrong shape", "intrinsics, A000"),
-        ({"world_2_cam": {"A000": [["x"] * 4] * 4}}, "something that is no number", "world_2_cam, A000"),
+        ({"world_2_cam": {"A000": [["x"] * 4] * 4}}, "not a number", "world_2_cam, A000"),
     ],
 )
 def test_a_garbled_calibration(copied: Path, change: dict[str, Any], words: str, place: str | None) -> None:

@@ -128,7 +128,7 @@ BAD = [
     ("no calibration", "Calibration", None, "no calibration", "_anno.smc"),
     ("no RT", "Calibration/01/RT", None, "no such numbers", "Calibration/01/RT"),
     ("odd K", "Calibration/01/K", np.eye(4), "no such numbers", "(4, 4)"),
-    ("not finite", "Calibration/01/K", np.full((3, 3), np.nan), "beyond sense", "Calibration/01/K"),
+    ("not finite", "Calibration/01/K", np.full((3, 3), np.nan), "not a number", "Calibration/01/K"),
     ("no rotation", "Calibration/01/RT", np.eye(4) * [2, 2, 2, 1], "not a rotation", "Calibration/01"),
     ("text", "Calibration/01/D", "none", "no such numbers", "Calibration/01/D"),
 ]

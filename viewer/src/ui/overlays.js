@@ -28,7 +28,8 @@ export class Overlays {
     player.addEventListener("ready", () => {
       this.find(".title").textContent = player.manifest.subject;
       this.find(".poster").classList.add("gone");
-      this.find(".spinner").hidden = true;
+      this.find('[name="poster"]').classList.add("gone");
+      this.#endProgress();
     });
     player.addEventListener("level", () => this.#pill());
     player.addEventListener("resized", () => this.#placePoster());
@@ -39,6 +40,12 @@ export class Overlays {
   /** All that was to be loaded is there. */
   loaded() {
     this.find(".pill").hidden = true;
+  }
+
+  /** The page's own bar, too. */
+  #endProgress() {
+    this.find(".spinner").hidden = true;
+    this.find('[name="progress-bar"]').hidden = true;
   }
 
   #progress() {
@@ -160,7 +167,7 @@ export class Overlays {
       this.find(".pill").hidden = true;
       return this.say(`${title}. ${remedy}`, 12000);
     }
-    this.find(".spinner").hidden = true;
+    this.#endProgress();
     this.find(".message h2").textContent = title;
     this.find(".message p").textContent = remedy;
     this.find(".message .file").textContent = error.file ?? "";

@@ -51,7 +51,8 @@ const field = ([name, label]) =>
 
 export const TEMPLATE = `<div class="stage">
   <canvas tabindex="0" role="img" part="canvas"></canvas>
-  <img class="poster" part="poster" alt="" hidden>
+  <slot name="poster"><img class="poster" part="poster" alt="" hidden></slot>
+  <div class="hotspots"></div>
   <div class="compare" hidden>
     <div class="frame"><img alt="Photo of a camera that was held out">
       <span class="tag left">Asset</span><span class="tag right">Photo</span><i></i>
@@ -60,7 +61,7 @@ export const TEMPLATE = `<div class="stage">
   </div>
   <header><b class="title" part="title"></b><span class="pill" role="status" hidden></span></header>
   <dl class="stats" hidden aria-label="Statistics"></dl>
-  <div class="spinner" part="progress" hidden><div role="progressbar" aria-label="Loading" aria-valuemin="0" aria-valuemax="100"><i></i></div><span>Loading</span></div>
+  <slot name="progress-bar"><div class="spinner" part="progress" hidden><div role="progressbar" aria-label="Loading" aria-valuemin="0" aria-valuemax="100"><i></i></div><span>Loading</span></div></slot>
   <aside class="panel" part="panel" aria-label="Settings" hidden>
     <div class="row head"><b>Settings</b>${button("settings", "Close the settings").replace(ICONS.settings, ICONS.close)}</div>
     <label class="row"><span>Detail</span><select name="level"></select></label>

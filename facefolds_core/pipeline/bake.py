@@ -1,0 +1,29 @@
+"""Texture frames fitted to the meshes that ship: data/<subject>/textures."""
+
+from __future__ import annotations
+
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_stage
+from facefolds_core.export import steps
+from facefolds_core.export.stores import read_grids, read_meshes
+from facefolds_core.files import atomic_folder
+from facefolds_core.params import BakeParams
+from facefolds_core.paths import SubjectFolders
+
+
+def bake(folders: SubjectFolders) -> str:
+    params = read_stage(BakeParams, folders.config)
+    with atomic_folder(folders.textures) as temporary:
+        rays = steps.bake(
+            read_scene(folders.scene).views_of("train", steps.BAKED_VIEWS),
+            read_grids(folders.samples / "grids.npz"),
+            read_meshes(folders.meshes / "meshes.npz"),
+            folders.samples / steps.TEXTURES,
+            folders.resampled / steps.TEXTURES,
+            params,
+            temporary,
+            folders.checkpoints / "baked",
+        )
+    if rays == 0:
+        return f"textures as they were resampled, in {folders.textures}"
+    return f"textures fitted to {rays} rays, in {folders.textures}"

@@ -1,0 +1,38 @@
+"""Each surface with at most R^m x R^m vertices, and texture coordinates, for all levels: data/<subject>/meshes."""
+
+from __future__ import annotations
+
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_level_resolutions, read_stage
+from facefolds_core.export import steps
+from facefolds_core.export.decimation import layer_order
+from facefolds_core.export.stores import holds_sheets, read_grids, read_sheets, read_surfaces, write_meshes
+from facefolds_core.files import atomic_folder
+from facefolds_core.params import DecimateParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.pipeline.choices import write_choice
+
+
+def decimate(folders: SubjectFolders) -> str:
+    params = read_stage(DecimateParams, folders.config)
+    path = folders.surfaces / "surfaces.npz"
+    surfaces = read_sheets(path) if holds_sheets(path) else read_surfaces(path)
+    grids = read_grids(folders.samples / "grids.npz")
+    levels = read_level_resolutions(folders.config)
+    made = steps.decimate_all(
+        surfaces, grids, read_scene(folders.scene), folders.samples / steps.TEXTURES, params, levels
+    )
+    meshes = made.meshes
+    order = layer_order(meshes, grids.chart)
+    with atomic_folder(folders.meshes) as temporary:
+        write_meshes(temporary / "meshes.npz", meshes)
+        for resolution, coarser in made.coarser.items():
+            write_meshes(temporary / f"level_{resolution}.npz", coarser)
+        why = write_choice(temporary, made.why)
+    vertices, triangles = sum(len(m.vertices) for m in meshes), sum(len(m.faces) for m in meshes)
+    coarse = "".join(f"; R^m {r}: {sum(len(m.faces) for m in found)} triangles" for r, found in made.coarser.items())
+    return (
+        f"{len(meshes)} meshes, {vertices} vertices, {triangles} triangles; {order.crossed} of {order.compared} "
+        f"vertices lie on the wrong side of a neighbouring layer, by {order.deepest:.1e} at most{coarse}; "
+        f"in {folders.meshes}{why}"
+    )

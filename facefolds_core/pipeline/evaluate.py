@@ -1,0 +1,69 @@
+"""Score the shipped files, and the model they came from, on the held-out cameras."""
+
+from __future__ import annotations
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.captures.found_scene import found_scene
+from facefolds_core.captures.scene import Scene
+from facefolds_core.config import read_stage, read_train
+from facefolds_core.facts import Fact
+from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.model import load_model
+from facefolds_core.model.device import device_of
+from facefolds_core.packaging.notes import codec_warning
+from facefolds_core.params import CompressParams, EvaluateParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.scoring.evaluation import Evaluation
+from facefolds_core.scoring.evaluation import evaluate as score
+from facefolds_core.scoring.perceptual import find_perceptual
+from facefolds_core.scoring.record import write_record
+from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
+from facefolds_core.scoring.sheets import write_contact_sheet
+from facefolds_core.scoring.terminal import result_lines, score_lines
+from facefolds_core.scoring.training_scores import bad_views, warnings_of
+from facefolds_core.scoring.warnings import matte_is_found, stands_still, training_events, warnings_among
+
+
+def noticed(folders: SubjectFolders, scene: Scene, asset: Asset, result: Evaluation) -> tuple[Fact, ...]:
+    """What is not well with the capture, the training, the files and the scores."""
+    video = read_stage(CompressParams, folders.config)
+    quality = asset.manifest.full.quality
+    codec = codec_warning(quality.psnr_to_model if quality else None, video.video)
+    limits = read_stage(EvaluateParams, folders.config).warnings
+    return warnings_among(
+        [
+            *scene.left_out,
+            *training_events(folders.model / "fit.json"),
+            *([codec] if codec else []),
+            *matte_is_found(result.matte),
+            *warnings_of(result.training),
+            *stands_still(result.changes.get("holdout", {}), scene.num_frames, limits),
+        ]
+    )
+
+
+def evaluate(folders: SubjectFolders) -> str:
+    params = read_stage(EvaluateParams, folders.config)
+    device = device_of(read_train(folders.config))
+    scene, asset = found_scene(folders), read_asset(folders.asset)
+    cost = read_cost(folders, asset.manifest)
+    perceptual, model = find_perceptual(device), load_model(folders.model, device)
+    with atomic_folder(folders.evaluation) as temporary:
+        result = score(scene, model, asset, params, perceptual, temporary)
+        warnings = noticed(folders, scene, asset, result)
+        about = Circumstances(result.matte, params.band, result.changes, result.patch, result.training, warnings)
+        metrics = metrics_json(scene.subject, result.scores, cost, about)
+        write_per_image(result.scores, temporary / "per_image.parquet")
+        write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
+        write_record(
+            temporary,
+            result.panels,
+            result.worst,
+            asset,
+            films=result.films,
+            patch=result.patch,
+            training=bad_views(result.training),
+        )
+    write_json(folders.metrics, metrics)
+    table = [*score_lines(metrics), *(f"note: {note}" for note in perceptual.missing)]
+    return "\n".join([f"scores in {folders.metrics}", *table, *result_lines(metrics, folders)])

@@ -1,0 +1,34 @@
+"""Texture frames at R^t x R^t: data/<subject>/resampled."""
+
+from __future__ import annotations
+
+import sys
+
+from facefolds_core.captures.scene import read_scene
+from facefolds_core.config import read_stage
+from facefolds_core.export.steps import TEXTURES, texels_for
+from facefolds_core.export.stores import read_grids, read_meshes
+from facefolds_core.export.textures import resample_store
+from facefolds_core.files import atomic_folder
+from facefolds_core.params import TextureParams
+from facefolds_core.paths import SubjectFolders
+from facefolds_core.pipeline.choices import write_choice
+
+
+def texture(folders: SubjectFolders) -> str:
+    params, samples = read_stage(TextureParams, folders.config), folders.samples / TEXTURES
+    meshes, grids = read_meshes(folders.meshes / "meshes.npz"), read_grids(folders.samples / "grids.npz")
+    size, chosen = texels_for(read_scene(folders.scene), meshes, grids, samples, params)
+    with atomic_folder(folders.resampled) as temporary:
+        kept = folders.checkpoints / "resampled"
+        source = resample_store(samples, temporary / TEXTURES, size, kept)
+        why = write_choice(temporary, chosen)
+    if size > source.height:
+        sys.stderr.write(
+            f"texture: warning: texture.resolution {size} is above sample.resolution {source.height}; "
+            "enlarging adds texels but no detail\n"
+        )
+    return (
+        f"{len(source.keys())} textures, {source.height} x {source.width} to {size} x {size}, "
+        f"in {folders.resampled}{why}"
+    )

@@ -1,0 +1,102 @@
+"""The library's face: what it offers, and that readers of assets need nothing of what makes them."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import facefolds_core
+from facefolds_core.cli import COMMANDS, app
+from tests.assets import make_asset
+
+EXTRAS = "torch numba scipy trimesh pymeshlab cv2 pyarrow safetensors matplotlib jinja2 yaml dvc dvclive rpack tqdm"
+READER = """
+import sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in sys.argv[2].split():
+            raise ModuleNotFoundError(f"{name} is not installed", name=name)
+
+sys.meta_path.insert(0, Refuse())
+import facefolds_core as facefolds
+
+assert "numpy" not in sys.modules
+assert facefolds.validate(sys.argv[1]) == []
+asset = facefolds.load_asset(sys.argv[1])
+camera = facefolds.camera_of(facefolds.Eye(azimuth=20), 40, 30, field_of_view=40)
+picture = asset.render(camera, 0)
+assert picture.shape == (30, 40, 4) and picture[..., 3].max() > 0
+assert asset._repr_html_()
+asset.save_glb(sys.argv[1] + ".glb")
+try:
+    facefolds.train
+except ModuleNotFoundError as error:
+    assert "facefolds[train]" in str(error)
+else:
+    raise AssertionError
+from facefolds_core.cli import validate, view, render
+"""
+
+
+def test_every_name_is_there() -> None:
+    for name in facefolds_core.__all__:
+        assert getattr(facefolds_core, name) is not None
+    assert set(facefolds_core.__all__) - {"__version__"} == set(facefolds_core._PLACES)
+
+
+def test_an_unknown_name() -> None:
+    with pytest.raises(AttributeError, match="splats"):
+        facefolds_core.splats  # noqa: B018
+
+
+def test_an_asset_is_read_checked_and_rendered_without_the_extras(tmp_path: Path, project_root: Path) -> None:
+    make_asset(tmp_path / "asset", layers=2, frames=1, resolution=32)
+    command = [sys.executable, "-c", READER, str(tmp_path / "asset"), EXTRAS]
+    environment = {**os.environ, "PYTHONPATH": str(project_root)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_lists_every_command_and_imports_none(project_root: Path) -> None:
+    code = (
+        "import sys; from facefolds_core.cli import app\n"
+        "try: app(['--help'])\n"
+        "finally: print([m for m in sys.modules if m.startswith('facefolds_core.cli.') or m == 'numpy'])"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(project_root)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert all(f"  {name} " in done.stdout for name in COMMANDS), done.stdout + done.stderr
+    assert done.stdout.rstrip().endswith("[]")
+
+
+@pytest.mark.parametrize("stage", ["configure", "reconstruct", "decimate", "texture", "bake", "compress"])
+def test_stages_that_ask_no_model_do_without_torch(stage: str, project_root: Path) -> None:
+    """It takes a second to import, in each stage of each subject."""
+    code = f"import sys, stages.{stage}; print('torch' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": str(project_root)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout == "False\n", done.stderr
+
+
+def test_a_command_without_its_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    for module in [
+        name for name in sys.modules if name.startswith(("facefolds_core.reporting", "facefolds_core.cli.report"))
+    ]:
+        monkeypatch.delitem(sys.modules, module)
+    done = CliRunner().invoke(app, ["report"])
+    assert done.exit_code == 1
+    assert "pip install 'facefolds[report]'" in str(done.exception)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_a_function(name: str) -> None:
+    module = importlib.import_module(f"facefolds_core.cli.{name.replace('-', '_')}")
+    assert callable(module.command)

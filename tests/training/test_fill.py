@@ -1,0 +1,29 @@
+"""What the layers begin with: the opacity and the colours that the subject's Gaussians put on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.state import MAX_OPACITY, MIN_OPACITY, TextureState
+
+
+def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
+    rng = np.random.default_rng(0)
+    start = torch.tensor([0.3, 0.4, 0.5, 1.0]).expand(2, 2, 4)
+    state = TextureState((4, 6), 3, 2, start, ExplicitParams())
+    opacity, rgb = rng.uniform(0.1, 0.9, (24, 3)).astype(np.float32), rng.random((24, 3, 3), np.float32)
+    opacity[0], opacity[1] = 0, 1
+    state.fill(opacity, rgb)
+    begun = state.activated(1).clone().numpy()
+    np.testing.assert_allclose(begun[..., 3], opacity.clip(MIN_OPACITY, MAX_OPACITY), atol=1e-5)
+    np.testing.assert_allclose(begun[1:, :, :3], rgb[1:], atol=1e-5)
+    np.testing.assert_allclose(begun[0, :, :3], np.tile((0.3, 0.4, 0.5), (3, 1)), atol=1e-5)  # nothing is there
+    state.frame_alpha[0] += 1
+    state.layers[1:] += 1
+    state.fill(opacity[::-1].copy())
+    again = state.activated(1).numpy()
+    np.testing.assert_allclose(again[..., 3], opacity[::-1].clip(MIN_OPACITY, MAX_OPACITY), atol=1e-5)
+    np.testing.assert_allclose(again[..., :3], begun[..., :3], atol=1e-5)
+    assert not state.layers[1:].any()

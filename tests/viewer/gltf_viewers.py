@@ -1,0 +1,48 @@
+"""What the web's viewers of glTF show of a GLB as they come: three.js with its GLTFLoader, and model-viewer."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Browser
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.serving import serving
+from tests.pictures import GREY
+
+VIEWER = Path(__file__).parents[2] / "viewer"
+GltfViewer = Literal["three", "model_viewer"]
+
+
+def build(folder: Path, viewer: GltfViewer) -> None:
+    """A page with the viewer, from the packages that the player's tests have."""
+    modules = VIEWER / "node_modules"
+    esbuild = [str(modules / ".bin" / "esbuild"), str(Path(__file__).parent / "gltf" / f"{viewer}.js")]
+    command = [*esbuild, "--bundle", "--format=esm", f"--outfile={folder / 'page.js'}", "--log-level=error"]
+    subprocess.run(command, check=True, env={**os.environ, "NODE_PATH": str(modules)})
+    script = '<script type="module" src="page.js"></script>'
+    (folder / "index.html").write_text(f'<!doctype html><link rel="icon" href="data:,"><body>{script}')
+
+
+def pictures(browser: Browser, folder: Path, glb: Path, cameras: Sequence[Camera]) -> dict[str, NDArray[np.float64]]:
+    """By camera's name, (H, W, 3) in [0, 1] over grey; `folder` is what `build` filled."""
+    shutil.copy(glb, folder / "head.glb")
+    given = [{"K": c.K.tolist(), "w2c": c.w2c.tolist(), "width": c.width, "height": c.height} for c in cameras]
+    with serving(folder, {}) as address:
+        page = browser.new_page()
+        page.goto(address)
+        page.wait_for_function("() => window.show")
+        found = page.evaluate("([cameras, background]) => show('head.glb', cameras, background)", [given, GREY])
+        page.close()
+    shown = [Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB") for data in found]
+    return {camera.name: np.asarray(picture) / 255 for camera, picture in zip(cameras, shown, strict=True)}

@@ -1,0 +1,101 @@
+"""What a page puts into the element: hotspots that follow the face, a poster and a bar of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Route
+
+from facefolds_core.asset import read_asset
+from facefolds_core.geometry.sphere_uv import uv_to_st
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+
+PLACE = (0.12, -0.1)
+"""u, v."""
+SPOT = """const [box, own] = [document.querySelector('#spot').getBoundingClientRect(), e.getBoundingClientRect()];
+    return [box.x + box.width / 2 - own.x, box.y + box.height / 2 - own.y];"""
+HOTSPOT = (
+    f'<button slot="hotspot-a" id="spot" data-surface="{PLACE[0]} {PLACE[1]} 1" style="width: 4px; height: 4px; '
+    'padding: 0; border: 0"></button>'
+)
+
+
+def opened(new_player: NewPlayer, asset: Path, inner: str, attributes: str = "") -> Player:
+    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300})
+    element = f'<facefolds-player src="asset/" style="height: 300px" controls="none" {attributes}>{inner}'
+    page_of_yours(player, f"{element}</facefolds-player>")
+    player.wait("e.level === 'full'")
+    return player
+
+
+def point_of(asset: Path) -> np.ndarray:
+    """Where the innermost layer has the place: the vertex nearest to it (the mesh is fine enough for two pixels)."""
+    level = read_asset(asset).full
+    mesh = level.layers[-1]
+    away = np.linalg.norm(mesh.st - uv_to_st(np.array(PLACE), level.windows[-1]), axis=1)
+    near = np.argsort(away)[:4]
+    weights = 1 / np.maximum(away[near], 1e-6)
+    return np.asarray((weights[:, None] * mesh.vertices[near]).sum(0) / weights.sum())
+
+
+def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, HOTSPOT)
+    point = [*map(float, point_of(rich)), 1.0]
+    for azimuth in (0, 25, -30):
+        player.run("e.state = {view: {azimuth: v}}; await new Promise((r) => setTimeout(r, 200))", azimuth)
+        seen = player.run(
+            """const { view, projection } = e.player.view.matrices(...e.player.size, e.player.renderer.bounds());
+            const times = (m, p) => [0, 1, 2, 3].map((i) => p.reduce((sum, x, k) => sum + m[4 * k + i] * x, 0));
+            const [x, y, , w] = times(projection, times(view, v));
+            return [(0.5 + x / w / 2) * e.clientWidth, (0.5 - y / w / 2) * e.clientHeight];""",
+            point,
+        )
+        assert player.run(SPOT) == pytest.approx(seen, abs=3), azimuth
+        assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')")
+
+
+def test_a_place_that_is_turned_away_says_so(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, HOTSPOT)
+    player.run(
+        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
+        "w2c: [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, 2]]}); await new Promise((r) => setTimeout(r, 200))"
+    )
+    assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')") is True
+    player.run(
+        "e.setCamera({K: [[100, 0, 32], [0, 100, 32], [0, 0, 1]], width: 64, height: 64,"
+        "w2c: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 2]]}); await new Promise((r) => setTimeout(r, 200))"
+    )
+    assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')") is False
+
+
+def test_the_surface_under_a_point_gives_a_hotspot_there(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, HOTSPOT)
+    surface = player.run(
+        "return e.surfaceFromPoint(e.getBoundingClientRect().x + 210, e.getBoundingClientRect().y + 130)"
+    )
+    assert isinstance(surface, str) and len(surface.split()) == 3
+    player.run(
+        "document.querySelector('#spot').dataset.surface = v; await new Promise((r) => setTimeout(r, 200))", surface
+    )
+    assert player.run(SPOT) == pytest.approx([210, 130], abs=1)
+    assert player.run("return e.surfaceFromPoint(1, 1)") is None
+
+
+def test_a_poster_and_a_bar_of_the_page_go_when_there_is_a_picture(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})
+    held: list[Route] = []
+    player.page.route("**/manifest.json", lambda route: held.append(route))
+    inner = '<p slot="poster" id="poster">Wait</p><p slot="progress-bar" id="bar">Coming</p>'
+    page_of_yours(player, f'<facefolds-player src="asset/" style="height: 300px">{inner}</facefolds-player>')
+    bar, poster = player.page.locator("#bar"), player.page.locator("#poster")
+    bar.wait_for(state="visible")
+    assert poster.is_visible()
+    assert not player.run("return e.shadowRoot.querySelector('.spinner').checkVisibility()")
+    while not held:
+        player.page.wait_for_timeout(50)
+    held[0].continue_()
+    player.wait("e.ready")
+    assert not bar.is_visible()
+    player.page.wait_for_function("() => getComputedStyle(document.querySelector('#poster')).opacity === '0'")
