@@ -43,7 +43,7 @@ function connectGesturesOf(element) {
   player.view.wheels = () => own() || root.activeElement !== null;
   const tell = (name, text) => {
     let told = 0;
-    let last = 0;
+    let last = -Infinity; // times count from the opening of the page
     player.canvas.addEventListener(name, ({ timeStamp }) => {
       if (timeStamp - last > AGAIN && told++ < 2) element.overlays.say(text);
       last = timeStamp;
