@@ -55,8 +55,8 @@ class FollowParams(Section):
     channel, from its median over the frames; its eight neighbours move with it. Where a texel does not follow one
     frame, the others are asked by their whole error."""
 
-    min_share: Share = 0.3
-    """Rays count of whose colour at least this share is of such texels."""
+    min_light: Share = 0.3
+    """Rays count of whose light at least this share comes to such texels."""
 
     steps: Count = 30
     """A frame, each on every second one of these rays, fewer where these are many; the rates fall along them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 RENAMED: dict[str, str] = {
     "train.level_halfwidth": "train.geometry.halfwidth",
     "train.lr_texture": "train.textures.learning_rate",
+    "train.follow.min_share": "train.follow.min_light",
 }
 """Old key -> new key of the same section; until 0.1 the names of the model `explicit`."""
 

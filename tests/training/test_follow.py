@@ -31,12 +31,12 @@ def random_texture() -> np.ndarray:
     return np.random.default_rng(1).random((*SHAPE, LAYERS, 4), np.float32)
 
 
-def test_shares_match_the_reference() -> None:
+def test_light_on_chosen_texels_matches_the_reference() -> None:
     views, texture = random_views(), random_texture()
     chosen = np.random.default_rng(3).random(SHAPE) < 0.5
-    found = follow_kernel.share_on(views.codes, texture, chosen, MIN_LIGHT)
+    found = follow_kernel.light_on(views.codes, texture, chosen, MIN_LIGHT)
     given = torch.from_numpy(views.codes.astype(np.int32)), torch.from_numpy(texture), torch.from_numpy(chosen)
-    torch.testing.assert_close(torch.from_numpy(found), reference.share_on(*given, MIN_LIGHT), atol=1e-6, rtol=0)
+    torch.testing.assert_close(torch.from_numpy(found), reference.light_on(*given, MIN_LIGHT), atol=1e-6, rtol=0)
 
 
 def test_a_step_matches_the_reference_and_leaves_other_texels() -> None:
@@ -200,3 +200,26 @@ def test_where_something_moves_all_frames_are_asked_by_their_whole_error() -> No
     assert followed[0].any() and not followed[0].all()
     assert not usual[followed[0].numpy()].any()
     assert all(film.error(state, frame) < 0.04 for frame in range(film.frames))
+
+
+def test_what_is_seen_against_nothing_stays_transparent() -> None:
+    """A clear layer before an opaque one: half of the rays pass the clear one alone, and end behind it."""
+    film = Film()
+    rng = np.random.default_rng(6)
+    codes = rng.integers(1, 65536, (film.rays, 2, 2)).astype(np.uint16)
+    alone = rng.random(film.rays) < 0.5
+    codes[alone, 1] = 0
+    views = film.source.views
+    film.source = StillRays(Views(codes, views.camera, views.pixel, views.directions))
+    film.images[:] = 255 * film.usual
+    film.images[film.moved] = 255 * film.other
+    film.images[:, alone] = 0
+    opaque = np.full((film.rays, 1), 255)
+    opaque[alone] = 0
+    film.cut = lambda index: np.concatenate([film.images[index], opaque], -1).astype(np.uint8)[None]  # type: ignore[method-assign]
+    start = torch.tensor([*film.usual, 0.5], dtype=torch.float32).expand(2, 2, 4)
+    state = TextureState(film.shape, 2, film.frames, start, PARAMS)
+    state.layers[0, ..., 3] = torch.tensor([-3.0, 9.0])
+    _, share = follow(state, film.source, film, RATES, unlit)
+    assert share > 0.1
+    assert state.activated(film.moved)[:, 0, 3].max() < 0.1

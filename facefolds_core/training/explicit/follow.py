@@ -99,7 +99,7 @@ def follow_frame(
     light: Light,
 ) -> None:
     """What one frame adds at the chosen texels (M,): its colour less the mean errors (M, 3), a step as far as it takes;
-    then Adam steps on the rays of which they are enough."""
+    then Adam steps on the rays whose light comes to them."""
     views, shine = _rays_on(state, source, frame, chosen, light)
     if not len(views.pixel):
         return
@@ -154,13 +154,14 @@ def _texture(state: TextureState, frame: int) -> NDArray[np.float32]:
 def _rays_on(
     state: TextureState, source: Rays, frame: int, chosen: NDArray[np.bool_], light: Light
 ) -> tuple[Views, NDArray[np.float32]]:
-    """The rays of which chosen texels are enough, and what the reflection adds to them."""
+    """The rays of which enough light comes to chosen texels, and what the reflection adds to them. Texels that are
+    transparent count as well: rays that end behind them are what keeps them so."""
     texture, least, params = _texture(state, frame), MIN_LIGHT, state.params.follow
     parts, shine = [], []
     for views in source.in_use(frame):
         light(state, views, frame)
-        found = follow_kernel.share_on(views.codes, texture, chosen.reshape(state.shape), least)
-        rays = np.flatnonzero(found >= params.min_share)
+        found = follow_kernel.light_on(views.codes, texture, chosen.reshape(state.shape), least)
+        rays = np.flatnonzero(found >= params.min_light)
         parts.append(views.part(rays))
         shine.append(state.shine[rays] if len(state.shine) else state.shine)
     return Views.together(parts), np.concatenate(shine)

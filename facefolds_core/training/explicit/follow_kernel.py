@@ -17,33 +17,34 @@ from facefolds_core.training.explicit.shading_kernel import tap_share
 
 
 @kernel(parallel=True)
-def share_on(codes, texture, chosen, min_light):  # type: ignore[no-untyped-def]
-    """(P,) float32: how much of each ray's colour is of chosen texels.
+def light_on(codes, texture, chosen, min_light):  # type: ignore[no-untyped-def]
+    """(P,) float32: how much light of each ray comes to a chosen texel, opaque or not.
 
     codes (P, N, 2), texture (H, W, N, 4), chosen (H, W) bool.
     """
     found = np.zeros(codes.shape[0], np.float32)
     for p in prange(codes.shape[0]):
-        found[p] = _share(p, codes, texture, chosen, min_light)
+        found[p] = _light(p, codes, texture, chosen, min_light)
     return found
 
 
 @compiled
-def _share(p: Any, codes: Any, texture: Any, chosen: Any, min_light: Any) -> Any:
-    transmittance, found = np.float32(1.0), np.float32(0.0)
+def _light(p: Any, codes: Any, texture: Any, chosen: Any, min_light: Any) -> Any:
+    transmittance = np.float32(1.0)
     for n in range(texture.shape[2]):
         if codes[p, n, 0] == 0:
             continue
-        added = np.float32(0.0)
+        added, met = np.float32(0.0), False
         for tap in range(4):
             i, j, share = tap_share(codes, p, n, tap, texture)
             added += share
-            if chosen[i, j]:
-                found += transmittance * share
+            met = met or (share > 0 and chosen[i, j])
+        if met:
+            return transmittance
         transmittance *= np.float32(1.0) - added
         if transmittance < min_light:
             break
-    return found
+    return np.float32(0.0)
 
 
 @inlined

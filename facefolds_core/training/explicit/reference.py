@@ -143,13 +143,12 @@ def errors_by_texel(
     return torch.cat([errors[..., :3], shares[..., :1]], -1)
 
 
-def share_on(codes: Tensor, texture: Tensor, chosen: Tensor, min_light: float) -> Tensor:
-    """As `follow_kernel.share_on`: [R, N, 2] int32, [H, W, N, 4], [H, W] bool -> [R]."""
-    own = texture.clone()
-    own[..., 3] *= chosen[..., None]
-    alpha = look_up(codes, texture)[..., 3]
-    before, _ = transmittances(alpha)
-    return (torch.where(before >= min_light, before, 0.0) * look_up(codes, own)[..., 3]).sum(1)
+def light_on(codes: Tensor, texture: Tensor, chosen: Tensor, min_light: float) -> Tensor:
+    """As `follow_kernel.light_on`: [R, N, 2] int32, [H, W, N, 4], [H, W] bool -> [R]."""
+    marked = chosen[..., None, None].to(texture).expand(texture.shape)
+    before, _ = transmittances(look_up(codes, texture)[..., 3])
+    met = (look_up(codes, marked)[..., 3] > 0) & (before >= min_light)
+    return torch.where(met, before, 0.0).amax(1)
 
 
 def follow_step(
