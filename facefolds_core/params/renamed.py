@@ -111,9 +111,9 @@ GONE: dict[str, str] = {
     **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
     "train.moving.background_rate": CUT_OUT,
-    "train.losses": f"{CUT_OUT}, and opacity needs no price",
-    "train.lambda_veil": f"{CUT_OUT}, and opacity needs no price",
-    "train.lambda_solid": f"{CUT_OUT}, and opacity needs no price",
+    "train.losses": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
+    "train.lambda_veil": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
+    "train.lambda_solid": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
     **{
         f"train.pruning.{key}": f"{CUT_OUT}, and no room is painted"
         for key in (

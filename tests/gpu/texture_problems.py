@@ -117,14 +117,14 @@ def smoothed() -> Problem:
     return Problem(kernels_gpu.smooth, TEXELS, arguments, {"out": 1e-6}, on_cpu, {"LAYERS": LAYERS})
 
 
-def assigned() -> Problem:
-    values = np.random.default_rng(4).normal(size=(TEXELS, LAYERS)).astype(np.float32)
+def drawn() -> Problem:
+    values, goal = np.random.default_rng(4).normal(size=(2, TEXELS, LAYERS)).astype(np.float32)
 
     def on_cpu(given: dict[str, Any]) -> None:
-        given["out"][:] = given["values"]
+        given["values"] += given["share"] * (given["goal"] - given["values"])
 
-    arguments = {"values": values, "out": np.zeros_like(values)}
-    return Problem(kernels_gpu.assign, TEXELS, arguments, {"out": 0}, on_cpu)
+    arguments = {"values": values, "goal": goal, "share": np.float32(0.25)}
+    return Problem(kernels_gpu.go_towards, TEXELS, arguments, {"values": 1e-6}, on_cpu)
 
 
 PROBLEMS = {
@@ -135,5 +135,5 @@ PROBLEMS = {
     "activation": activation,
     "adam of textures": adam,
     "smoothing": smoothed,
-    "assignment": assigned,
+    "drawn": drawn,
 }

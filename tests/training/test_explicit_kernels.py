@@ -71,12 +71,15 @@ def test_errors_by_texel_match_autograd(least: float) -> None:
 
 
 def test_what_is_cut_out_needs_no_layers_where_it_is_clear() -> None:
-    """A pixel beside the subject has the colour behind: no layer explains it, and none is asked for."""
+    """A pixel beside the subject has the colour behind: no layer explains it, and each is asked to go, at a price."""
     p = _problem(50, 3, (6, 6))
     p["cut"][:], p["texture"][..., 3] = 0, 0
     gradient = np.zeros((3, 6, 6, 4), np.float32)
     assert shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False) == pytest.approx(0, abs=1e-9)
-    assert np.abs(gradient).max() < 1e-5
+    assert np.abs(gradient[..., :3]).max() < 1e-5
+    assert gradient[..., 3].min() >= 0
+    met = (p["codes"][p["rays"], :, 0] > 0).sum()
+    assert gradient[..., 3].sum() == pytest.approx(shading_kernel.PRICE * met, rel=1e-4)
 
 
 def _in_torch(p: dict[str, np.ndarray]) -> list[torch.Tensor]:

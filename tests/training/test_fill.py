@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import torch
 
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.explicit.state import MAX_OPACITY, MIN_OPACITY, TextureState
+from facefolds_core.training.explicit.state import BELIEF, MAX_OPACITY, MIN_OPACITY, TextureState
+from facefolds_core.training.explicit.views import Views
 
 
 def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> None:
@@ -27,3 +30,30 @@ def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> Non
     np.testing.assert_allclose(again[..., 3], opacity[::-1].clip(MIN_OPACITY, MAX_OPACITY), atol=1e-5)
     np.testing.assert_allclose(again[..., :3], begun[..., :3], atol=1e-5)
     assert not state.layers[1:].any()
+
+
+def test_steps_draw_opacity_back_to_what_is_believed() -> None:
+    """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
+    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())
+    state.fill(np.full((24, 3), 0.5, np.float32))
+    numbers = np.zeros(2, np.int32)
+    views = Views(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
+    step = partial(state.step, views, np.arange(2), OneColour(), 0, 0.0, np.full(5, 0.1, np.float32))
+    step()
+    torch.testing.assert_close(state.layers[0, ..., 3], torch.zeros(24, 3))
+    state.believe(np.full((24, 3), 0.9, np.float32))
+    step()
+    torch.testing.assert_close(state.layers[0, ..., 3], torch.full((24, 3), BELIEF * float(np.log(9))))
+    assert not state.frame_alpha.any()
+
+
+class OneColour:
+    """A picture of one pixel."""
+
+    behind = np.full((1, 3), 0.5, np.float32)
+
+    def cut(self, index: int) -> np.ndarray:
+        return np.full((1, 1, 4), 255, np.uint8)
+
+    def shuffle(self, random: np.random.Generator) -> None:
+        pass

@@ -114,8 +114,8 @@ def smooth(values, height, width, out):
 
 
 @entry
-def assign(values, out):
+def go_towards(values, goal, share):
     k = cuda.grid(1)
-    if k < out.shape[0]:
-        for n in range(out.shape[1]):
-            out[k, n] = values[k, n]
+    if k < values.shape[0]:
+        for n in range(values.shape[1]):
+            values[k, n] += share * (goal[k, n] - values[k, n])

@@ -8,6 +8,7 @@ from torch import Tensor
 from facefolds_core.adam import EPSILON, Betas
 from facefolds_core.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
+from facefolds_core.training.explicit.shading_kernel import PRICE
 
 
 def activate(colour: Tensor, layers: Tensor, frame_colour: Tensor, frame_alpha: Tensor) -> Tensor:
@@ -77,7 +78,8 @@ def shade(
         rgb = rgba[..., :3] if shine is None else rgba[..., :3] + shine[:, None]
         colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * behind
         squares = (colour - over(cut, behind)).square().sum()
-        (gradient,) = torch.autograd.grad(0.5 * squares, texture)
+        beside = ((1 - transmittance) * (cut[:, 3] == 0)).sum()
+        (gradient,) = torch.autograd.grad(0.5 * squares + PRICE * beside, texture)
     return gradient, squares.detach()
 
 

@@ -16,6 +16,13 @@ from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
 
 Array = NDArray[Any]
 
+PRICE = 0.1
+"""Of the opacity of a ray whose pixel shows nothing of the subject: squared errors alone hardly ask thin opacity to go.
+On cameras left out, any background: actor with 8 cameras +0.4 dB, `sparse` +0.2, actor with 20 cameras -0.05."""
+
+CLEAREST = 1e-6
+"""Least transmittance of a layer that is divided by."""
+
 _scatter = scatter_of(4)
 
 
@@ -67,7 +74,7 @@ def shade(  # type: ignore[no-untyped-def]
     shares,  # whether alpha's part of `gradient` gets w, what a texel adds to a ray's colour, in place of its gradient
 ):
     """Differentiates the sum over rays of 0.5 |C - I|^2, with C = sum_i w_i c_i + T g and I = F + (1 - m) g; T is the
-    transmittance.
+    transmittance. Where m = 0, `PRICE` (1 - T) is added.
 
     Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     """
@@ -185,12 +192,14 @@ def shade_ray(
     cam, pix = camera[p], pixel[p]
     d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, transmittance)
     s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
+    price = zero if shares or cut[cam, pix, 3] > 0 else np.float32(PRICE) * transmittance
     # From the back: s is the colour of all that lies behind layer q.
     for q in range(m - 1, -1, -1):
         n, alpha, light = layer[q], c[q, 3], before[q]
         g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
         wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
         wish[n, k, 5] = light * alpha if shares else light * (d0 * g0 + d1 * g1 + d2 * g2)
+        wish[n, k, 5] += price / max(one - alpha, np.float32(CLEAREST))
         s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
     return d0 * d0 + d1 * d1 + d2 * d2
 

@@ -145,6 +145,10 @@ class GpuTextureState(TextureState):
         )
         return float(away.squares.copy_to_host().sum())
 
+    def _go_back(self, believed: Tensor, share: float) -> None:
+        goal = self._kept.get("believed", believed, lambda: (gpu.to_gpu(believed.numpy()),))[0]
+        kernels_gpu.go_towards.run(len(believed), self._go().layers[0, :, :, 3], goal, np.float32(share))
+
     def _views(self, views: Views) -> tuple[Any, ...]:
         """Codes, camera and pixel."""
         arrays = (views.codes, views.camera, views.pixel)
@@ -161,7 +165,7 @@ class GpuTextureState(TextureState):
         m, n = logits.shape
         smoothed = gpu.empty((m, n))
         kernels_gpu.smooth.run(m, logits, *self.shape, smoothed, LAYERS=n)
-        kernels_gpu.assign.run(m, smoothed, logits)
+        kernels_gpu.go_towards.run(m, logits, smoothed, np.float32(1))
 
     def contributions(self, source: Rays, passes: int) -> Tensor:
         away, (h, w), frames = self._go(), self.shape, len(self.steps)

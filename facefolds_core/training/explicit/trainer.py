@@ -124,8 +124,7 @@ class Trainer:
             self.state = self._new_state(level.texels)
         elif self.state.shape != level.texels:
             self.state.grow(level.texels)
-        if begun or moved:
-            self._fill(colours=begun)
+        self._begin_with_subject(begun or moved, colours=begun)
         if new_rays:
             self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
@@ -133,6 +132,7 @@ class Trainer:
         """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
         self._trace(level)
         self.state = self._new_state(level.texels)
+        self._begin_with_subject(False, False)
         assert self.views is not None
         self.gloss.follow(self.state, self.views, self.pictures, self.middle)
         return self.state
@@ -148,8 +148,8 @@ class Trainer:
         shape = (self.params.layers, self.scene.num_frames)
         return state_type(self.device.gpu)(texels, *shape, start, self.params)
 
-    def _fill(self, colours: bool) -> None:
-        """Give each layer what the subject's Gaussians put there; without `colours` its opacity alone."""
+    def _begin_with_subject(self, fill: bool, colours: bool) -> None:
+        """Let the layers believe in the opacity of the subject's Gaussians, and begin with it; with their colours."""
         assert self.state is not None
         shape = self.state.shape
         with on_one_thread():
@@ -158,7 +158,9 @@ class Trainer:
         places = radii[0].permute(1, 2, 0).double().numpy()
         opacity, rgb = shells(self.fit.volume, self.fit.chart, texel_uv(self.fit.window, *shape), places)
         flat = shape[0] * shape[1], places.shape[-1]
-        self.state.fill(opacity.reshape(flat), rgb.reshape(*flat, 3) if colours else None)
+        self.state.believe(opacity.reshape(flat))
+        if fill:
+            self.state.fill(opacity.reshape(flat), rgb.reshape(*flat, 3) if colours else None)
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
