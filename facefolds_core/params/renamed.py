@@ -89,6 +89,7 @@ FIXED: dict[str, str] = {
 """Old key, or section of keys -> the file of facefolds_core where its value stands now, next to what uses it."""
 
 CUT_OUT = "the subject is cut out of all training pictures, over changing colours: no background is learnt"
+PRICE = f"{CUT_OUT}; the price of opacity is fixed now, in facefolds_core/training/explicit/shading_kernel.py"
 FOUND = "the stage `subject` fits Gaussians; its section `subject` has the keys `iterations`, `fewest`, `most`, `seed`"
 MATTES = (
     "the stage `subject` finds mattes of all pictures, and its section is called `subject`; `subjects.NAME.mattes` "
@@ -111,9 +112,9 @@ GONE: dict[str, str] = {
     **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
     "train.moving.background_rate": CUT_OUT,
-    "train.losses": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
-    "train.lambda_veil": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
-    "train.lambda_solid": f"{CUT_OUT}, and the price of opacity outside is fixed, in training/explicit/shading_kernel.py",
+    "train.losses": PRICE,
+    "train.lambda_veil": PRICE,
+    "train.lambda_solid": PRICE,
     **{
         f"train.pruning.{key}": f"{CUT_OUT}, and no room is painted"
         for key in (
