@@ -77,7 +77,7 @@ def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
         (MINIMAL + "train: {preset: fastest}\n", "there are"),
         (MINIMAL + "train: {preset: [fast]}\n", "there are"),
         (MINIMAL + "train: fast\n", "keys and values"),
-        (MINIMAL + "train: {lambda_veil: 0}\n", "opacity needs no price"),
+        (MINIMAL + "train: {lambda_veil: 0}\n", "the price of opacity is fixed now"),
         (MINIMAL + "matte: {method: auto}\n", "its section is called `subject`"),
         (MINIMAL + "matte: {}\nroom: {}\n", "`matte`: remove it"),
         ("subjects:\n  a: {source: actor, path: x, matte: {train: all}}\n", "its section is called `subject`"),
