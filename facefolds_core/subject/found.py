@@ -22,7 +22,11 @@ Bool = NDArray[np.bool_]
 FINEST, COARSEST = 100, 8
 """Cells in a radius of the ball, at most and at least."""
 AROUND = 2.0
-"""Radius, in those of the ball, within which a subject that is known in the pictures may go on."""
+"""Radius, in those of the ball, within which a subject that is known in the pictures may go on, and any subject towards
+the cameras: their common point may lie at its back, as of a head on a wall."""
+TOWARDS = 0.5
+"""Least cosine of the angle to the cameras' mean direction, times that mean's length: 1 where all stand at one place, 0
+where they stand all around. What is nearer to them than the subject, and joined to it, is the subject's."""
 
 
 @dataclass(frozen=True)
@@ -61,35 +65,38 @@ def _body(splats: Splats, possible: Bool, reach: float, params: BodyParams) -> B
     if not solid.any():
         return solid
     voxel = float(np.clip(params.joined * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
-    side = int(np.ceil(2 * reach / voxel)) + 2
-    cells = np.clip(((splats.means + reach) / voxel).astype(np.int64) + 1, 0, side - 1)
-    weight = np.zeros((side, side, side), np.float32)
+    low = splats.means[possible].min(0) - 1.5 * voxel
+    cells = ((splats.means - low) / voxel).astype(np.int64)
+    weight = np.zeros(tuple(cells[possible].max(0) + 2), np.float32)
+    cells = cells.clip(0, np.array(weight.shape) - 1)
     area = np.prod(np.sort(splats.sizes, 1)[:, 1:], 1) / voxel**2  # of the face that it shows
-    _scatter(weight, splats, solid, np.minimum(area, 4.0) * splats.opacities, reach, voxel)
+    _scatter(weight, splats, solid, np.minimum(area, 4.0) * splats.opacities, low, voxel)
     labels, count = ndimage.label(weight > 0, np.ones((3, 3, 3)))
-    axes = (np.arange(side) - 0.5) * voxel - reach
-    square = axes[:, None, None] ** 2 + axes[:, None] ** 2 + axes**2
+    x, y, z = ((np.arange(size) + 0.5) * voxel + low[axis] for axis, size in enumerate(weight.shape))
+    square = x[:, None, None] ** 2 + y[:, None] ** 2 + z**2
     mass = ndimage.sum_labels(weight * np.exp(-0.5 * square / params.near**2), labels, np.arange(1, count + 1))
     body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=1)
     return np.asarray(possible & body[tuple(cells.T)])
 
 
 def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
-    """(N,) Gaussians in the subject's ball that enough cameras have in their pictures."""
-    params = params or BodyParams()
-    inside = np.linalg.norm(splats.means, axis=1) < (scene.radius or REACH)
-    cameras = scene.views_of("train")
+    """(N,) Gaussians in the subject's ball, or before it, that enough cameras have in their pictures."""
+    params, reach = params or BodyParams(), scene.radius or REACH
+    cameras, away = scene.views_of("train"), np.linalg.norm(splats.means, axis=1)
+    mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in cameras], 0)
+    before = (splats.means @ mean > TOWARDS * away) & (away < AROUND * reach)
+    inside = (away < reach) | (before if scene.radius is None else False)
     seen = seen_by(cameras, splats.means.astype(np.float64))
     return np.asarray(inside & (seen >= min(params.views, len(cameras))))
 
 
-def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, reach: float, voxel: float) -> None:
+def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, low: Array, voxel: float) -> None:
     """Put Gaussians into cells: at their means, and one standard deviation to both sides along their longest axes."""
     ends = longest_axes(splats.values[chosen])
     for side in (-1, 0, 1):
         places = splats.means[chosen] + side * ends
-        cells = ((places + reach) / voxel).astype(np.int64) + 1
-        inside = ((cells >= 0) & (cells < weight.shape[0])).all(1)
+        cells = np.floor((places - low) / voxel).astype(np.int64)
+        inside = ((cells >= 0) & (cells < weight.shape)).all(1)
         np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
 
 

@@ -20,7 +20,7 @@ from facefolds_core.params import SubjectParams
 from facefolds_core.paths import SubjectFolders
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
 from facefolds_core.subject.folder import make_folder
-from facefolds_core.subject.found import joined
+from facefolds_core.subject.found import joined, subject_of
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.sheet import RED, tile
@@ -196,3 +196,19 @@ def test_a_splat_file_takes_the_place_of_our_own_fit(tmp_path: Path) -> None:
     held = scene.splits.index("holdout")
     true, here = render(scene.cameras[held], OPAQUE, 0)[1] > 0.5, mattes.of((held, 0)).opacity > 127
     assert (true & here).sum() / (true | here).sum() > 0.9
+
+
+def test_what_is_joined_to_the_subject_towards_the_cameras_is_its(tmp_path: Path) -> None:
+    """As a muzzle before a wall, where the cameras' common point is; not what goes on to a side of it."""
+    scene, head = make_scene(tmp_path, size=8), gaussians(OPAQUE)
+    wide = [replace(camera, K=camera.K * [[0.2, 1, 1], [1, 0.2, 1], [1, 1, 1]]) for camera in scene.cameras]
+    scene = replace(scene, cameras=wide)
+    mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in scene.cameras], 0)
+    towards = mean / np.linalg.norm(mean)
+    aside = np.cross(towards, [0, 1, 0]) / np.linalg.norm(np.cross(towards, [0, 1, 0]))
+    away = np.linspace(0, 0.7, 71)
+    bars = np.repeat(head.values[:1], 142, 0)
+    bars[:, MEAN] = np.concatenate([away[:, None] * towards, away[:, None] * aside])
+    bars[:, SCALE], bars[:, OPACITY] = np.log(0.01), 4
+    found = subject_of(Splats(bars, head.background), scene)
+    assert found[:71].all() and found[71:][away < 0.44].all() and not found[71:][away > 0.46].any()

@@ -124,7 +124,7 @@ def test_playing_goes_over_the_borders_of_segments_and_round(new_player: NewPlay
     )
     assert isinstance(seen, list)
     steps = (np.diff(seen[:-1]) + FRAMES) % FRAMES
-    assert steps.max() < 12 and len(set(seen)) > 15
+    assert steps.max() < 12
     assert max(seen) > 36
 
 
