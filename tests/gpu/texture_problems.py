@@ -14,7 +14,7 @@ from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT
 from tests.gpu.problem import Problem
 
 FAST = ExplicitParams()
-RAYS, LAYERS, SHAPE = 60, FAST.layers, (9, 7)
+RAYS, LAYERS, SAMPLES, SHAPE = 60, FAST.layers, 4, (9, 7)
 TEXELS = SHAPE[0] * SHAPE[1]
 
 
@@ -23,12 +23,15 @@ def shading(late: bool, shining: bool) -> Problem:
     rng = np.random.default_rng(0)
     codes = rng.integers(1, 65536, (RAYS, LAYERS, 2)).astype(np.uint16)
     codes[rng.random((RAYS, LAYERS)) < 0.2] = 0
+    finer = rng.integers(1, 65536, (RAYS // 3, SAMPLES, LAYERS, 2)).astype(np.uint16)
     texture = rng.random((*SHAPE, LAYERS, 4), np.float32)
     texture[..., 3] *= rng.choice(np.array([0.002, 0.2, 0.9], np.float32), (*SHAPE, LAYERS))
     faint = np.float32(MIN_ALPHA if late else 0.0)
     opacity = rng.integers(0, 256, (2, RAYS, 1))
     arguments = {
         "codes": codes,
+        "finer": finer,
+        "which": np.where(np.arange(RAYS) % 3 == 1, np.arange(RAYS) // 3, -1).astype(np.int32),
         "camera": rng.integers(0, 2, RAYS).astype(np.int32),
         "pixel": rng.permutation(RAYS).astype(np.int32),
         "rays": np.arange(0, RAYS, 2),
@@ -50,7 +53,7 @@ def shading(late: bool, shining: bool) -> Problem:
 
     # Worst seen: 3e-8 and 0 (of 3.5).
     outputs = {"gradient": 1e-6, "squares": 1e-6}
-    return Problem(kernels_gpu.shade, RAYS // 2, arguments, outputs, on_cpu, {"LAYERS": LAYERS})
+    return Problem(kernels_gpu.shade, RAYS // 2, arguments, outputs, on_cpu, {"LAYERS": LAYERS, "SAMPLES": SAMPLES})
 
 
 def contributions() -> Problem:

@@ -31,8 +31,13 @@ def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> d
     codes[rng.random((rays, layers)) < 0.2] = 0
     texture = rng.random((*shape, layers, 4), np.float32)
     texture[..., 3] *= 0.5
+    finer = rng.integers(1, 65536, (rays // 3, 4, layers, 2)).astype(np.uint16)
+    finer[rng.random((rays // 3, 4, layers)) < 0.2] = 0
+    which = rng.permutation(np.r_[np.arange(rays // 3), np.full(rays - rays // 3, -1)]).astype(np.int32)
     return {
         "codes": codes,
+        "finer": finer,
+        "which": which,
         "camera": np.zeros(rays, np.int32),
         "pixel": np.arange(rays, dtype=np.int32),
         "rays": np.arange(rays),
@@ -78,15 +83,18 @@ def test_what_is_cut_out_needs_no_layers_where_it_is_clear() -> None:
     assert shading_kernel.shade(*p.values(), gradient, 0.0, MIN_LIGHT, False) == pytest.approx(0, abs=1e-9)
     assert np.abs(gradient[..., :3]).max() < 1e-5
     assert gradient[..., 3].min() >= 0
-    met = (p["codes"][p["rays"], :, 0] > 0).sum()
+    met = (p["codes"][p["which"] < 0, :, 0] > 0).sum() + (p["finer"][..., 0] > 0).sum() / 4
     assert gradient[..., 3].sum() == pytest.approx(shading_kernel.PRICE * met, rel=1e-4)
 
 
 def _in_torch(p: dict[str, np.ndarray]) -> list[torch.Tensor]:
-    """As the references take a problem whose rays are all of one camera: codes, cut, behind, texture, shine."""
-    rays = p["pixel"].shape[0]
-    cut, behind = p["cut"][0] / np.float32(255), p["behind"].repeat(rays, 0)
-    return [torch.from_numpy(x) for x in (p["codes"].astype(np.int32), cut, behind, p["texture"], p["shine"])]
+    """As the references take a problem whose rays are all of one camera: codes, of, cut, behind, texture, shine."""
+    pixels, single = p["pixel"].shape[0], np.flatnonzero(p["which"] < 0)
+    finer = np.argsort(p["which"], kind="stable")[len(single) :]
+    codes = np.concatenate([p["codes"][single], p["finer"].reshape(-1, *p["codes"].shape[1:])]).astype(np.int32)
+    of = np.concatenate([single, finer.repeat(4)])
+    cut, behind = p["cut"][0] / np.float32(255), p["behind"].repeat(pixels, 0)
+    return [torch.from_numpy(x) for x in (codes, of, cut, behind, p["texture"], p["shine"])]
 
 
 def test_contributions_match_the_reference() -> None:

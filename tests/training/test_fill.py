@@ -37,7 +37,7 @@ def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())
     state.fill(np.full((24, 3), 0.5, np.float32))
     numbers = np.zeros(2, np.int32)
-    views = Views(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
+    views = Views.centred(np.zeros((2, 3, 2), np.uint16), numbers, numbers, np.zeros((2, 3), np.float32))
     step = partial(state.step, views, np.arange(2), OneColour(), 0, 0.0, np.full(5, 0.1, np.float32))
     step()
     torch.testing.assert_close(state.layers[0, ..., 3], torch.zeros(24, 3))

@@ -24,7 +24,9 @@ def random_views(rays: int = RAYS) -> Views:
     rng = np.random.default_rng(0)
     codes = rng.integers(1, 65536, (rays, LAYERS, 2)).astype(np.uint16)
     codes[rng.random((rays, LAYERS)) < 0.2] = 0
-    return Views(codes, np.zeros(rays, np.int32), np.arange(rays, dtype=np.int32), np.zeros((rays, 3), np.float32))
+    return Views.centred(
+        codes, np.zeros(rays, np.int32), np.arange(rays, dtype=np.int32), np.zeros((rays, 3), np.float32)
+    )
 
 
 def random_texture() -> np.ndarray:
@@ -90,7 +92,7 @@ class Film:
         rng = np.random.default_rng(5)
         codes = rng.integers(1, 65536, (self.rays, 1, 2)).astype(np.uint16)
         numbers = np.arange(self.rays, dtype=np.int32)
-        views = Views(codes, np.zeros(self.rays, np.int32), numbers, np.zeros((self.rays, 3), np.float32))
+        views = Views.centred(codes, np.zeros(self.rays, np.int32), numbers, np.zeros((self.rays, 3), np.float32))
         self.source = StillRays(views)
         place = (codes[:, 0, :].astype(float) - 1) / hit_codes.SCALE
         self.inside = ((place > 0.37) & (place < 0.53)).all(1)
@@ -183,7 +185,7 @@ def test_where_everything_moves_a_step_takes_a_quarter_of_a_usual_one() -> None:
 def test_texels_with_a_gradient_are_all_known() -> None:
     views = random_views(40)
     sums = np.zeros((LAYERS, *SHAPE, 4), np.float32)
-    rays = views.codes, views.camera, views.pixel
+    rays = views.arrays
     blank, none = np.zeros((1, 40, 4), np.uint8), np.zeros((0, 3), np.float32)
     behind, texture = np.zeros((1, 3), np.float32), random_texture() * 0.3
     shading_kernel.shade(*rays, np.arange(40), blank, behind, texture, none, sums, 0.0, 0.0, True)
@@ -210,7 +212,7 @@ def test_what_is_seen_against_nothing_stays_transparent() -> None:
     alone = rng.random(film.rays) < 0.5
     codes[alone, 1] = 0
     views = film.source.views
-    film.source = StillRays(Views(codes, views.camera, views.pixel, views.directions))
+    film.source = StillRays(Views.centred(codes, views.camera, views.pixel, views.directions))
     film.images[:] = 255 * film.usual
     film.images[film.moved] = 255 * film.other
     film.images[:, alone] = 0

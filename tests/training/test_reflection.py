@@ -270,6 +270,6 @@ def test_a_ray_reflects_at_the_layer_nearest_to_the_middle() -> None:
     codes[0, :] = 1 + np.arange(5)[:, None] * 1000
     codes[1, [0, 4]] = [[1, 65535], [65535, 1]]
     codes[2, 1:] = codes[0, 1:] * (np.arange(1, 5) != 2)[:, None]
-    views = Views(codes, np.zeros(3, np.int32), np.zeros(3, np.int32), np.eye(3, dtype=np.float32))
+    views = Views.centred(codes, np.zeros(3, np.int32), np.zeros(3, np.int32), np.eye(3, dtype=np.float32))
     st = Seen.middle(views, np.eye(3, dtype=np.float32)).st
     np.testing.assert_allclose(st, [[2000 / 65534] * 2, [0, 1], [1000 / 65534] * 2], atol=1e-6)

@@ -74,7 +74,7 @@ def mean_errors(state: TextureState, source: Rays, pictures: Pictures, frame: in
     apart = max(1, int(sum(len(views.pixel) for views in shares) / enough))
     for views in shares:
         light(state, views, frame)
-        rays = views.codes, views.camera, views.pixel, np.arange(0, len(views.pixel), apart)
+        rays = *views.arrays, np.arange(0, len(views.pixel), apart)
         shading_kernel.shade(*rays, cut, behind, texture, state.shine, sums, 0.0, least, True)
     total = sums.sum(0, dtype=np.float32).reshape(h * w, 4)
     sums[:] = 0
@@ -116,9 +116,7 @@ def follow_frame(
     for step in range(params.steps):
         pictures.shuffle(random)
         shading_kernel.shade(
-            views.codes,
-            views.camera,
-            views.pixel,
+            *views.arrays,
             np.arange(step % apart, len(views.pixel), apart),
             cut,
             pictures.behind,
@@ -176,9 +174,10 @@ def _apart(rays: int, usual: float) -> int:
 def _met(views: Views, shape: tuple[int, int]) -> NDArray[np.int64]:
     """Texels around all crossings of rays, with any layer; layer by layer, since there may be many rays."""
     met = np.zeros(shape[0] * shape[1], bool)
-    for n in range(views.codes.shape[1]):
-        column, row = (before(views.codes[:, n, axis], size) for axis, size in ((0, shape[1]), (1, shape[0])))
-        met[row * shape[1] + column] = True
+    for codes in (views.codes, views.finer.reshape(-1, *views.codes.shape[1:])):
+        for n in range(codes.shape[1]):
+            column, row = (before(codes[:, n, axis], size) for axis, size in ((0, shape[1]), (1, shape[0])))
+            met[row * shape[1] + column] = True
     corners = np.flatnonzero(met)
     for step in (1, shape[1], shape[1] + 1):
         met[corners + step] = True

@@ -11,11 +11,11 @@ from numba import cuda
 from facefolds_core.gpu import entry
 from facefolds_core.scatter import put_of
 from facefolds_core.training.explicit.adam_kernel import activate_texel, adam_texel
-from facefolds_core.training.explicit.shading_kernel import light_before, shade_ray, tap_share
+from facefolds_core.training.explicit.shading_kernel import light_before, shade_pixel, tap_share
 from facefolds_core.training.explicit.smoothing import column_sum, mean
 
-LAYERS = 1
-"""N, given where an entry is run."""
+LAYERS = SAMPLES = 1
+"""N, and the most rays of a pixel, given where an entry is run."""
 
 _put = put_of(4)
 
@@ -23,6 +23,8 @@ _put = put_of(4)
 @entry
 def shade(
     codes,  # as of `shading_kernel.shade`
+    finer,
+    which,
     camera,
     pixel,
     rays,
@@ -37,15 +39,18 @@ def shade(
     k = cuda.grid(1)
     if k >= rays.shape[0]:
         return
-    index = cuda.local.array((LAYERS, 1), np.int32)
-    wish = cuda.local.array((LAYERS, 1, 6), np.float32)
-    layer = cuda.local.array(LAYERS, np.int64)
-    c = cuda.local.array((LAYERS, 4), np.float32)
-    before = cuda.local.array(LAYERS, np.float32)
-    square = shade_ray(
+    index = cuda.local.array((LAYERS, SAMPLES), np.int32)
+    wish = cuda.local.array((LAYERS, SAMPLES, 6), np.float32)
+    layer = cuda.local.array((SAMPLES, LAYERS), np.int64)
+    count = cuda.local.array(SAMPLES, np.int64)
+    c = cuda.local.array((SAMPLES, LAYERS, 4), np.float32)
+    before = cuda.local.array((SAMPLES, LAYERS), np.float32)
+    p = rays[k]
+    own = codes[p : p + 1] if which[p] < 0 else finer[which[p]]
+    square = shade_pixel(
         0,
-        rays[k],
-        codes,
+        p,
+        own,
         camera,
         pixel,
         cut,
@@ -55,12 +60,13 @@ def shade(
         terms,
         index,
         wish,
-        (layer, c, before),
+        (layer, count, c, before),
     )
     cuda.atomic.add(squares, k % squares.shape[0], square)
     for n in range(LAYERS):
-        if index[n, 0] >= 0:
-            _put(index[n, 0], wish[n], 0, gradient[n])
+        for s in range(own.shape[0]):
+            if index[n, s] >= 0:
+                _put(index[n, s], wish[n], s, gradient[n])
 
 
 @entry

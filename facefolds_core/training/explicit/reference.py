@@ -62,10 +62,11 @@ def contributions(codes: Tensor, texture: Tensor, min_light: float) -> Tensor:
 
 def shade(
     codes: Tensor,  # [R, N, 2] int32
-    cut: Tensor,  # [R, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [R, 3]
+    of: Tensor,  # [R], which of the P pixels a ray goes through
+    cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
+    behind: Tensor,  # [P, 3]
     texture: Tensor,  # [H, W, N, 4]
-    shine: Tensor | None,  # [R, 3]
+    shine: Tensor,  # [P, 3]
     min_alpha: float,
     min_light: float,
 ) -> tuple[Tensor, Tensor]:
@@ -74,13 +75,20 @@ def shade(
     with torch.enable_grad():
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3].detach(), min_alpha, min_light), rgba[..., 3], 0.0)
-        weights, transmittance = compositing_weights(alpha)
-        rgb = rgba[..., :3] if shine is None else rgba[..., :3] + shine[:, None]
-        colour = (weights[..., None] * rgb).sum(1) + transmittance[:, None] * behind
-        squares = (colour - over(cut, behind)).square().sum()
+        colour, transmittance = _pixels(rgba[..., :3] + shine[of][:, None], alpha, of, len(cut))
+        squares = (colour + transmittance[:, None] * behind - over(cut, behind)).square().sum()
         beside = ((1 - transmittance) * (cut[:, 3] == 0)).sum()
         (gradient,) = torch.autograd.grad(0.5 * squares + PRICE * beside, texture)
     return gradient, squares.detach()
+
+
+def _pixels(rgb: Tensor, alpha: Tensor, of: Tensor, count: int) -> tuple[Tensor, Tensor]:
+    """Rays' [R, N, 3] and [R, N] -> colours over black [P, 3] and transmittances [P]: means of their rays."""
+    weights, transmittance = compositing_weights(alpha)
+    seen = torch.cat([(weights[..., None] * rgb).sum(1), transmittance[:, None]], 1)
+    rays = torch.bincount(of, minlength=count).clamp(min=1)[:, None]
+    means = seen.new_zeros(count, 4).index_add(0, of, seen) / rays
+    return means[:, :3], means[:, 3]
 
 
 def over(cut: Tensor, behind: Tensor) -> Tensor:
@@ -126,22 +134,26 @@ def _adam(state: Tensor, g: Tensor, met: Tensor, rate: Tensor, correct: Tensor, 
 
 def errors_by_texel(
     codes: Tensor,  # [R, N, 2] int32
-    cut: Tensor,  # [R, 4] in [0, 1], colours times opacity
-    behind: Tensor,  # [R, 3]
+    of: Tensor,  # [R], which of the P pixels a ray goes through
+    cut: Tensor,  # [P, 4] in [0, 1], colours times opacity
+    behind: Tensor,  # [P, 3]
     texture: Tensor,  # [H, W, N, 4]
-    shine: Tensor,  # [R, 3]
+    shine: Tensor,  # [P, 3]
     min_light: float,
 ) -> Tensor:
-    """As `shading_kernel.shade` with `shares`: [H, W, N, 4], over the rays w (C - I) and w."""
+    """As `shading_kernel.shade` with `shares`: [H, W, N, 4], over the rays w (C - I) of their pixel, and w."""
     texture = texture.detach().clone().requires_grad_()
     with torch.enable_grad():
         rgba = look_up(codes, texture)
         alpha = torch.where(visible(rgba[..., 3], 0.0, min_light), rgba[..., 3], 0.0).detach()
-        weights, transmittance = compositing_weights(alpha)
-        colour = (weights[..., None] * (rgba[..., :3] + shine[:, None])).sum(1) + transmittance[:, None] * behind
+        colour, transmittance = _pixels(rgba[..., :3] + shine[of][:, None], alpha, of, len(cut))
+        error = (colour + transmittance[:, None] * behind - over(cut, behind)).detach()
+        weights, _ = compositing_weights(alpha)
         # A colour's derivative is its weight.
-        (errors,) = torch.autograd.grad(0.5 * (colour - over(cut, behind)).square().sum(), texture, retain_graph=True)
-        (shares,) = torch.autograd.grad(colour[:, 0].sum(), texture)
+        (errors,) = torch.autograd.grad(
+            (weights[..., None] * rgba[..., :3] * error[of][:, None]).sum(), texture, retain_graph=True
+        )
+        (shares,) = torch.autograd.grad((weights * rgba[..., 0]).sum(), texture)
     return torch.cat([errors[..., :3], shares[..., :1]], -1)
 
 

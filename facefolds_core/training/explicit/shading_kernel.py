@@ -60,49 +60,54 @@ def difference(cut, behind, cam, pix, r0, r1, r2, transmittance):  # type: ignor
 
 @kernel(parallel=True)
 def shade(  # type: ignore[no-untyped-def]
-    codes,  # (P, N, 2) uint16 (`hit_codes`): crossings with each layer
+    codes,  # (P, N, 2) uint16 (`hit_codes`): crossings of the ray through each pixel's centre with each layer
+    finer,  # (Q, S, N, 2), of S rays spread over a pixel
+    which,  # (P,) int32, which of the Q a pixel has in place of the ray through its centre, or -1
     camera,  # (P,) int32
     pixel,  # (P,) int32
     rays,  # (R,) int64, which of the P to shade, none twice
     cut,  # (C, H W, 4) uint8, the subject cut out: colours F times opacity m, and m
     behind,  # (C, 3) float32, the colour g behind it and behind the layers
     texture,  # (H, W, N, 4) rgb and alpha in [0, 1]
-    shine,  # (P, 3) float32, added to the colours that a ray meets; (0, 3) for none
+    shine,  # (P, 3) float32, added to the colours that a pixel's rays meet; (0, 3) for none
     gradient,  # (N, H, W, 4), added to
     min_alpha,  # layers with less alpha are left out
     min_light,  # layers behind less transmittance are left out
-    shares,  # whether alpha's part of `gradient` gets w, what a texel adds to a ray's colour, in place of its gradient
+    shares,  # whether `gradient` gets w (C - I) and w in place of its gradient; w: what a texel adds to a ray's colour
 ):
-    """Differentiates the sum over rays of 0.5 |C - I|^2, with C = sum_i w_i c_i + T g and I = F + (1 - m) g; T is the
-    transmittance. Where m = 0, `PRICE` (1 - T) is added.
+    """Differentiates the sum over pixels of 0.5 |C - I|^2: I = F + (1 - m) g, and C the mean over a pixel's rays of
+    sum_i w_i c_i + T g; T is the transmittance. Where m = 0, `PRICE` (1 - T) is added.
 
     Adds the gradient to `gradient`; returns the sum of |C - I|^2.
     """
-    layers, count = texture.shape[2], rays.shape[0]
+    layers, count, room = texture.shape[2], rays.shape[0], BLOCK * max(1, finer.shape[1])
     squares = np.zeros((count + BLOCK - 1) // BLOCK)
-    index = np.empty((layers, CHUNK), np.int32)
-    wish = np.empty((layers, CHUNK, 6), np.float32)
+    blocks = CHUNK // BLOCK
+    index = np.empty((layers, blocks * room), np.int32)
+    wish = np.empty((layers, blocks * room, 6), np.float32)
     terms = np.float32(min_alpha), min_light, shares
     for start in range(0, count, CHUNK):
-        own = min(CHUNK, count - start)
-        for block in prange((own + BLOCK - 1) // BLOCK):
-            first, last = block * BLOCK, min((block + 1) * BLOCK, own)
+        own = (min(CHUNK, count - start) + BLOCK - 1) // BLOCK
+        for block in prange(own):
+            first, last = start + block * BLOCK, min(start + (block + 1) * BLOCK, count)
             squares[start // BLOCK + block] = _shade(
                 codes,
+                finer,
+                which,
                 camera,
                 pixel,
-                rays[start + first : start + last],
+                rays[first:last],
                 cut,
                 behind,
                 texture,
                 shine,
                 terms,
-                index[:, first:last],
-                wish[:, first:last],
+                index[:, block * room : (block + 1) * room],
+                wish[:, block * room : (block + 1) * room],
             )
         for task in prange(layers):
             n = spread(task, layers)
-            _scatter(index[n, :own], wish[n, :own], gradient[n])
+            _scatter(index[n, : own * room], wish[n, : own * room], gradient[n])
     total = 0.0  # not squares.sum(), which numba shares out among the threads
     for block in range(squares.shape[0]):
         total += squares[block]
@@ -112,6 +117,8 @@ def shade(  # type: ignore[no-untyped-def]
 @compiled
 def _shade(
     codes: Any,
+    finer: Any,
+    which: Any,
     camera: Any,
     pixel: Any,
     rays: Any,
@@ -123,17 +130,21 @@ def _shade(
     index: Any,
     wish: Any,
 ) -> Any:
-    """A block of R rays, see `shade_ray`. Returns the sum of |C - I|^2."""
-    layers = texture.shape[2]
-    own = (np.empty(layers, np.int64), np.empty((layers, 4), np.float32), np.empty(layers, np.float32))
-    total = 0.0
-    for k in range(rays.shape[0]):
-        total += shade_ray(k, rays[k], codes, camera, pixel, cut, behind, texture, shine, terms, index, wish, own)
+    """A block of R pixels, see `shade_pixel`. Returns the sum of |C - I|^2."""
+    layers, most = texture.shape[2], max(1, finer.shape[1])
+    met = np.empty((most, layers), np.int64), np.empty(most, np.int64)
+    own = (*met, np.empty((most, layers, 4), np.float32), np.empty((most, layers), np.float32))
+    total, k = 0.0, 0
+    for p in rays:
+        through = codes[p : p + 1] if which[p] < 0 else finer[which[p]]
+        total += shade_pixel(k, p, through, camera, pixel, cut, behind, texture, shine, terms, index, wish, own)
+        k += through.shape[0]
+    index[:, k:] = -1
     return total
 
 
 @inlined  # a call with so many arrays costs
-def shade_ray(
+def shade_pixel(
     k: Any,
     p: Any,
     codes: Any,
@@ -148,14 +159,48 @@ def shade_ray(
     wish: Any,
     own: Any,
 ) -> Any:
-    """Ray p of `shade`, number k of its block: the texels before its crossings in index (N, R), -1 where there is none,
-    and what is wanted there in wish (N, R, 6): fractions of row and column, gradient of rgba (`shares`: of rgb, and w).
-    Returns |C - I|^2.
+    """Pixel p of `shade`, with codes (S, N, 2) of its own rays, numbers k to k + S - 1 of their block: the texels
+    before their crossings in index (N, R), -1 where there is none, and what is wanted there in wish (N, R, 6):
+    fractions of row and column, gradient of rgba (`shares`: w (C - I), and w). Returns |C - I|^2.
 
-    Scratch: own, arrays (N,) int64, (N, 4) and (N,).
+    Scratch: own, arrays (S, N) int64, (S,) int64, (S, N, 4) and (S, N).
     """
+    samples, shares = codes.shape[0], terms[2]
+    one, zero = np.float32(1.0), np.float32(0.0)
+    layer, count, c, before = own
+    share = one / np.float32(samples)
+    light, r0, r1, r2 = zero, zero, zero, zero
+    for s in range(samples):
+        ray = layer[s], c[s], before[s]
+        m, t, a0, a1, a2 = _meet(k + s, p, codes[s], texture, shine, terms, index, wish, ray)
+        count[s] = m
+        light, r0, r1, r2 = light + share * t, r0 + share * a0, r1 + share * a1, r2 + share * a2
+    cam, pix = camera[p], pixel[p]
+    d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, light)
+    price = zero if shares or cut[cam, pix, 3] > 0 else np.float32(PRICE)
+    factor = one if shares else share
+    for s in range(samples):
+        m, at, through = count[s], k + s, one
+        if m > 0:
+            through = before[s, m - 1] * (one - c[s, m - 1, 3])
+        s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
+        # From the back: s is the colour of all that lies behind layer q.
+        for q in range(m - 1, -1, -1):
+            n, alpha, w = layer[s, q], c[s, q, 3], factor * before[s, q]
+            g0, g1, g2 = c[s, q, 0] - s0, c[s, q, 1] - s1, c[s, q, 2] - s2
+            wish[n, at, 2], wish[n, at, 3], wish[n, at, 4] = w * alpha * d0, w * alpha * d1, w * alpha * d2
+            wish[n, at, 5] = w * alpha if shares else w * (d0 * g0 + d1 * g1 + d2 * g2)
+            wish[n, at, 5] += factor * price * through / max(one - alpha, np.float32(CLEAREST))
+            s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
+    return d0 * d0 + d1 * d1 + d2 * d2
+
+
+@inlined
+def _meet(k, p, codes, texture, shine, terms, index, wish, own):  # type: ignore[no-untyped-def]
+    """A ray of pixel p, number k of its block, with codes (N, 2), through the layers. Returns how many it meets,
+    transmittance, colour."""
     height, width, layers = texture.shape[0], texture.shape[1], texture.shape[2]
-    min_alpha, min_light, shares = terms
+    min_alpha, min_light, _ = terms
     one, zero = np.float32(1.0), np.float32(0.0)
     layer, c, before = own
     transmittance, r0, r1, r2 = one, zero, zero, zero
@@ -166,10 +211,10 @@ def shade_ray(
     for n in range(layers):
         index[n, k] = -1
     for n in range(layers):
-        if codes[p, n, 0] == 0:
+        if codes[n, 0] == 0:
             continue
-        column, b = corner(codes[p, n, 0], width)
-        row, a = corner(codes[p, n, 1], height)
+        column, b = corner(codes[n, 0], width)
+        row, a = corner(codes[n, 1], height)
         i, j, of = np.uint64(row), np.uint64(column), np.uint64(n)
         alpha = rgba_tap(texture, i, j, of, 3, a, b)
         if alpha < min_alpha:
@@ -189,19 +234,7 @@ def shade_ray(
         m += 1
         if transmittance < min_light:
             break
-    cam, pix = camera[p], pixel[p]
-    d0, d1, d2 = difference(cut, behind, cam, pix, r0, r1, r2, transmittance)
-    s0, s1, s2 = behind[cam, 0], behind[cam, 1], behind[cam, 2]
-    price = zero if shares or cut[cam, pix, 3] > 0 else np.float32(PRICE) * transmittance
-    # From the back: s is the colour of all that lies behind layer q.
-    for q in range(m - 1, -1, -1):
-        n, alpha, light = layer[q], c[q, 3], before[q]
-        g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
-        wish[n, k, 2], wish[n, k, 3], wish[n, k, 4] = light * alpha * d0, light * alpha * d1, light * alpha * d2
-        wish[n, k, 5] = light * alpha if shares else light * (d0 * g0 + d1 * g1 + d2 * g2)
-        wish[n, k, 5] += price / max(one - alpha, np.float32(CLEAREST))
-        s0, s1, s2 = s0 + alpha * g0, s1 + alpha * g1, s2 + alpha * g2
-    return d0 * d0 + d1 * d1 + d2 * d2
+    return m, transmittance, r0, r1, r2
 
 
 @kernel(parallel=True)

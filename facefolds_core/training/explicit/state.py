@@ -172,9 +172,7 @@ class TextureState:
         texture = self.activated(frame)
         (h, w), n = self.shape, texture.shape[1]
         squares: float = shading_kernel.shade(
-            views.codes,
-            views.camera,
-            views.pixel,
+            *views.arrays,
             rays,
             pictures.cut(frame),
             pictures.behind,

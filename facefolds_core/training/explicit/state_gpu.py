@@ -130,6 +130,7 @@ class GpuTextureState(TextureState):
             (np.float32(min_alpha), MIN_LIGHT, False),
             away.squares,
             LAYERS=n,
+            SAMPLES=max(1, views.finer.shape[1]),
         )
         kernels_gpu.adam_step.run(
             m,
@@ -150,9 +151,8 @@ class GpuTextureState(TextureState):
         kernels_gpu.go_towards.run(len(believed), self._go().layers[0, :, :, 3], goal, np.float32(share))
 
     def _views(self, views: Views) -> tuple[Any, ...]:
-        """Codes, camera and pixel."""
-        arrays = (views.codes, views.camera, views.pixel)
-        return self._kept.get(("views", id(views)), views, lambda: tuple(gpu.to_gpu(array) for array in arrays))
+        """See `Views.arrays`."""
+        return self._kept.get(("views", id(views)), views, lambda: tuple(gpu.to_gpu(array) for array in views.arrays))
 
     def smooth_alpha(self, frame: int) -> None:
         self._smooth_there(self._go().layers[0, :, :, 3])

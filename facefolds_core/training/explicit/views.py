@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.params import MovingParams
@@ -20,32 +21,129 @@ from facefolds_core.spacing import spread
 Array = NDArray[np.float64]
 
 
+FINER = 0.25 * np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
+"""(S, 2): where the rays of a pixel at an outline go through, pixels from its centre. An outline runs through such a
+pixel; elsewhere one ray shows what four do."""
+
+
 @dataclass(frozen=True)
 class Views:
-    """P rays of C training cameras that cross at least one layer.
+    """P pixels of C training cameras whose rays cross at least one layer; Q of them at outlines.
 
     Attributes:
-        codes: (P, N, 2) uint16 (`hit_codes`): the crossing with each layer, over the window. A texel of 512 is 128
-            steps.
+        codes: (P, N, 2) uint16 (`hit_codes`): the crossing of the ray through the centre with each layer, over the
+            window. A texel of 512 is 128 steps.
+        finer: (Q, S, N, 2), of S rays spread over the pixel.
+        which: (P,) int32, which of the Q it is, or -1.
         camera: (P,) int32, position in the list of training cameras.
         pixel: (P,) int32, row-major.
-        directions: (P, 3) float32, unit vectors.
+        directions: (P, 3) float32, unit vectors, through the centre.
     """
 
     codes: NDArray[np.uint16]
+    finer: NDArray[np.uint16]
+    which: NDArray[np.int32]
     camera: NDArray[np.int32]
     pixel: NDArray[np.int32]
     directions: NDArray[np.float32]
 
+    @classmethod
+    def centred(
+        cls,
+        codes: NDArray[np.uint16],
+        camera: NDArray[np.int32],
+        pixel: NDArray[np.int32],
+        directions: NDArray[np.float32],
+    ) -> Views:
+        """Of one ray each."""
+        return cls(
+            codes,
+            np.zeros((0, len(FINER), *codes.shape[1:]), np.uint16),
+            np.full(len(codes), -1, np.int32),
+            camera,
+            pixel,
+            directions,
+        )
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16], *tuple[NDArray[np.int32], ...]]:
+        """Codes, finer, which, camera, pixel: as `shading_kernel.shade` takes them."""
+        return self.codes, self.finer, self.which, self.camera, self.pixel
+
     def part(self, chosen: NDArray[np.integer]) -> Views:
-        """Some of the rays, copied."""
-        return Views(self.codes[chosen], self.camera[chosen], self.pixel[chosen], self.directions[chosen])
+        """Some of the pixels, copied."""
+        which = self.which[chosen]
+        there = which >= 0
+        finer = self.finer[which[there]]
+        which[there] = np.arange(len(finer))
+        return Views(self.codes[chosen], finer, which, self.camera[chosen], self.pixel[chosen], self.directions[chosen])
 
     @staticmethod
     def together(parts: Sequence[Views]) -> Views:
         """One after the other."""
-        arrays = ((part.codes, part.camera, part.pixel, part.directions) for part in parts)
-        return Views(*(np.concatenate(array) for array in zip(*arrays, strict=True)))
+        before = np.cumsum([0, *(len(part.finer) for part in parts)])
+        which = [np.where(part.which < 0, -1, part.which + k) for part, k in zip(parts, before, strict=False)]
+        names = ("codes", "finer", "camera", "pixel", "directions")
+        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return Views(which=np.concatenate(which).astype(np.int32), **joined)
+
+
+SOFT = 8
+"""Codes of a matte between which it is the same: what differs more within 3 x 3 pixels is an outline."""
+FRAMES = 12
+"""In which outlines of a still head are looked for, at most."""
+
+
+class Tracer:
+    """Crosses pixels of training cameras with the layers.
+
+    Args:
+        gpu: whether on a GPU.
+    """
+
+    def __init__(self, scene: Scene, manifolds: RadialManifolds, gpu: bool = False) -> None:
+        self._scene, self._mattes = scene, scene.open_mattes()
+        self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
+        self._belt = manifolds.chart.numbers
+
+    def views(self, position: int, index: int, pixels: NDArray[np.int64], frames: Sequence[int], fine: bool) -> Views:
+        """Those of the pixels (R,) whose rays meet a layer.
+
+        Args:
+            position: of the camera among the training cameras.
+            index: of the camera in the scene.
+            frames: in which outlines count; the camera stands as in the first.
+            fine: whether pixels at outlines have finer rays.
+        """
+        camera = self._scene.camera_in_head(index, frames[0])
+        centres = np.stack([pixels % camera.width, pixels // camera.width], -1) + 0.5
+        codes, directions = self._codes(camera, centres)
+        around = np.flatnonzero(self._outline(index, frames).ravel()[pixels]) if fine else np.zeros(0, np.int64)
+        finer = np.stack([self._codes(camera, centres[around] + offset)[0] for offset in FINER], 1)
+        hit = np.asarray((codes[..., 0] > 0).any(1))
+        hit[around] |= np.asarray((finer[..., 0] > 0).any((1, 2)))
+        which = np.full(len(pixels), -1, np.int32)
+        which[around] = np.arange(len(around))
+        own = np.full(len(pixels), position, np.int32)
+        along = directions.astype(np.float32)
+        return Views(codes, finer, which, own, pixels.astype(np.int32), along).part(np.flatnonzero(hit))
+
+    def _codes(self, camera: Camera, places: NDArray[np.floating]) -> tuple[NDArray[np.uint16], Array]:
+        """(R, N, 2) of rays through places (R, 2), and their directions (R, 3)."""
+        origins, directions = camera.rays(places.astype(np.float64))
+        offsets, directions = np.ascontiguousarray(origins - self._centre), np.ascontiguousarray(directions)
+        distance = self._trace(offsets, directions)
+        return texture_positions(offsets, directions, distance, self._window, self._belt), directions
+
+    def _outline(self, index: int, frames: Sequence[int]) -> NDArray[np.bool_]:
+        """(H, W) pixels around which a matte of one of the frames is not the same."""
+        found, near = np.zeros((self._scene.height, self._scene.width), bool), np.ones((3, 3), np.uint8)
+        for frame in frames:
+            if self._mattes is not None and (index, frame) in self._mattes:
+                matte = self._mattes.image(index, frame)[..., 0]
+                found |= cv2.dilate(matte, near).astype(int) - cv2.erode(matte, near) > SOFT
+        return found
 
 
 def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
@@ -54,22 +152,14 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    codes, cameras, pixels, along = [], [], [], []
-    centre = manifolds.centre.cpu().numpy().astype(np.float64)
-    window, trace = np.array(manifolds.window), manifolds.tracer(gpu)
-    belt = manifolds.chart.numbers
-    for position, index in enumerate(scene.indices("train")):
-        origins, directions = scene.cameras[index].rays()
-        chosen = np.arange(first_pixel(position, stride), scene.height * scene.width, stride)
-        offsets = np.ascontiguousarray(origins.reshape(-1, 3)[chosen] - centre)
-        directions = np.ascontiguousarray(directions.reshape(-1, 3)[chosen])
-        distance = trace(offsets, directions)
-        hit = np.flatnonzero((distance > 0).any(1))
-        codes.append(texture_positions(offsets[hit], directions[hit], distance[hit], window, belt))
-        cameras.append(np.full(len(hit), position, np.int32))
-        pixels.append(chosen[hit].astype(np.int32))
-        along.append(directions[hit].astype(np.float32))
-    views = Views(np.concatenate(codes), np.concatenate(cameras), np.concatenate(pixels), np.concatenate(along))
+    tracer, frames, size = (
+        Tracer(scene, manifolds, gpu),
+        spread(range(scene.num_frames), FRAMES),
+        scene.height * scene.width,
+    )
+    chosen = [np.arange(first_pixel(k, stride), size, stride) for k in range(len(scene.indices("train")))]
+    indices = enumerate(zip(scene.indices("train"), chosen, strict=True))
+    views = Views.together([tracer.views(k, index, pixels, frames, stride == 1) for k, (index, pixels) in indices])
     if len(views.pixel) == 0:
         raise _nothing_seen(scene)
     return views
@@ -186,9 +276,7 @@ class MovingRays:
     ) -> None:
         self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
-        self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
-        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
-        self._belt = manifolds.chart.numbers
+        self._tracer = Tracer(scene, manifolds, gpu)
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = spread(range(scene.num_frames), sampling.frames)
@@ -206,7 +294,7 @@ class MovingRays:
         views = self._kept.get((frame, number))
         if views is None:
             views = self._traced(frame, number, self.shares)
-            size = sum(array.nbytes for array in (views.codes, views.camera, views.pixel, views.directions))
+            size = sum(array.nbytes for array in vars(views).values())
             if size <= self._room:
                 self._kept[frame, number] = views
                 self._room -= size
@@ -224,21 +312,8 @@ class MovingRays:
         chosen = [
             np.arange(first_pixel(c, stride) + stride * phase, size, stride * parts) for c in range(len(self._cameras))
         ]
-        rays = [self._rays(camera, frame, pixels) for camera, pixels in zip(self._cameras, chosen, strict=True)]
-        offsets, directions = (np.concatenate(arrays) for arrays in zip(*rays, strict=True))
-        distance = self._trace(offsets, directions)
-        hit = np.flatnonzero((distance > 0).any(1))
-        codes = texture_positions(offsets[hit], directions[hit], distance[hit], self._window, self._belt)
-        camera = np.repeat(np.arange(len(chosen), dtype=np.int32), [len(pixels) for pixels in chosen])
-        pixels = np.concatenate(chosen)[hit].astype(np.int32)
-        return Views(codes, camera[hit], pixels, directions[hit].astype(np.float32))
-
-    def _rays(self, camera: int, frame: int, pixels: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Origins minus c and directions (R, 3) through pixels (R,)."""
-        seen = self._scene.camera_in_head(camera, frame)
-        places = np.stack([pixels % seen.width + 0.5, pixels // seen.width + 0.5], -1)
-        origins, directions = seen.rays(places)
-        return origins - self._centre, directions
+        cameras, fine = enumerate(zip(self._cameras, chosen, strict=True)), stride == 1
+        return Views.together([self._tracer.views(k, index, own, [frame], fine) for k, (index, own) in cameras])
 
 
 def first_pixel(camera: int, stride: int) -> int:
