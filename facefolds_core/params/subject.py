@@ -106,7 +106,7 @@ class Subject(Overrides):
 
     radius: Annotated[float, Field(gt=0, le=1e9)] | None = None
     """Radius of the ball about the centre that holds the subject, in the capture's unit of length; null takes a ball
-    of 45 cm about a head."""
+    of 45 cm about a head, and what goes on from there towards the cameras."""
 
     mattes: str | None = None
     """Folder of mattes of the scene's pictures, CAMERA.png or CAMERA/FRAME.png. They take the place of the capture's
