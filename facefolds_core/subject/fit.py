@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -85,7 +86,7 @@ def fit_pictures(
     random = np.random.default_rng(seed)
     pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
     count = int(np.clip(pixels / params.pixels, params.fewest, params.most))
-    whole = params.shrunk(pixels / len(pictures))
+    whole = min(1.0, math.sqrt(params.largest * len(pictures) / pixels))
     first, starting = 0, int(params.seeds * count)
     if begun is None:
         over = pictures if opacities is None else [_over_grey(*pair) for pair in zip(pictures, opacities, strict=True)]

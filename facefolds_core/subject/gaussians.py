@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 
@@ -48,7 +47,3 @@ class GaussianParams:
     dropped: float = 0.1
     structure: float = 0.2
     again: float = 0.25
-
-    def shrunk(self, pixels: float) -> float:
-        """By how much a picture of so many pixels is made smaller."""
-        return min(1.0, math.sqrt(self.largest / pixels))

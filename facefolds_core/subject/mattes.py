@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +14,6 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.cut_out import Array, Bool, EdgeParams, agreement, cut_out, grown, pixels, softened
 from facefolds_core.subject.found import background, near_enough, opacity_of, subject_of
-from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.plates import from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import Body
@@ -95,25 +93,15 @@ def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None
     """The body at the centre, as the training pictures of a frame agree on it: what the Gaussians say of each picture
     is said to the pixel by its colours, and these silhouettes vote on the Gaussians."""
     edge, store = edge or EdgeParams(), scene.open_frames()
-    there = [i for i in scene.indices("train") if (i, frame) in store]
-    views = [_smaller(scene.camera_in_head(i, frame), store.image(i, frame)) for i in there]
+    cameras = {i: scene.camera_in_head(i, frame) for i in scene.indices("train") if (i, frame) in store}
     subject, possible = subject_of(splats, scene), near_enough(splats, scene)
     for _ in range(edge.rounds):
         larger = []
-        for one, picture in views:
-            cut = cut_out(picture, opacity_of(splats, subject, one), one, edge)
+        for i, one in cameras.items():
+            cut = cut_out(store.image(i, frame), opacity_of(splats, subject, one), one, edge)
             larger.append((one, grown(cut.astype(np.uint8), pixels(edge.grow, one)) > 0))
         subject = possible & _voted(splats, larger, edge.share)
     return Body(splats, subject, frame)
-
-
-def _smaller(camera: Camera, picture: Image) -> tuple[Camera, Image]:
-    """As large as the Gaussians have seen it: a vote needs no more."""
-    share = GaussianParams().shrunk(camera.width * camera.height)
-    if share == 1:
-        return camera, picture
-    size = round(share * camera.width), round(share * camera.height)
-    return camera.resized(*size), np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _voted(splats: Splats, cuts: list[tuple[Camera, Bool]], share: float) -> Bool:

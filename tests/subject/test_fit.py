@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,9 @@ import pytest
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.frame_store import write_frames
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import rotation
-from facefolds_core.subject import fit, mattes
-from facefolds_core.subject.drawing import View, render, view_of
+from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import fit_room, pictures_of
 from facefolds_core.subject.fit import fit_pictures
 from facefolds_core.subject.foreign import moved, read_start
@@ -116,25 +113,6 @@ def test_subject_mattes_and_what_stands_behind(scene: Scene, splats: Splats) -> 
     behind = background(splats, subject, scene.cameras[HELD])
     beside = ~true
     assert np.abs(behind - wall(scene.cameras[HELD]))[beside].mean() < 0.12
-
-
-def test_large_pictures_are_looked_at_smaller(scene: Scene, splats: Splats, monkeypatch: pytest.MonkeyPatch) -> None:
-    few = GaussianParams(fewest=200, most=200, iterations=12, every=4)
-    cameras, pictures = pictures_of(scene, 0, scene.indices("train"))
-    assert [GaussianParams(largest=100).shrunk(pixels) for pixels in (50, 400)] == [1, 0.5]
-    seen = list[tuple[int, int]]()
-
-    def noted(camera: Camera) -> View:
-        seen.append((camera.width, camera.height))
-        return view_of(camera)
-
-    monkeypatch.setattr(fit, "view_of", noted)
-    fit_pictures(cameras, pictures, replace(few, largest=SIZE * SIZE // 4))
-    assert max(seen) == (SIZE // 2, SIZE // 2)
-    whole = body_among(scene, splats, 0).subject
-    monkeypatch.setattr(mattes, "GaussianParams", lambda: GaussianParams(largest=SIZE * SIZE // 4))
-    voted = body_among(scene, splats, 0).subject
-    assert (voted & whole).sum() > 0.9 * (voted | whole).sum()
 
 
 def test_a_picture_that_contradicts_the_others_is_not_believed(scene: Scene, splats: Splats) -> None:
