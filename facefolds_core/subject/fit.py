@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -86,7 +85,6 @@ def fit_pictures(
     random = np.random.default_rng(seed)
     pixels = sum(picture.shape[0] * picture.shape[1] for picture in pictures)
     count = int(np.clip(pixels / params.pixels, params.fewest, params.most))
-    whole = min(1.0, math.sqrt(params.largest * len(pictures) / pixels))
     first, starting = 0, int(params.seeds * count)
     if begun is None:
         over = pictures if opacities is None else [_over_grey(*pair) for pair in zip(pictures, opacities, strict=True)]
@@ -98,7 +96,7 @@ def fit_pictures(
     level, order = -1.0, np.arange(0)
     for step in range(first, params.iterations):
         done = step / params.iterations
-        size = [share for start, share in params.levels if start <= done][-1] * whole
+        size = [share for start, share in params.levels if start <= done][-1]
         if size != level:
             alphas = [None] * len(cameras) if opacities is None else opacities
             level = size

@@ -14,8 +14,7 @@ class GaussianParams:
         seeds: share of them with which it begins.
         ball: radius about the origin in which depths are looked for most closely, units.
         iterations: steps of Adam, a picture each.
-        levels: from which share of the iterations on pictures of which size,
-        largest: in pixels of a picture, of those that are larger: `most` Gaussians could show no more.
+        levels: from which share of the iterations on pictures of which size.
         rate_mean: Adam's rates of positions, units a step, first and last; farther than 1 unit from the origin in
             proportion to the distance.
         rate_scale, rate_turn, rate_opacity, rate_colour, rate_shine: of the others, see splats.py.
@@ -34,7 +33,6 @@ class GaussianParams:
     ball: float = 0.25
     iterations: int = 2500
     levels: tuple[tuple[float, float], ...] = ((0.0, 0.25), (0.15, 0.5), (0.5, 1.0))
-    largest: int = 400_000
     rate_mean: tuple[float, float] = (1e-4, 2e-6)
     rate_scale: float = 0.01
     rate_turn: float = 0.004
