@@ -84,8 +84,8 @@ def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) 
     params, reach = params or BodyParams(), scene.radius or REACH
     cameras, away = scene.views_of("train"), np.linalg.norm(splats.means, axis=1)
     mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in cameras], 0)
-    before = (splats.means @ mean > TOWARDS * away) & (away < AROUND * reach)
-    inside = (away < reach) | (before if scene.radius is None else False)
+    before = splats.means @ mean > TOWARDS * away
+    inside = away < np.where(before & (scene.radius is None), AROUND * reach, reach)
     seen = seen_by(cameras, splats.means.astype(np.float64))
     return np.asarray(inside & (seen >= min(params.views, len(cameras))))
 

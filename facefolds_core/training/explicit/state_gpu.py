@@ -130,7 +130,7 @@ class GpuTextureState(TextureState):
             (np.float32(min_alpha), MIN_LIGHT, False),
             away.squares,
             LAYERS=n,
-            SAMPLES=max(1, views.finer.shape[1]),
+            SAMPLES=views.finer.shape[1],
         )
         kernels_gpu.adam_step.run(
             m,

@@ -152,14 +152,12 @@ def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    tracer, frames, size = (
-        Tracer(scene, manifolds, gpu),
-        spread(range(scene.num_frames), FRAMES),
-        scene.height * scene.width,
-    )
-    chosen = [np.arange(first_pixel(k, stride), size, stride) for k in range(len(scene.indices("train")))]
-    indices = enumerate(zip(scene.indices("train"), chosen, strict=True))
-    views = Views.together([tracer.views(k, index, pixels, frames, stride == 1) for k, (index, pixels) in indices])
+    tracer, found = Tracer(scene, manifolds, gpu), []
+    frames = spread(range(scene.num_frames), FRAMES)
+    for position, index in enumerate(scene.indices("train")):
+        pixels = np.arange(first_pixel(position, stride), scene.height * scene.width, stride)
+        found.append(tracer.views(position, index, pixels, frames, stride == 1))
+    views = Views.together(found)
     if len(views.pixel) == 0:
         raise _nothing_seen(scene)
     return views
@@ -312,8 +310,8 @@ class MovingRays:
         chosen = [
             np.arange(first_pixel(c, stride) + stride * phase, size, stride * parts) for c in range(len(self._cameras))
         ]
-        cameras, fine = enumerate(zip(self._cameras, chosen, strict=True)), stride == 1
-        return Views.together([self._tracer.views(k, index, own, [frame], fine) for k, (index, own) in cameras])
+        cameras = enumerate(zip(self._cameras, chosen, strict=True))
+        return Views.together([self._tracer.views(k, index, own, [frame], stride == 1) for k, (index, own) in cameras])
 
 
 def first_pixel(camera: int, stride: int) -> int:
