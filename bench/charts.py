@@ -21,7 +21,7 @@ from bench.hazard_rows import CLEAN, ROWS, loss_of
 from bench.results import Cell, Measurement, Row
 from bench.tables import PAPER, RATES, cell_text
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 
 STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 FRONTIER = "Pareto frontier"

@@ -28,7 +28,7 @@ from bench.tables import markdown, number
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.actor import make_rig
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import atomic_folder, read_json
+from facefolds_core.files.writing import atomic_folder, read_json
 from facefolds_core.params import STAGE_SECTIONS, CaptureParams
 from facefolds_core.rendering.areas import view_of
 from facefolds_core.rendering.camera_paths import Eye, camera_of, distance_to_fit

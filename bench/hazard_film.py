@@ -17,11 +17,11 @@ from facefolds_core.captures.actor import ActorOptions, ActorRig, camera_at, mak
 from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.scene import Scene, Split, read_scene, write_scene
 from facefolds_core.captures.sources.multiface import read_multiface
-from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import Image, write_frames
+from facefolds_core.config.source_code import digest_of_file
+from facefolds_core.files.frame_store import Image, write_frames
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
-from facefolds_core.source_code import digest_of_file
 
 EXTREMES = {"+60": 60.0, "-60": -60.0, "+75": 75.0, "-75": -75.0, "+85": 85.0, "-85": -85.0}
 """Held-out cameras besides the rig's: name -> azimuth, degrees to the head's left; training cameras reach 72."""

@@ -14,7 +14,7 @@ from bench.results import Cell
 from facefolds_core.captures.actor import ActorOptions
 from facefolds_core.captures.images import Colour, corrected_colour, to_8bit
 from facefolds_core.captures.scene import SPHERE_CENTRE
-from facefolds_core.frame_store import Image
+from facefolds_core.files.frame_store import Image
 from facefolds_core.geometry.cameras import Camera
 
 Random = np.random.Generator

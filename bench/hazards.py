@@ -28,8 +28,8 @@ from bench.run import Project, own_params, score_model, training_of
 from bench.tables import hazard_tables, replace_between
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.metrics import psnr
 from facefolds_core.scoring.perceptual import Perceptual
 

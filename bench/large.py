@@ -25,7 +25,7 @@ from bench.takes import Watched, watched
 from facefolds_core.captures.gathering import Calibration
 from facefolds_core.captures.krt import read_krt
 from facefolds_core.errors import report_user_errors
-from facefolds_core.files import write_json, write_text
+from facefolds_core.files.writing import write_json, write_text
 from facefolds_core.params import STAGE_SECTIONS, merged
 
 PICTURES = ("images", "masks", "mattes", "plates")

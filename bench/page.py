@@ -19,12 +19,12 @@ from bench.tables import markdown
 from facefolds_core.asset import read_asset
 from facefolds_core.cli.render import parse_size
 from facefolds_core.errors import report_user_errors
-from facefolds_core.files import write_json
-from facefolds_core.player import find_player
+from facefolds_core.files.writing import write_json
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import finer, pixel_means
-from facefolds_core.serving import serving
+from facefolds_core.serving.player import find_player
+from facefolds_core.serving.server import serving
 from tests.chromium import FLAGS, chromium
 from tests.pictures import GREY, GREY_VALUE, five_cameras, psnr
 from tests.viewer.captured import captured

@@ -28,10 +28,10 @@ from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.cli.render import parse_size
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import write_json
-from facefolds_core.player import find_player
+from facefolds_core.files.writing import write_json
 from facefolds_core.rendering.reference import sample_texture
-from facefolds_core.serving import serving
+from facefolds_core.serving.player import find_player
+from facefolds_core.serving.server import serving
 from tests.chromium import FLAGS, chromium
 
 PAGES = ROOT / "bench" / "browser"

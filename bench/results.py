@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files.writing import read_json, write_json
 
 ROOT = Path(__file__).resolve().parents[1]
 Clock = Literal["wall", "processor"]

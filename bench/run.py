@@ -17,10 +17,10 @@ from bench.results import ROOT, Means
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
-from facefolds_core.files import read_json, write_text
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import read_json, write_text
 from facefolds_core.model import load_model
 from facefolds_core.params import merged
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.images import score_images
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.model_view import ModelView

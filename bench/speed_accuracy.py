@@ -18,7 +18,7 @@ from bench import charts
 from bench.results import Clock, Conditions, Measurement, Scores, Store, commit_name, machine_name, mean, now
 from bench.run import Project, own_params, score_model, training_of
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_train
+from facefolds_core.config.stages import read_train
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.model.device import device_of, pick_device
 from facefolds_core.scoring.panels import METRICS

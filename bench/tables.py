@@ -11,7 +11,7 @@ import numpy as np
 from bench.hazard_rows import FILM, ROWS, Hazard, Loss, loss_of
 from bench.results import ROOT, Cell, Row
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_text
+from facefolds_core.files.writing import read_json, write_text
 
 PAPER: dict[str, list[dict[str, Any]]] = read_json(ROOT / "bench" / "results" / "paper.json")
 """Its ablations as printed (docs/research/ablations.md). `other_bytes` is what `disk` leaves out."""

@@ -30,9 +30,9 @@ from PIL import Image
 from bench.run import Project
 from bench.tables import markdown
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files.pictures import open_picture
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.params import STAGE_SECTIONS, merged
-from facefolds_core.pictures import open_picture
 
 RATE = 40.0618
 """Frames a second: 160.2472 a loop of 4 s."""

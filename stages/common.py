@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 
 from facefolds_core.errors import report_user_errors
-from facefolds_core.locks import Lock, try_lock
-from facefolds_core.paths import check_subject_name, subject_folders, subject_of_dvc_stage
+from facefolds_core.files.paths import check_subject_name, subject_folders, subject_of_dvc_stage
 from facefolds_core.pipeline.running import Work, alone, run_alone
-from facefolds_core.processes import end_with_parent
+from facefolds_core.system.locks import Lock, try_lock
+from facefolds_core.system.processes import end_with_parent
 
 Data = Annotated[Path, typer.Option(help="Folder that holds one folder a subject.")]
 KILLED = "if DVC was killed, and says the next time that a file is corrupted, `facefolds doctor` mends it"

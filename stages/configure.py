@@ -9,11 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.generated import is_generated
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.source_code import digests_of_stages
+from facefolds_core.files.paths import SubjectFolders, check_capture_place, check_mattes_place, check_start_place
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.params import STAGE_SECTIONS
-from facefolds_core.params_file import idle_keys, load_params, write_configs
-from facefolds_core.paths import SubjectFolders, check_capture_place, check_mattes_place, check_start_place
-from facefolds_core.source_code import digests_of_stages
 from stages.common import run_for_all
 
 ROOT = Path(__file__).resolve().parents[1]

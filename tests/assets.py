@@ -13,8 +13,8 @@ from facefolds_core.asset.cropping import CroppedLayer, crop_layers
 from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
-from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions

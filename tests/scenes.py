@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.found_scene import GAUSSIANS
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene, Split, write_scene
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import directions_to_uv, uv_to_directions

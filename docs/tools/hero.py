@@ -25,11 +25,11 @@ from bench.run import own_params
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import atomic_file, atomic_folder, read_json, write_text
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_file, atomic_folder, read_json, write_text
 from facefolds_core.params import merged
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.player import find_player
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
+from facefolds_core.serving.player import find_player
 
 NAME = "hero"
 PARAMS = Path(__file__).with_name("hero.yaml")

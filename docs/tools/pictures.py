@@ -26,14 +26,14 @@ from facefolds_core.captures.actor import ActorOptions, camera_at, render
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.cli.render import shrink
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import atomic_file, file_sha256, read_json, write_json
-from facefolds_core.pictures import open_picture
-from facefolds_core.player import find_player
+from facefolds_core.files.pictures import open_picture
+from facefolds_core.files.writing import atomic_file, file_sha256, read_json, write_json
 from facefolds_core.rendering.camera_paths import Eye, camera_of, frame_due, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
 from facefolds_core.rendering.opengl_reflection import Glossy
 from facefolds_core.rendering.pixels import SIDE, finer
-from facefolds_core.serving import serving
+from facefolds_core.serving.player import find_player
+from facefolds_core.serving.server import serving
 from tests.chromium import FLAGS, chromium
 
 IMAGES = ROOT / "docs" / "images"

@@ -15,7 +15,7 @@ import typer
 
 from bench.tables import markdown, number, replace_between, size, spaced
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 README = ("<!-- results: written by docs/tools/scores.py -->", "<!-- end of results -->")

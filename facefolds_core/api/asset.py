@@ -15,9 +15,9 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.player import find_player
 from facefolds_core.rendering.pixels import render
 from facefolds_core.reporting.face import face
+from facefolds_core.serving.player import find_player
 
 HEIGHT = 480
 """Of the player in a notebook, pixels."""

@@ -13,11 +13,11 @@ from facefolds_core.api.work import new_folders, run, set_params, write_defaults
 from facefolds_core.captures import capture as captures
 from facefolds_core.captures.looking import describe, look
 from facefolds_core.captures.sources import read_capture
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config.stages import read_stage, read_subject
 from facefolds_core.errors import UserError
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.reading import is_there
 from facefolds_core.params import CaptureParams, Overrides, Subject, user_error
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.reading import is_there
 from facefolds_core.registry import SOURCES
 
 KEYS = sorted({field.alias or name for name, field in Subject.model_fields.items()} - set(Overrides.model_fields))

@@ -15,9 +15,9 @@ from facefolds_core.api.scene import Scene, load_scene
 from facefolds_core.api.subject import Subject, find_subject
 from facefolds_core.api.work import folders_of, run, set_params
 from facefolds_core.captures.found_scene import GAUSSIANS
-from facefolds_core.config import read_train
+from facefolds_core.config.stages import read_train
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.model import RadianceManifolds
 from facefolds_core.model import load_model as read_model

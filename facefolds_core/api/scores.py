@@ -13,7 +13,7 @@ from facefolds_core.api.scene import Scene
 from facefolds_core.api.work import folders_of, run, set_params
 from facefolds_core.asset.manifest_file import MANIFEST_NAME
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.terminal import score_lines
 
 

@@ -15,8 +15,8 @@ from facefolds_core.api.scene import Scene
 from facefolds_core.api.work import folders_of, run, set_params
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import FrameStore
-from facefolds_core.pictures import open_picture
+from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.files.pictures import open_picture
 from facefolds_core.subject.storage import FoundSubject, read_found
 
 SIDE = 600

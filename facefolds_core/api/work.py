@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.config.params_file import Params, write_configs, write_section
 from facefolds_core.errors import UserError
+from facefolds_core.files.paths import SubjectFolders, subject_folders
 from facefolds_core.params import Subject, section_of
-from facefolds_core.params_file import Params, write_configs, write_section
-from facefolds_core.paths import SubjectFolders, subject_folders
 from facefolds_core.pipeline.running import run_alone
 
 _TEMPORARY: list[TemporaryDirectory[str]] = []

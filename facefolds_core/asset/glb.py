@@ -27,7 +27,7 @@ from facefolds_core.asset.opaque import faces_over, opaque_where_covered
 from facefolds_core.asset.packing import GUTTER
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import st_to_uv
 from facefolds_core.geometry.track import Track

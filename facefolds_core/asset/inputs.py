@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 

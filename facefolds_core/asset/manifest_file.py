@@ -19,7 +19,7 @@ from facefolds_core.asset.manifest_base import without_absent
 from facefolds_core.asset.older import OLDEST, brought_up
 from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_text
+from facefolds_core.files.writing import read_json, write_text
 
 MANIFEST_NAME = "manifest.json"
 SCHEMA_PATH = Path(__file__).with_name("manifest.schema.json")

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from facefolds_core.asset.codecs import Codec
 from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.video import FORMATS, Picture, encode_video
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 
 PICTURES_AHEAD = 2
 """That are made on a thread of their own while one is encoded."""

@@ -13,8 +13,8 @@ from PIL import Image
 from facefolds_core.asset.manifest import REMEDY, Level, Reflection
 from facefolds_core.asset.manifest_base import Rect
 from facefolds_core.errors import UserError
+from facefolds_core.files.pictures import DamagedPictureError, open_picture
 from facefolds_core.geometry.reflections import ReflectionMaps
-from facefolds_core.pictures import DamagedPictureError, open_picture
 
 Codes = NDArray[np.uint8]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from facefolds_core.asset.manifest import Level, Manifest
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, sealed
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 
 PLAYER_FILE = "single.js"
 POLICY = (

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import file_sha256
+from facefolds_core.files.writing import file_sha256
 
 MISSING = "the file is missing"
 

@@ -26,7 +26,7 @@ from facefolds_core.asset.manifest_base import ByteRange, StoredFile
 from facefolds_core.asset.manifest_extras import Audio, Stream
 from facefolds_core.asset.segments import probe_segments
 from facefolds_core.asset.video import FORMATS
-from facefolds_core.files import file_sha256
+from facefolds_core.files.writing import file_sha256
 
 DASH, HLS = "stream.mpd", "stream.m3u8"
 _NAMESPACE = {"mpd": "urn:mpeg:dash:schema:mpd:2011"}

@@ -20,8 +20,8 @@ from facefolds_core.asset.stored import check_file, is_folder, leads_out
 from facefolds_core.asset.track_file import track_problems
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
+from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
 
 _BT709_LIMITED = (1, 1)
 _COLOURFUL = 24

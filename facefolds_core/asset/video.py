@@ -35,7 +35,7 @@ from facefolds_core.asset.containers import container_of, kind_of
 from facefolds_core.asset.packing import GUTTER, MAX_PIXELS, AtlasLayout, cut, fill_cell
 from facefolds_core.asset.regions import Marker, Region
 from facefolds_core.errors import UserError
-from facefolds_core.scheduling import kept_scheduling
+from facefolds_core.system.scheduling import kept_scheduling
 
 _PRIMARIES_BT709 = 1
 _TRANSFER_SRGB = 13  # IEC 61966-2-1 in ITU-T H.273

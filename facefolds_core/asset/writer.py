@@ -34,7 +34,7 @@ from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.regions import Regions, nowhere
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
-from facefolds_core.files import file_sha256
+from facefolds_core.files.writing import file_sha256
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 
 
 @kernel(nogil=True)

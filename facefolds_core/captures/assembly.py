@@ -22,11 +22,11 @@ from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
-from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
-from facefolds_core.spill import by_rows
+from facefolds_core.system.spill import by_rows
 
 Negatives = list[Negative]
 

@@ -17,7 +17,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import FrameRange, Subject
-from facefolds_core.spill import by_rows
+from facefolds_core.system.spill import by_rows
 
 Array = NDArray[np.float64]
 

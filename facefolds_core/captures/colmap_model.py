@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
+from facefolds_core.files.reading import is_regular, read_bytes, read_text
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.reading import is_regular, read_bytes, read_text
 
 Array = NDArray[np.float64]
 

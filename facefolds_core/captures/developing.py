@@ -26,7 +26,7 @@ from facefolds_core.captures.images import corrected_colour, display_colour, dow
 from facefolds_core.captures.lens import Lens, undistort
 from facefolds_core.captures.picture import Picture, VideoFrame, decoded
 from facefolds_core.captures.videos import Channels
-from facefolds_core.frame_store import Image
+from facefolds_core.files.frame_store import Image
 from facefolds_core.params import NormalizeParams
 
 T = TypeVar("T")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.reading import is_there
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.reading import is_there
 
 GAUSSIANS, MATTES = "gaussians.npz", "mattes.arrow"
 """In `data/SUBJECT/subject`."""

@@ -18,9 +18,9 @@ from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
 from facefolds_core.captures.videos import Video, check_together, frame_names
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.files.reading import is_folder
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.params import FrameRange, Subject
-from facefolds_core.reading import is_folder
 
 Array = NDArray[np.float64]
 Photos = Mapping[str, Mapping[str, Picture]]

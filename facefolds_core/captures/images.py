@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from facefolds_core.errors import UserError
-from facefolds_core.pictures import FORMATS, DamagedPictureError, open_picture, picture_size
-from facefolds_core.reading import LARGEST, check_regular, no_memory, read_bytes
+from facefolds_core.files.pictures import FORMATS, DamagedPictureError, open_picture, picture_size
+from facefolds_core.files.reading import LARGEST, check_regular, no_memory, read_bytes
 
 Image = NDArray[np.uint8]
 _REMEDY = "copy the file again from its source, or take this image out of the capture"

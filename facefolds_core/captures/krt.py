@@ -14,8 +14,8 @@ import numpy as np
 from facefolds_core.captures.gathering import Calibration
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
+from facefolds_core.files.reading import is_regular, read_text
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
-from facefolds_core.reading import is_regular, read_text
 
 FULL_SIZE = (1334, 2048)
 """(width, height) of Multiface's own images, v1 and v2."""

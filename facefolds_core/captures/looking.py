@@ -10,7 +10,7 @@ from pathlib import Path
 from facefolds_core.captures.gathering import Recognised
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
-from facefolds_core.reading import is_folder, is_regular
+from facefolds_core.files.reading import is_folder, is_regular
 from facefolds_core.registry import SOURCES
 
 MOST = 2000

@@ -14,7 +14,7 @@ from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track, rigid_motion
 from facefolds_core.params import NormalizeParams
-from facefolds_core.spill import by_rows, running_mean
+from facefolds_core.system.spill import by_rows, running_mean
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
+from facefolds_core.files.reading import read_bytes
 from facefolds_core.geometry.cameras import HUGE
-from facefolds_core.reading import read_bytes
 
 Array = NDArray[np.float64]
 

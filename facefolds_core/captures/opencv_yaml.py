@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.numbers import numbers_from, short
 from facefolds_core.errors import UserError
-from facefolds_core.parsing import parse_yaml
-from facefolds_core.reading import read_text
+from facefolds_core.files.parsing import parse_yaml
+from facefolds_core.files.reading import read_text
 
 REMEDY = "write the calibration again with the tool that made it"
 

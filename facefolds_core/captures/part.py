@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.track import Track
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from facefolds_core.captures.images import Image, decode_image, decode_mask, image_size, opacity_of, rgb_of
 from facefolds_core.captures.videos import Channels, Video
 from facefolds_core.errors import UserError
-from facefolds_core.pictures import FORMATS, DamagedPictureError, picture_size
-from facefolds_core.reading import check_regular
+from facefolds_core.files.pictures import FORMATS, DamagedPictureError, picture_size
+from facefolds_core.files.reading import check_regular
 
 _REMEDY = "copy the file again from its source, or take this camera out of the capture"
 _HEAD = 1 << 16

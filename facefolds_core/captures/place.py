@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from facefolds_core.captures.scene import REACH, Scene
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.spacing import spread
 

@@ -28,15 +28,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, read_fact
-from facefolds_core.files import read_json, write_json
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.archives import read_npz
+from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.files.reading import check_regular, is_there, remake
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
-from facefolds_core.reading import check_regular, is_there, remake
 
 SCENE_VERSION = 3
 """Version 1 had lines of text in `left_out`, version 2 no `poses`; both are still read."""

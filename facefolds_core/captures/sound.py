@@ -11,7 +11,7 @@ import numpy as np
 from av.error import FFmpegError
 
 from facefolds_core.errors import UserError
-from facefolds_core.reading import LARGEST, check_regular, no_memory
+from facefolds_core.files.reading import LARGEST, check_regular, no_memory
 
 _REMEDY = "replace the file, or remove it"
 RATES = (1000, 384_000)

@@ -22,7 +22,7 @@ from av.video.reformatter import Interpolation, VideoReformatter
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.reading import check_regular
+from facefolds_core.files.reading import check_regular
 
 Image = NDArray[np.uint8]
 Channels = Literal["rgb", "opacity"]

@@ -9,7 +9,7 @@ import numpy as np
 from facefolds_core.api.cameras import camera_named, cameras_of_asset
 from facefolds_core.asset.reader import Asset
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json
+from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import Camera
 
 

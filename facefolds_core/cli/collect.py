@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json
+from facefolds_core.files.writing import read_json
 from facefolds_core.sweeps.experiments import runs_of
 from facefolds_core.sweeps.table import write_runs
 

@@ -14,7 +14,7 @@ import typer
 
 from facefolds_core.cli.mending import mend
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.reading import is_there
+from facefolds_core.files.reading import is_there
 
 SYSTEM_LIBRARIES = {
     # shared object -> (who needs it, Debian/Ubuntu package, Fedora package)

@@ -12,7 +12,7 @@ from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.cli.export import Asset, Level
 from facefolds_core.cli.render import pick_level
 from facefolds_core.errors import report_user_errors
-from facefolds_core.player import find_player
+from facefolds_core.serving.player import find_player
 
 
 def command(

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from facefolds_core.errors import UserError
-from facefolds_core.locks import WAIT, try_lock
+from facefolds_core.system.locks import WAIT, try_lock
 
 PATIENCE = 5.0
 """Seconds to wait for a DVC that is at work."""

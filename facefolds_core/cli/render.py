@@ -25,7 +25,7 @@ from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
 from facefolds_core.cli.cameras import named_camera
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VideoCodec
 from facefolds_core.rendering.camera_paths import (

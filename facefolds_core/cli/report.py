@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.player import find_player
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.reporting.build import make_report
+from facefolds_core.serving.player import find_player
 
 
 def evaluated_subjects(data: Path) -> list[Path]:

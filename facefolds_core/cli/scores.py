@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files import read_json
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.reading import check_regular
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.reading import check_regular
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.terminal import result_lines, score_lines
 
 REMEDY = "make it again with `dvc repro`"

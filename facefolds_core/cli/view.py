@@ -14,8 +14,8 @@ import typer
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.stored import is_folder
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.player import find_player
-from facefolds_core.serving import serving
+from facefolds_core.serving.player import find_player
+from facefolds_core.serving.server import serving
 
 
 def latest_asset(data: Path) -> Path:

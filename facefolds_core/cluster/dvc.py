@@ -11,7 +11,7 @@ from itertools import groupby
 
 from dvc.cli import main
 
-from facefolds_core.processes import end_with_parent
+from facefolds_core.system.processes import end_with_parent
 
 THEN = "--then"
 

@@ -27,7 +27,7 @@ from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.project import Project
 from facefolds_core.errors import UserError
-from facefolds_core.processes import with_threads
+from facefolds_core.system.processes import with_threads
 
 RUNNING = re.compile(r"Running stage '([^']+)'")
 LOST_RECORD = re.compile(r"^ERROR: .*\bruns\b.*\.tmp'", re.MULTILINE)

@@ -19,10 +19,10 @@ from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.job import RUNNING, Job, Outcome
 from facefolds_core.cluster.lockfile import parts_of, put_together
 from facefolds_core.cluster.project import CODE
+from facefolds_core.config.params_file import Params
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_text
-from facefolds_core.params_file import Params
-from facefolds_core.parsing import brief, parse_yaml
+from facefolds_core.files.parsing import brief, parse_yaml
+from facefolds_core.files.writing import write_text
 from facefolds_core.sweeps.edit import set_for_subject
 
 BUSY = "is busy, it is being blocked by"

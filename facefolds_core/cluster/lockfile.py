@@ -14,7 +14,7 @@ from typing import Any
 from dvc.repo import Repo
 from ruamel.yaml import YAML
 
-from facefolds_core.files import write_text
+from facefolds_core.files.writing import write_text
 
 LOCK = "dvc.lock"
 

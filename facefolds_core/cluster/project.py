@@ -15,7 +15,7 @@ from dvc.config import Config
 from facefolds_core.cluster.lockfile import LOCK
 from facefolds_core.cluster.run_cache import drop_empty_runs
 from facefolds_core.errors import UserError
-from facefolds_core.reading import is_regular
+from facefolds_core.files.reading import is_regular
 
 CODE = ("facefolds_core", "stages")
 FILES = ("dvc.yaml", "params.yaml", ".dvcignore", ".dvc/config", ".dvc/config.local")

@@ -23,7 +23,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
 from facefolds_core.engines._picture import rgb_picture
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import window_to_window
 

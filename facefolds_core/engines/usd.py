@@ -27,7 +27,7 @@ from facefolds_core.asset.manifest import Texture
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.engines._picture import rgb_picture
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file, atomic_folder
+from facefolds_core.files.writing import atomic_file, atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 
 STAGE = "face.usdc"

@@ -23,10 +23,10 @@ from facefolds_core.export.bake_kernel import accumulate, render, true_positions
 from facefolds_core.export.sheets import sheet_faces, sheet_mesh, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.export.textures import fill_colour, premultiply, straight
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.hit_codes import encode
+from facefolds_core.kernels.hit_codes import encode
 from facefolds_core.progress import progress as progress_bar
 from facefolds_core.rendering.raster import cast_mesh
 

@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.export.stores import Grids
 from facefolds_core.export.textures import resample
 from facefolds_core.facts import Fact, fact
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.rendering import Hits, composite

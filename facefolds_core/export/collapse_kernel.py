@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from facefolds_core.export.quadrics_kernel import TERMS, cost
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.kernels.jit import inlined, kernel
 
 MOST_NEIGHBOURS = 64
 """A collapse that would give a vertex more neighbours than this is not made."""

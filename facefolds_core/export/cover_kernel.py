@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.kernels.jit import inlined, kernel
 
 
 @inlined

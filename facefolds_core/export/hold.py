@@ -22,12 +22,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.export.bake import MIN_LIGHT
 from facefolds_core.export.hold_kernel import add_weights, hold
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.progress import progress as progress_bar
-from facefolds_core.source_code import digest_of_packages
 from facefolds_core.spacing import spread
 
 LOOKED_AT = 6

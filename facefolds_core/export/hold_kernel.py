@@ -8,9 +8,9 @@ import numpy as np
 from numba import prange
 
 from facefolds_core.export.bake_kernel import _tap
-from facefolds_core.hit_codes import corner
-from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
+from facefolds_core.kernels.hit_codes import corner
+from facefolds_core.kernels.jit import compiled, inlined, kernel
+from facefolds_core.kernels.scatter import BLOCK, CHUNK, scatter_of, spread
 
 _scatter = scatter_of(2)
 

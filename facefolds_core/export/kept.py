@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder, read_json, write_json
-from facefolds_core.frame_store import FrameStore, Image
+from facefolds_core.files.frame_store import FrameStore, Image
+from facefolds_core.files.writing import atomic_folder, read_json, write_json
 
 STORE, INDEX = "textures.arrow", "frames.json"
 

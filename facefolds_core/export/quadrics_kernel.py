@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.kernels.jit import inlined, kernel
 
 TERMS = 21
 """Of a quadric in five dimensions: 15 of the symmetric matrix, 5 linear, 1 constant."""

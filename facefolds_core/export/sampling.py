@@ -14,16 +14,16 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
-from facefolds_core.source_code import digest_of_packages
 
 DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""

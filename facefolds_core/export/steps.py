@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
 from facefolds_core.export.choosing import MESHES, choose_meshes, choose_texels
@@ -28,12 +29,11 @@ from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.sheets import Gridded, grid_sheets
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.facts import Fact
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
 from facefolds_core.progress import progress
-from facefolds_core.source_code import digest_of_packages
 
 TEXTURES = "textures.arrow"
 """Name of a frame store of textures, N layers x K frames, in its folder."""

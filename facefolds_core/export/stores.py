@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
+from facefolds_core.files.archives import read_npz
+from facefolds_core.files.reading import remake
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.reading import remake
 
 
 @dataclass(frozen=True)

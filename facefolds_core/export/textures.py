@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.progress import progress as progress_bar
-from facefolds_core.source_code import digest_of_packages
 
 Float = NDArray[np.float32]
 Image = NDArray[np.uint8]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from facefolds_core.jit import inlined
+from facefolds_core.kernels.jit import inlined
 
 _TO_UV = 2.0 / math.pi
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numba import cuda
 
-from facefolds_core import gpu
-from facefolds_core.gpu import entry
+from facefolds_core.kernels import gpu
+from facefolds_core.kernels.gpu import entry
 from facefolds_core.model.radial_kernel import cross
 
 LAYERS = 1

@@ -12,8 +12,8 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.chart_kernel import chart_position
-from facefolds_core.hit_codes import SCALE
-from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.kernels.hit_codes import SCALE
+from facefolds_core.kernels.jit import compiled, inlined, kernel
 
 Array = NDArray[Any]
 

@@ -16,10 +16,10 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from facefolds_core.errors import UserError
+from facefolds_core.files.reading import check_regular
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.reflection import Reflection
-from facefolds_core.reading import check_regular
 
 FOLDER = "segments"
 """In a model's folder."""

@@ -11,7 +11,8 @@ import torch
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files.reading import check_regular
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.manifolds import MlpManifolds
@@ -21,7 +22,6 @@ from facefolds_core.model.reflection import Reflection, ReflectionShape
 from facefolds_core.model.segmented import SegmentedTextures, segment_file
 from facefolds_core.model.tensor_files import check_tensors, read_tensors, write_tensors
 from facefolds_core.model.textures import MlpTextures
-from facefolds_core.reading import check_regular
 from facefolds_core.registry import MODELS
 
 _REMEDY = "train again: `dvc repro --force train@SUBJECT`"

@@ -12,8 +12,8 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from facefolds_core.errors import UserError, disk_error, is_disk_error
-from facefolds_core.files import atomic_file
-from facefolds_core.reading import check_regular, no_memory
+from facefolds_core.files.reading import check_regular, no_memory
+from facefolds_core.files.writing import atomic_file
 
 
 def write_tensors(path: Path, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:

@@ -31,10 +31,11 @@ from facefolds_core.asset.writer import (
     manifest_of,
 )
 from facefolds_core.captures.scene import Scene
+from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import Grids
-from facefolds_core.files import atomic_folder, file_sha256
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.files.writing import atomic_folder, file_sha256
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
@@ -45,7 +46,6 @@ from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.packaging.views import training_cameras
 from facefolds_core.params import CompressParams, LevelParams
-from facefolds_core.source_code import digest_of_packages
 from facefolds_core.spacing import spread
 
 POSTER_SIDE = 720

@@ -24,7 +24,8 @@ from facefolds_core.asset.reader import Asset, read_asset
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files.pictures import open_picture
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
@@ -33,7 +34,6 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.packaging.levels import Resampled
 from facefolds_core.packaging.rungs import write_rungs
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
-from facefolds_core.pictures import open_picture
 from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset
 

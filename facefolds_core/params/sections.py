@@ -9,6 +9,7 @@ from typing import Annotated, Any, Union, cast, get_args, get_origin
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from facefolds_core.errors import UserError
+from facefolds_core.files.parsing import brief
 from facefolds_core.params.base import Section
 from facefolds_core.params.capture import CaptureParams, NormalizeParams
 from facefolds_core.params.compress import CompressParams
@@ -17,7 +18,6 @@ from facefolds_core.params.export import BakeParams, DecimateParams, Reconstruct
 from facefolds_core.params.gaussians import SubjectParams
 from facefolds_core.params.renamed import remedy_for
 from facefolds_core.params.train import PRESETS, TrainParams, TrainSection
-from facefolds_core.parsing import brief
 
 SECTIONS: dict[str, tuple[type[Section], ...]] = {
     "capture": (CaptureParams,),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config.stages import read_stage
 from facefolds_core.export import steps
 from facefolds_core.export.stores import read_grids, read_meshes
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import BakeParams
-from facefolds_core.paths import SubjectFolders
 
 
 def bake(folders: SubjectFolders) -> str:

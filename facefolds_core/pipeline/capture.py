@@ -6,13 +6,13 @@ from pathlib import Path
 
 from facefolds_core.captures.actor import write_capture
 from facefolds_core.captures.generated import is_generated
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config.stages import read_stage, read_subject
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files.paths import SubjectFolders, check_capture_place
+from facefolds_core.files.reading import is_folder, is_regular
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.paths import SubjectFolders, check_capture_place
 from facefolds_core.progress import progress
-from facefolds_core.reading import is_folder, is_regular
 
 
 def capture(folders: SubjectFolders) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.facts import Fact
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 
 CHOICE = "choice.json"
 

@@ -7,14 +7,14 @@ import sys
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.reader import read_level
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config.stages import read_stage
 from facefolds_core.export.steps import TEXTURES
 from facefolds_core.export.stores import read_chart, read_meshes, read_reflection_maps, read_windows
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.packaging.package import Export, package
 from facefolds_core.params import CompressParams
-from facefolds_core.paths import SubjectFolders
 
 
 def compress(folders: SubjectFolders) -> str:

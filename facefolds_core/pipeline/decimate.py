@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_level_resolutions, read_stage
+from facefolds_core.config.stages import read_level_resolutions, read_stage
 from facefolds_core.export import steps
 from facefolds_core.export.decimation import layer_order
 from facefolds_core.export.stores import holds_sheets, read_grids, read_sheets, read_surfaces, write_meshes
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import DecimateParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.choices import write_choice
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
-from facefolds_core.config import read_stage, read_train
+from facefolds_core.config.stages import read_stage, read_train
 from facefolds_core.facts import Fact
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.params import CompressParams, EvaluateParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.scoring.evaluation import Evaluation
 from facefolds_core.scoring.evaluation import evaluate as score
 from facefolds_core.scoring.perceptual import find_perceptual

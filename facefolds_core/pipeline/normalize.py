@@ -5,9 +5,9 @@ from __future__ import annotations
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import read_capture
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config.stages import read_stage, read_subject
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import CaptureParams, NormalizeParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.training.registration import with_found_poses
 
 SHOWN = 5

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from facefolds_core.config import read_stage
+from facefolds_core.config.stages import read_stage
 from facefolds_core.export.poisson import reconstruct_layers
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Grids, read_grids, write_sheets, write_surfaces
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import ReconstructParams
-from facefolds_core.paths import SubjectFolders
 
 
 def reconstruct(folders: SubjectFolders) -> str:

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
-from facefolds_core.locks import holding, owner
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_json
+from facefolds_core.system.locks import holding, owner
 
 Work = Callable[[SubjectFolders], str]
 """Does a stage's work on one subject's folders, and says in a line what was made and where; more lines may follow."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.config import read_stage, read_train
+from facefolds_core.config.stages import read_stage, read_train
 from facefolds_core.errors import UserError
 from facefolds_core.export.steps import SAMPLED_VIEWS, check_frames, sample_model
 from facefolds_core.export.stores import write_grids
 from facefolds_core.facts import shorten
-from facefolds_core.files import atomic_folder, read_json
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder, read_json
 from facefolds_core.model import load_model
 from facefolds_core.model.device import device_of
 from facefolds_core.params import SampleParams
-from facefolds_core.paths import SubjectFolders
 
 
 def _key_frames(fit: Path, scene: Scene) -> list[int] | None:

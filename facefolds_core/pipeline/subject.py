@@ -6,10 +6,10 @@ from collections import Counter
 from pathlib import Path
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage, read_subject
+from facefolds_core.config.stages import read_stage, read_subject
 from facefolds_core.facts import shorten
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import SubjectParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.subject.folder import make_folder
 
 WORDS = {

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.config import read_stage
+from facefolds_core.config.stages import read_stage
 from facefolds_core.export.steps import TEXTURES, texels_for
 from facefolds_core.export.stores import read_grids, read_meshes
 from facefolds_core.export.textures import resample_store
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import TextureParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.choices import write_choice
 
 

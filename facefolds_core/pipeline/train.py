@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from facefolds_core import models
 from facefolds_core.captures.found_scene import found_scene
-from facefolds_core.config import read_train
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.training import models
+from facefolds_core.config.stages import read_train
+from facefolds_core.files.paths import SubjectFolders
 
 
 def train(folders: SubjectFolders) -> str:

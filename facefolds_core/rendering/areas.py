@@ -16,7 +16,7 @@ from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.jit import compiled, kernel
+from facefolds_core.kernels.jit import compiled, kernel
 from facefolds_core.rendering.pixels import SIDE, Image, Lit, finer, lit_hits, pixel_means, strips_of
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import BLACK, Hits, Layered, seen_from

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 from facefolds_core.rendering.reference import Hits, Mesh
 
 EDGE = 1e-9

@@ -13,8 +13,8 @@ from markupsafe import Markup
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.facts import worded
-from facefolds_core.files import write_text
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.face import face
 from facefolds_core.reporting.facts import Facts, finite, read_facts

@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json
-from facefolds_core.paths import SubjectFolders
-from facefolds_core.reading import check_regular, is_there, no_memory
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.reading import check_regular, is_there, no_memory
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.panels import HEADLINES
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"

@@ -16,8 +16,8 @@ from PIL import Image
 from facefolds_core.asset import Asset
 from facefolds_core.asset.manifest_file import MANIFEST_NAME
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
-from facefolds_core.pictures import DamagedPictureError, open_picture
+from facefolds_core.files.pictures import DamagedPictureError, open_picture
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.scoring.films import FilmFile
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import HEADLINES, Panel

@@ -15,8 +15,8 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact
-from facefolds_core.files import atomic_file, read_json
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import atomic_file, read_json
 from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, HEADLINES, LEAST, VARIANTS, ImageScore
 from facefolds_core.scoring.patches import WorstPatch
 from facefolds_core.scoring.temporal import Change

@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.scoring.metrics import Array
 from facefolds_core.scoring.panels import ImageScore, Panel
 from facefolds_core.scoring.report import headline

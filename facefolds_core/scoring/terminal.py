@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from facefolds_core.captures.scene import Split
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.scoring.truths import MatteKind
 
 NAME, CELL = 42, 12

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.scoring.metrics import Array
 
 MatteKind = Literal["true", "scene", "found"]

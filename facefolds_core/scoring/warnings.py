@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from facefolds_core.facts import WARNINGS, Fact, fact, read_fact
-from facefolds_core.files import read_json
+from facefolds_core.files.reading import is_there
+from facefolds_core.files.writing import read_json
 from facefolds_core.params import ScoreWarningParams
-from facefolds_core.reading import is_there
 from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.truths import MatteKind
 

@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import prange
 
-from facefolds_core.adam import EPSILON
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.adam import EPSILON
+from facefolds_core.kernels.jit import kernel
 
 
 @kernel(parallel=True)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.lanes import LANES, fill, highest, least, load, most, store, total, where_less
+from facefolds_core.kernels.jit import compiled, inlined, kernel
+from facefolds_core.kernels.lanes import LANES, fill, highest, least, load, most, store, total, where_less
 from facefolds_core.subject.project_kernel import FAINT, FLAT
 
 TILE = (LANES, 16)

@@ -14,11 +14,11 @@ from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_folder
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
+from facefolds_core.files.reading import is_there
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import SubjectParams
-from facefolds_core.reading import is_there
 from facefolds_core.spacing import spread
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.drawing import draw, view_of

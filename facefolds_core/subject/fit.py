@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.adam import corrections, decays
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.subject.adam_kernel import adam_step
 from facefolds_core.subject.density import grown, thinned
 from facefolds_core.subject.drawing import View, differentiate, draw, view_of

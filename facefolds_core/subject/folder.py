@@ -20,8 +20,8 @@ from PIL import Image as Pillow
 from facefolds_core.captures.found_scene import GAUSSIANS, MATTES
 from facefolds_core.captures.given_mattes import given_mattes
 from facefolds_core.captures.scene import Scene
-from facefolds_core.files import atomic_folder, write_json
-from facefolds_core.frame_store import Image, write_frames
+from facefolds_core.files.frame_store import Image, write_frames
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.params import SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.spacing import spread

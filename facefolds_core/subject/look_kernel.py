@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.kernels.jit import compiled, inlined, kernel
 from facefolds_core.subject.trilinear import sample
 
 CLEAR, OPAQUE = 1e-4, 1e-3

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
-from facefolds_core.reading import read_bytes
+from facefolds_core.files.reading import read_bytes
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.subject.splats import COLOUR, COLUMNS, MEAN, OPACITY, SCALE, SHINE, TURN, Splats
 
 Array = NDArray[np.float32]

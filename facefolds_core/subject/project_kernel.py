@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.jit import compiled, kernel
+from facefolds_core.kernels.jit import compiled, kernel
 
 PLANE = 13
 """Columns of what a picture sees of a Gaussian: mean x, y in pixels; p = A dx^2 + B dx dy + C dy^2 as A, B, C, its

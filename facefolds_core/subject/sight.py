@@ -9,7 +9,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 
 
 def seen_by(cameras: Sequence[Camera], points: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.archives import read_npz
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
-from facefolds_core.reading import remake
+from facefolds_core.files.archives import read_npz
+from facefolds_core.files.reading import remake
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.splats import COLUMNS, Splats
 

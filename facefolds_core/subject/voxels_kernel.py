@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 
 
 @kernel()

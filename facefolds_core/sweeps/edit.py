@@ -11,10 +11,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
+from facefolds_core.config.params_file import load_params
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
-from facefolds_core.params_file import load_params
-from facefolds_core.parsing import brief
+from facefolds_core.files.parsing import brief
+from facefolds_core.files.writing import atomic_file
 
 
 def set_for_subject(path: Path, subject: str, values: Mapping[str, Any]) -> None:

@@ -20,8 +20,8 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import atomic_file
-from facefolds_core.parsing import parse_json
+from facefolds_core.files.parsing import parse_json
+from facefolds_core.files.writing import atomic_file
 
 NAMES = ("experiment", "revision", "subject", "error")
 SUFFIXES = (".parquet", ".csv")

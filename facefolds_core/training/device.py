@@ -24,7 +24,7 @@ class Device:
     def name(self) -> str:
         if not self.gpu:
             return device_name(torch.device("cpu"))
-        from facefolds_core import gpu
+        from facefolds_core.kernels import gpu
 
         return gpu.name()
 
@@ -32,7 +32,7 @@ class Device:
         """Bytes in use on the GPU, or resident in this process, at most until now."""
         if not self.gpu:
             return peak_memory(torch.device("cpu"))
-        from facefolds_core import gpu
+        from facefolds_core.kernels import gpu
 
         return gpu.most_bytes()
 
@@ -47,7 +47,7 @@ def choose(name: Literal["auto", "cpu", "cuda"]) -> Device:
         return Device(False)
     if importlib.util.find_spec("numba_cuda") is None:
         raise _none("numba-cuda, which is not installed", "pip install 'facefolds[cuda]'")
-    from facefolds_core import gpu
+    from facefolds_core.kernels import gpu
 
     if not gpu.available():
         raise _none("an NVIDIA GPU and its driver", "see whether `nvidia-smi` shows one")

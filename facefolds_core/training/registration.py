@@ -23,17 +23,17 @@ from facefolds_core.captures.motion import in_head, is_much
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
-from facefolds_core.files import atomic_file
+from facefolds_core.files.writing import atomic_file
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track, own_track
 from facefolds_core.params import NormalizeParams, SubjectParams
 from facefolds_core.progress import progress
-from facefolds_core.spill import by_rows
 from facefolds_core.subject.find import find_subject, reference_frame
 from facefolds_core.subject.foreign import moved
 from facefolds_core.subject.storage import BODY, Body, write_body
 from facefolds_core.subject.volume import Volume, volume_of
+from facefolds_core.system.spill import by_rows
 from facefolds_core.training.alignment import MIN_COSINE, Equations, Picture, Points, features, look_up, refined, unit
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from facefolds_core.files import atomic_folder, write_json
+from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import Spec, save_model
 from facefolds_core.training.report import TrainingReport

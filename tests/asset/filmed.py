@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from facefolds_core.captures.scene import Scene, write_scene
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.similarity import Similarity

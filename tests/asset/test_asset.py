@@ -11,7 +11,7 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import (

@@ -17,12 +17,12 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import write_meshes
-from facefolds_core.files import write_text
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_text
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.packaging.poster import BACKGROUND
 from facefolds_core.params import CompressParams, merged
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.compress import compress
 from tests.assets import CENTRE, PLAIN, WINDOW, cap_crops, cap_mesh, cap_textures, radius_of, write_store
 from tests.scenes import look_at_origin

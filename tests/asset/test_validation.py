@@ -20,7 +20,7 @@ from facefolds_core.asset.manifest import Manifest
 from facefolds_core.asset.manifest_file import write_manifest
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.files import file_sha256
+from facefolds_core.files.writing import file_sha256
 from tests.assets import cap_mesh, make_asset
 
 FILES = ["manifest.json", "full_meshes.bin", "full.mp4"]

@@ -16,7 +16,7 @@ from bench.hazard_rows import HAZARDS, Hazard
 from bench.results import Cell, Measurement, Row, Store
 from bench.run import Project
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 from facefolds_core.sweeps.table import Run
 from tests.scoring.fakes import FRAMES, flat_scene, half_mask
 

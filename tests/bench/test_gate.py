@@ -14,7 +14,7 @@ from bench.gate import Found, falls
 from bench.results import Store
 from bench.run import Project
 from facefolds_core.captures.actor import make_rig
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 from facefolds_core.params import CaptureParams
 from tests.bench.test_commands import invoke
 

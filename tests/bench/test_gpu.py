@@ -10,7 +10,7 @@ import typer
 pytest.importorskip("numba_cuda", reason="the extra `cuda` is not installed")
 
 from bench import gpu as bench_gpu
-from facefolds_core import gpu
+from facefolds_core.kernels import gpu
 
 
 def test_without_a_gpu_it_ends_with_a_message(

@@ -12,7 +12,7 @@ from bench.results import ROOT
 from bench.run import Project, own_params, score_model, training_of
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 from facefolds_core.model.storage import save_model
 from facefolds_core.scoring.perceptual import Perceptual
 from tests.scoring.fakes import FRAMES, SPEC, flat_scene, half_mask, tiny_model

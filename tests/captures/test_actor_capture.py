@@ -12,9 +12,9 @@ from facefolds_core.captures.actor import SEGMENT, make_rig, render, tracked_mes
 from facefolds_core.captures.actor.motion import pose_at
 from facefolds_core.captures.actor.shape import distance
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json, write_json
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.params import CaptureParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.capture import capture
 
 PARAMS = CaptureParams(cameras=3, frames=2, height=48, width=32, plates=False)

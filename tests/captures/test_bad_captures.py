@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from facefolds_core.config.params_file import Params, write_configs
 from facefolds_core.errors import UserError
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import Subject
-from facefolds_core.params_file import Params, write_configs
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.normalize import normalize
 from tests.captures.fixtures import (
     HEAD_TO_WORLD,

@@ -10,7 +10,7 @@ import pytest
 
 from facefolds_core.captures.actor.capture import krt_block
 from facefolds_core.captures.scene import Scene
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 from tests.captures.fixtures import intrinsics, opengl_matrix, save
 from tests.filmed import check_same, film, scene_of
 

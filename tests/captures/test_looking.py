@@ -13,8 +13,8 @@ from facefolds_core.captures.looking import describe, look
 from facefolds_core.captures.sources import read_capture
 from facefolds_core.cli import app
 from facefolds_core.errors import UserError
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.registry import SOURCES
 from tests.captures.fixtures import pattern, save, write_multiface, write_transforms
 

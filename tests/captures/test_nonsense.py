@@ -18,10 +18,10 @@ from pydantic import ValidationError
 
 from facefolds_core.captures.capture import frame_rate
 from facefolds_core.captures.sound import cut_sound
+from facefolds_core.config.params_file import Params, write_configs
 from facefolds_core.errors import UserError
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.params import Subject
-from facefolds_core.params_file import Params, write_configs
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.pipeline.capture import capture
 from facefolds_core.pipeline.normalize import normalize
 from tests.captures.fixtures import (

@@ -17,7 +17,7 @@ from PIL import Image as Pillow
 
 from facefolds_core.captures.images import decode_image, image_size
 from facefolds_core.errors import UserError
-from facefolds_core.pictures import DamagedPictureError, open_picture, picture_size
+from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
 from tests.hostile.damage import flip_bits, truncate, zero_tail
 
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 40 64\nshowpage\n%%EOF\n"

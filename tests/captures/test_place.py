@@ -13,9 +13,9 @@ from facefolds_core.captures.place import BALL, ball_outline
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
+from facefolds_core.files.pictures import open_picture
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import NormalizeParams, Subject
-from facefolds_core.pictures import open_picture
 from tests.captures.fixtures import HEAD, world_camera, write_multiface
 
 

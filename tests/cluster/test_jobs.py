@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from facefolds_core.cluster.jobs import links_of
-from facefolds_core.params_file import load_params
+from facefolds_core.config.params_file import load_params
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
-from facefolds_core.paths import (
+from facefolds_core.files.paths import (
     SubjectFolders,
     check_capture_place,
     check_mattes_place,
@@ -19,6 +18,7 @@ from facefolds_core.paths import (
     subject_folders,
     subject_of_dvc_stage,
 )
+from facefolds_core.files.writing import write_json
 from facefolds_core.pipeline.capture import capture
 from stages.common import run_stage
 from stages.configure import configure

@@ -9,10 +9,10 @@ import pytest
 
 from docs.tools import hero
 from facefolds_core.asset import read_asset
-from facefolds_core.files import write_json
+from facefolds_core.config.params_file import load_params
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_json
 from facefolds_core.params import CaptureParams
-from facefolds_core.params_file import load_params
-from facefolds_core.paths import SubjectFolders
 from tests.assets import make_asset
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from docs.tools.scores import readme_table
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 
 
 def test_without_results_there_is_no_table(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.hit_codes import SCALE
+from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
 
 

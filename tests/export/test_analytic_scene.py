@@ -20,7 +20,7 @@ from facefolds_core.export.sampling import sample_grids, write_textures
 from facefolds_core.export.sheets import full_meshes, grid_sheets
 from facefolds_core.export.textures import resample_store
 from facefolds_core.export.window import visible_window
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams, ReconstructParams

@@ -16,7 +16,7 @@ from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
-from facefolds_core.hit_codes import SCALE
+from facefolds_core.kernels.hit_codes import SCALE
 from tests.ellipsoids import Ellipsoids
 from tests.export import bake_reference
 from tests.scenes import look_at_origin

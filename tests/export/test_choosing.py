@@ -17,8 +17,8 @@ from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Grids
 from facefolds_core.facts import fact
-from facefolds_core.files import read_json
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
+from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps

@@ -12,7 +12,7 @@ from facefolds_core.export.bake_kernel import render
 from facefolds_core.export.hold import held_rows, parts, texel_weights
 from facefolds_core.export.hold_kernel import add_weights, hold, steady
 from facefolds_core.export.kept import KeptFrames
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 
 
 def kept(y: np.ndarray, price: float) -> np.ndarray:

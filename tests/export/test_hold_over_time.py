@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.export.hold import held_rows, texel_weights
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import directions_to_uv
 from facefolds_core.params import BakeParams

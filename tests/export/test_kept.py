@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.export.kept import INDEX, STORE, KeptFrames, digest_of, digest_of_frame
-from facefolds_core.frame_store import FrameStore, Image, write_frames
+from facefolds_core.files.frame_store import FrameStore, Image, write_frames
 
 LAYERS, FRAMES = 2, 3
 

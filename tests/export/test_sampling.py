@@ -15,7 +15,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.export import sampling
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.sampling import grid_normals, sample_grids, samples_for, texture_rows, write_textures
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import FULL_WINDOW, Window, points_to_uv, row_strides, texel_uv, uv_to_directions
 from facefolds_core.model.textures import TexelGrid

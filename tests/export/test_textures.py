@@ -10,7 +10,7 @@ import pytest
 from facefolds_core.errors import UserError
 from facefolds_core.export import textures
 from facefolds_core.export.textures import Image, resample, resample_store
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 
 
 def constant(size: int, rgba: tuple[int, int, int, int]) -> np.ndarray:

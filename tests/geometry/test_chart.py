@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.chart_kernel import chart_position
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 
 C = (-0.25, 0.1, 0.05)
 SPHERE = Chart(C)

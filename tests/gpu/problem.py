@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.gpu import Entry, to_gpu
+from facefolds_core.kernels.gpu import Entry, to_gpu
 
 
 @dataclass(frozen=True)

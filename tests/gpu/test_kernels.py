@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("numba_cuda", reason="the extra `cuda` is not installed: kernels for GPUs are not tested")
 
-from facefolds_core import gpu
+from facefolds_core.kernels import gpu
 from tests.gpu.problems import PROBLEMS
 
 

@@ -32,7 +32,7 @@ def test_a_training_gives_the_same_model(tmp_path: Path, project_root: Path) -> 
 
 
 def test_cuda_without_the_extra_or_without_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from facefolds_core import gpu
+    from facefolds_core.kernels import gpu
 
     monkeypatch.setattr(gpu, "available", lambda: False)
     with pytest.raises(UserError, match="nvidia-smi"):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.adam import decays
+from facefolds_core.kernels.adam import decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, kernels_gpu, shading_kernel, smoothing
 from facefolds_core.training.explicit.rates import BETAS

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.errors import as_user_error
-from facefolds_core.files import PREFIX, write_json
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import PREFIX, write_json
 from facefolds_core.pipeline.bake import bake
 from facefolds_core.pipeline.capture import capture
 from facefolds_core.pipeline.compress import compress

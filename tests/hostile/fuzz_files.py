@@ -19,7 +19,8 @@ import pyarrow.parquet as pq
 import torch
 
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
-from facefolds_core.config import read_subject, read_train
+from facefolds_core.config.params_file import Params, write_configs
+from facefolds_core.config.stages import read_subject, read_train
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import (
@@ -37,14 +38,13 @@ from facefolds_core.export.stores import (
     write_sheets,
     write_surfaces,
 )
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.storage import ModelSpec, build_model, load_model, save_model
 from facefolds_core.params import Subject
-from facefolds_core.params_file import Params, write_configs
 from facefolds_core.reporting.facts import read_images
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.splats import COLUMNS, Splats

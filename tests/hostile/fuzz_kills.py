@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from facefolds_core.files import PREFIX
+from facefolds_core.files.writing import PREFIX
 from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, fingerprint
 from tests.pipeline.tiny import TinyProject

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from facefolds_core.config import read_stage, read_subject, read_train
+from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.stages import read_stage, read_subject, read_train
+from facefolds_core.files.paths import SubjectFolders, check_capture_place, subject_folders
 from facefolds_core.params import SECTIONS, STAGE_SECTIONS
-from facefolds_core.params_file import idle_keys, load_params, write_configs
-from facefolds_core.paths import SubjectFolders, check_capture_place, subject_folders
 from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
 
 LEVEL = {"name": "small", "mesh_resolution": 16, "texture_resolution": 128, "crf": 30}

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from facefolds_core.serving import serving
+from facefolds_core.serving.server import serving
 from tests.hostile.damage import MUTATIONS, Counts, Outcome, fingerprint
 
 SECRET = b"not to be seen"

@@ -13,15 +13,15 @@ import psutil
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.locks import try_lock
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.pipeline import running
 from facefolds_core.pipeline.running import alone
+from facefolds_core.system.locks import try_lock
 
 STAGE = """
 import os, sys, time
 from pathlib import Path
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.writing import atomic_folder
 from stages.common import run_stage
 
 def work(folders):

@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 from facefolds_core.cli import app, mending
 from facefolds_core.cli.mending import mend
 from facefolds_core.errors import UserError
-from facefolds_core.locks import try_lock
 from facefolds_core.params import STAGE_SECTIONS
+from facefolds_core.system.locks import try_lock
 from stages import common
 
 PIPELINE = """\

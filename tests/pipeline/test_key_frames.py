@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_json
+from facefolds_core.files.writing import write_json
 from facefolds_core.pipeline.sample import _key_frames
 from tests.scoring.fakes import flat_scene
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.files import write_text
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, tables, words
 from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts, read_images
 from facefolds_core.reporting.pictures import as_scored

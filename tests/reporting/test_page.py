@@ -15,8 +15,8 @@ from facefolds_core.asset import read_asset
 from facefolds_core.cli.report import command, evaluated_subjects
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
-from facefolds_core.files import read_json, write_json
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.reporting import build
 from facefolds_core.reporting.build import make_report
 from facefolds_core.scoring.record import NAME

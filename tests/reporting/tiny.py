@@ -9,9 +9,9 @@ from PIL import Image
 from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.facts import fact
-from facefolds_core.files import write_json, write_text
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_json, write_text
 from facefolds_core.params import section_of
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.scoring.films import FilmFolder
 from facefolds_core.scoring.metrics import shown

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.asset import Asset
 from facefolds_core.captures.scene import Scene, read_scene, write_scene
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.track import Track

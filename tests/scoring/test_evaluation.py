@@ -12,7 +12,7 @@ import torch
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import EvaluateParams
 from facefolds_core.rendering.pixels import finer, pixel_means

@@ -9,7 +9,7 @@ import av
 import numpy as np
 import pytest
 
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.scoring.films import FilmFolder
 from tests.hostile.fuzz_disk import limited_files
 

@@ -12,8 +12,8 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
-from facefolds_core.files import write_json
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.files.writing import write_json
 from facefolds_core.scoring.panels import ALL_METRICS, FILM_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import (
     EXPORT_STAGES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.facts import fact
-from facefolds_core.paths import SubjectFolders
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.scoring.panels import ALL_METRICS, VARIANTS, ImageScore
 from facefolds_core.scoring.report import Circumstances, metrics_json
 from facefolds_core.scoring.terminal import result_lines, score_lines

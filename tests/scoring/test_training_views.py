@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.params import EvaluateParams
 from facefolds_core.scoring.training_scores import TrainingView, bad_views, compared_by, warnings_of
 from facefolds_core.scoring.training_views import training_views

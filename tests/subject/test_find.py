@@ -14,10 +14,10 @@ from PIL import Image
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
+from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.geometry.track import Track
 from facefolds_core.params import SubjectParams
-from facefolds_core.paths import SubjectFolders
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
 from facefolds_core.subject.folder import make_folder
 from facefolds_core.subject.found import joined, subject_of

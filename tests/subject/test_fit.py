@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.errors import UserError
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import rotation
 from facefolds_core.subject.drawing import render

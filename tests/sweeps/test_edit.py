@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from facefolds_core.config.params_file import load_params
 from facefolds_core.errors import UserError
 from facefolds_core.params import CompressParams, DecimateParams
-from facefolds_core.params_file import load_params
 from facefolds_core.sweeps.edit import set_for_subject
 
 

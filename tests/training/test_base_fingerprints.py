@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.training.segments.base import digests_of_frames, fingerprint_of_base
 from tests.scenes import make_scene
 

@@ -13,7 +13,7 @@ import torch
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds

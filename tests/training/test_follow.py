@@ -6,8 +6,8 @@ import numba
 import numpy as np
 import torch
 
-from facefolds_core import hit_codes
-from facefolds_core.adam import decays
+from facefolds_core.kernels import hit_codes
+from facefolds_core.kernels.adam import decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import follow_kernel, reference, shading_kernel
 from facefolds_core.training.explicit.follow import _apart, _met, follow, follow_frame, lagging, mean_errors

@@ -8,9 +8,9 @@ from typing import get_args
 
 import pytest
 
+from facefolds_core import models
 from facefolds_core.params import PRESETS, TrainParams
 from facefolds_core.registry import MODELS, Registry
-from facefolds_core.training import models
 
 
 @pytest.mark.parametrize("name", MODELS.names)

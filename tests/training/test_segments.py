@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import UserError
-from facefolds_core.files import read_json
-from facefolds_core.frame_store import FrameStore, write_frames
+from facefolds_core.files.frame_store import FrameStore, write_frames
+from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.track import Track
 from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.frame_store import write_frames
+from facefolds_core.files.frame_store import write_frames
 from facefolds_core.training.explicit.targets import CutOuts, OneFrame
 from tests.scenes import make_scene
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.serving import serving
+from facefolds_core.serving.server import serving
 from tests.viewer.captured import captured
 from tests.viewer.fixtures import rich_asset
 

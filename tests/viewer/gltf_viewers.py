@@ -17,7 +17,7 @@ from PIL import Image
 from playwright.sync_api import Browser
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.serving import serving
+from facefolds_core.serving.server import serving
 from tests.pictures import GREY
 
 VIEWER = Path(__file__).parents[2] / "viewer"

@@ -15,7 +15,7 @@ import pytest
 
 from facefolds_core.cli.view import asset_folder, latest_asset
 from facefolds_core.errors import UserError
-from facefolds_core.player import find_player
+from facefolds_core.serving.player import find_player
 from tests.assets import make_asset
 
 

@@ -15,7 +15,7 @@ from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
 from facefolds_core.captures.actor.motion import head_pose
 from facefolds_core.captures.actor.render import ActorOptions, Picture, render
 from facefolds_core.captures.actor.rig import ActorRig, make_rig
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams
 

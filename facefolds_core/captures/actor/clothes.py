@@ -14,7 +14,7 @@ from facefolds_core.captures.actor.noise import (
     smoothstep,
     value_noise,
 )
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 CUT_MARGIN = 6.0
 """mm by which what is under the clothes ends above their lower edge."""

@@ -22,7 +22,7 @@ from facefolds_core.captures.actor.noise import (
     span,
     value_noise,
 )
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 _CENTRE_Y, _CENTRE_Z = 25.0, -12.0
 # Unit axis through the crown, and two unit vectors across it.

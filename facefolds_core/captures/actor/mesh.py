@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.motion import NOSE, pose_at
 from facefolds_core.captures.actor.shape import trace
-from facefolds_core.jit import kernel
+from facefolds_core.kernels.jit import kernel
 
 Array = NDArray[np.float64]
 

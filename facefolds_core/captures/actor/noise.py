@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 Vector = tuple[float, float, float]
 

@@ -23,7 +23,7 @@ from facefolds_core.captures.actor.shade import surface_colour
 from facefolds_core.captures.actor.shape import AROUND, RADIUS, normal, surface, trace
 from facefolds_core.captures.actor.shape import reach as shape_reach
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.jit import compiled, kernel
+from facefolds_core.kernels.jit import compiled, kernel
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from facefolds_core.captures.actor.noise import Vector, clamp, hash3, mix, smoothstep, value_noise
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 _LEFT, _RIGHT = -1900.0, 1900.0
 _CEILING, _FLOOR = -1250.0, 1350.0

@@ -28,7 +28,7 @@ from facefolds_core.captures.actor.shape import (
     mouth_gap,
     to_rest,
 )
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 
 @compiled

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.actor.clothes import CUT_MARGIN, bust, shirt
 from facefolds_core.captures.actor.motion import BALL, BLINK, BROW, JAW, NOSE, PUCKER, SMILE
 from facefolds_core.captures.actor.noise import Vector, clamp, cone, ellipsoid, smooth_max, smooth_min, smoothstep, span
-from facefolds_core.jit import compiled
+from facefolds_core.kernels.jit import compiled
 
 AROUND: Vector = (0.0, -25.0, 20.0)
 RADIUS = 240.0

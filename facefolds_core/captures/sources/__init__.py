@@ -19,8 +19,8 @@ from __future__ import annotations
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.generated import is_generated
 from facefolds_core.captures.looking import check_layout
+from facefolds_core.files.paths import SubjectFolders, check_capture_place
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.paths import SubjectFolders, check_capture_place
 from facefolds_core.registry import SOURCES
 
 

@@ -25,9 +25,9 @@ from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, Recognised, gather, inside, pictures_in
 from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
+from facefolds_core.files.reading import is_regular, read_text
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import is_regular, read_text
 
 FPS = 25.0
 PIXEL_CENTRES = 0.5

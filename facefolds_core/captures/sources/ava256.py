@@ -31,10 +31,10 @@ from facefolds_core.captures.picture import Picture, ZipPicture, open_zip, read_
 from facefolds_core.captures.tracked import check_extent, parse_pose, read_obj
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.files import read_json
+from facefolds_core.files.reading import check_folder, check_regular, is_regular, read_text
+from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import check_folder, check_regular, is_regular, read_text
 
 FULL_SIZE = (2668, 4096)
 FPS = 30.0

@@ -21,8 +21,8 @@ from facefolds_core.captures.gathering import Calibration, Recognised, gather, i
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
+from facefolds_core.files.reading import is_folder, is_there
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import is_folder, is_there
 
 FPS = 30.0
 PIXEL_CENTRES = 0.5

@@ -31,8 +31,8 @@ from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.files.reading import is_regular
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import is_regular
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0

@@ -32,9 +32,9 @@ from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.captures.tracked import read_tracking
 from facefolds_core.facts import Fact, fact, shorten
+from facefolds_core.files.reading import check_folder, is_folder, is_there, read_text
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import check_folder, is_folder, is_there, read_text
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0

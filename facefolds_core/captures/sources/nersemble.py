@@ -50,9 +50,9 @@ from facefolds_core.captures.numbers import matrix_from, read_npy, short
 from facefolds_core.captures.picture import Picture
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
-from facefolds_core.files import read_json
+from facefolds_core.files.reading import check_folder, check_regular, is_folder, is_regular
+from facefolds_core.files.writing import read_json
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import check_folder, check_regular, is_folder, is_regular
 
 FULL_SIZE = (2200, 3208)
 FPS = 73.0

@@ -22,9 +22,9 @@ from facefolds_core.captures.gathering import Calibration, Recognised, footage, 
 from facefolds_core.captures.numbers import read_npy
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
+from facefolds_core.files.reading import is_regular
 from facefolds_core.geometry.cameras import HUGE
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import is_regular
 
 PIXEL_CENTRES = 0.5
 """The principal point is half the width: continuous coordinates."""

@@ -31,8 +31,8 @@ from facefolds_core.captures.numbers import numbers_from
 from facefolds_core.captures.picture import Hdf5Picture, Picture, open_hdf5
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
+from facefolds_core.files.reading import is_folder, is_regular
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import is_folder, is_regular
 
 Array = NDArray[np.float64]
 

@@ -28,10 +28,10 @@ from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.facts import fact, shorten
-from facefolds_core.files import read_json
+from facefolds_core.files.reading import LARGEST, check_regular, is_folder, is_regular, is_there
+from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.params import CaptureParams, Subject
-from facefolds_core.reading import LARGEST, check_regular, is_folder, is_regular, is_there
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.adam import EPSILON
-from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.kernels.adam import EPSILON
+from facefolds_core.kernels.jit import compiled, inlined, kernel
 
 
 @kernel(parallel=True)

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from facefolds_core.errors import is_disk_error
 from facefolds_core.facts import read_fact
-from facefolds_core.files import atomic_folder
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import SegmentParams
 from facefolds_core.training.explicit.attempt import Attempt
 from facefolds_core.training.explicit.plan import Epochs, Level

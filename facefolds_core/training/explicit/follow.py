@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from facefolds_core.adam import corrections, decays
-from facefolds_core.hit_codes import before
+from facefolds_core.kernels.adam import corrections, decays
+from facefolds_core.kernels.hit_codes import before
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS, falling

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.adam import EPSILON
-from facefolds_core.jit import compiled, inlined, kernel
+from facefolds_core.kernels.adam import EPSILON
+from facefolds_core.kernels.jit import compiled, inlined, kernel
 from facefolds_core.training.explicit.adam_kernel import activate_texel
 from facefolds_core.training.explicit.shading_kernel import tap_share
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import cuda
 
-from facefolds_core.gpu import entry
-from facefolds_core.scatter import put_of
+from facefolds_core.kernels.gpu import entry
+from facefolds_core.kernels.scatter import put_of
 from facefolds_core.training.explicit.adam_kernel import activate_texel, adam_texel
 from facefolds_core.training.explicit.shading_kernel import light_before, shade_pixel, tap_share
 from facefolds_core.training.explicit.smoothing import column_sum, mean

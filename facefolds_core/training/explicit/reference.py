@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from facefolds_core.adam import EPSILON, Betas
-from facefolds_core.hit_codes import SCALE
+from facefolds_core.kernels.adam import EPSILON, Betas
+from facefolds_core.kernels.hit_codes import SCALE
 from facefolds_core.model.compositing import compositing_weights, transmittances
 from facefolds_core.training.explicit.shading_kernel import PRICE
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.hit_codes import SCALE, corner
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.kernels.hit_codes import SCALE, corner
+from facefolds_core.kernels.jit import inlined, kernel
 from facefolds_core.training.explicit.shading_kernel import difference, rgb_tap, rgba_tap
 
 

@@ -1,6 +1,6 @@
 """Shading of stored crossings, forwards and backwards, compiled for CPUs; GPUs: `*_gpu.py`. Reference: `reference.py`.
 
-For how threads share the work see `facefolds_core.scatter`."""
+For how threads share the work see `facefolds_core.kernels.scatter`."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from facefolds_core.hit_codes import corner
-from facefolds_core.jit import compiled, inlined, kernel
-from facefolds_core.scatter import BLOCK, CHUNK, scatter_of, spread
+from facefolds_core.kernels.hit_codes import corner
+from facefolds_core.kernels.jit import compiled, inlined, kernel
+from facefolds_core.kernels.scatter import BLOCK, CHUNK, scatter_of, spread
 
 Array = NDArray[Any]
 

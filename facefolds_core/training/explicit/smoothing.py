@@ -13,7 +13,7 @@ import torch
 from numba import prange
 from torch import Tensor
 
-from facefolds_core.jit import inlined, kernel
+from facefolds_core.kernels.jit import inlined, kernel
 
 
 @kernel(parallel=True)

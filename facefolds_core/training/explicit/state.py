@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core.adam import corrections, decays
+from facefolds_core.kernels.adam import corrections, decays
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.rates import BETAS

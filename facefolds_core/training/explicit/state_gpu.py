@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core import gpu
-from facefolds_core.adam import decays
+from facefolds_core.kernels import gpu
+from facefolds_core.kernels.adam import decays
 from facefolds_core.training.explicit import kernels_gpu
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState

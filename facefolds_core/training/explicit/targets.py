@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
-from facefolds_core.frame_store import FrameStore
+from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.training.explicit.views import Images
 
 KEPT_BYTES = 2 << 30

@@ -17,14 +17,14 @@ from torch import Tensor
 
 from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
-from facefolds_core.files import atomic_folder
+from facefolds_core.config.source_code import digest_of_packages
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.model import load_model
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.storage import ExplicitSpec, read_spec
 from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams, ReflectionParams
-from facefolds_core.source_code import digest_of_packages
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.explicit.reflection_maps import Maps
 from facefolds_core.training.patience import is_full, patiently

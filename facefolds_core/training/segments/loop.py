@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import fact
-from facefolds_core.files import read_json
+from facefolds_core.files.writing import read_json
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec

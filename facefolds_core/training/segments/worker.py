@@ -14,7 +14,7 @@ import time
 from multiprocessing.connection import Connection
 
 from facefolds_core.errors import as_user_error
-from facefolds_core.processes import end_with_parent
+from facefolds_core.system.processes import end_with_parent
 from facefolds_core.training.segments.fitting import fit_segment
 from facefolds_core.training.segments.handed import taken
 from facefolds_core.training.segments.messages import Failed, FrameDone, SegmentDone

@@ -16,7 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from facefolds_core.errors import UserError
-from facefolds_core.processes import with_threads
+from facefolds_core.system.processes import with_threads
 from facefolds_core.training.segments.base import Base
 from facefolds_core.training.segments.handed import Fitting, handed
 from facefolds_core.training.segments.messages import Failed, FrameDone, SegmentDone

@@ -1,0 +1,81 @@
+"""What rays add to the texels that they meet, shared out among threads: compiled.
+
+Rays are worked on in chunks. Threads share the rays of a chunk, and note what each ray wants of each layer; then they
+share the layers, and each texel takes what is wanted of it in the order of the rays. So one array of sums serves any
+number of threads, and the result does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from facefolds_core.kernels.jit import add, add4, compiled, inlined
+
+CHUNK = 32768
+"""Rays whose wishes are noted at once: few enough for the cache."""
+
+BLOCK = 256
+"""Rays that a thread takes at once."""
+
+
+@inlined
+def spread(task, tasks):  # type: ignore[no-untyped-def]
+    """A permutation: a thread takes neighbouring tasks, and of neighbouring layers one is met as often as the other."""
+    group, size = task % 4, tasks // 4
+    return group * size + min(group, tasks % 4) + task // 4
+
+
+def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
+    """A compiled function that adds what ray k wants of one layer to its sums (H, W, values), bilinear.
+
+    Its arguments: the texel before the ray's crossing as row width + column; wish (R, 2 + values), fractions of row and
+    column and what is to be added; k; the sums.
+    """
+
+    @inlined
+    def put(texel: Any, wish: Any, k: Any, sums: Any) -> None:
+        width = sums.shape[1]
+        one = np.float32(1.0)
+        i, j = texel // width, texel % width
+        a, b = wish[k, 0], wish[k, 1]
+        for tap in range(4):
+            di, dj = tap >> 1, tap & 1
+            w = (a if di else one - a) * (b if dj else one - b)
+            for q in range(values):
+                add(sums, (i + di, j + dj, q), w * wish[k, 2 + q])
+
+    @inlined
+    def put4(texel: Any, wish: Any, k: Any, sums: Any) -> None:
+        i, j = np.uint64(texel // sums.shape[1]), np.uint64(texel % sums.shape[1])
+        one, next_one = np.float32(1.0), np.uint64(1)
+        # All is read before anything is written: for all a compiler knows, the wishes may lie in the sums.
+        a, b, g0, g1, g2, g3 = wish[k, 0], wish[k, 1], wish[k, 2], wish[k, 3], wish[k, 4], wish[k, 5]
+        w = (one - a) * (one - b)
+        add4(sums, (i, j), w * g0, w * g1, w * g2, w * g3)
+        w = (one - a) * b
+        add4(sums, (i, j + next_one), w * g0, w * g1, w * g2, w * g3)
+        w = a * (one - b)
+        add4(sums, (i + next_one, j), w * g0, w * g1, w * g2, w * g3)
+        w = a * b
+        add4(sums, (i + next_one, j + next_one), w * g0, w * g1, w * g2, w * g3)
+
+    return put4 if values == 4 else put
+
+
+def scatter_of(values: int) -> Callable[[Any, Any, Any], None]:
+    """A compiled function that puts what R rays want of one layer.
+
+    Its arguments: index (R,), the texel before each ray's crossing, or -1; wish and sums as of `put_of`.
+    """
+    put = put_of(values)
+
+    @compiled
+    def scatter(index: Any, wish: Any, sums: Any) -> None:
+        for k in range(index.shape[0]):
+            if index[k] >= 0:
+                put(index[k], wish, k, sums)
+
+    return scatter

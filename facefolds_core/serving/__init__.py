@@ -1,0 +1,1 @@
+"""The web player over HTTP: the server, the files that it hands out, where the built player lies."""

@@ -1,0 +1,135 @@
+"""params.yaml: presets, overrides, and every kind of mistake in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.config.params_file import load_params, write_configs
+from facefolds_core.config.stages import read_level_resolutions, read_stage, read_subject, read_train
+from facefolds_core.errors import UserError
+from facefolds_core.params import BakeParams, CompressParams, MlpParams, TextureParams
+
+MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
+
+
+def params_file(folder: Path, text: str) -> Path:
+    path = folder / "params.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_the_projects_own_file_is_valid(project_root: Path) -> None:
+    params = load_params(project_root / "params.yaml")
+    assert params.subject("actor").source == "actor"
+
+
+def test_a_preset_fills_what_is_not_given(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL + "train: {preset: paper, iterations: 7}\n"))
+    train = params.stage("train", "a")
+    assert isinstance(train, MlpParams)
+    assert train.iterations == 7
+    assert train.rays == 32768
+
+
+@pytest.mark.parametrize("number", ["1e-3", "1E-3", "+1e-3", ".1e-2", "10_0e-5", "0.001"])
+def test_numbers_are_read_as_dvc_writes_them(tmp_path: Path, number: str) -> None:
+    text = MINIMAL + f"bake: {{hold: {number}}}\ncompress: {{levels: []}}\n"
+    bake = load_params(params_file(tmp_path, text)).stage("bake", "a")
+    assert isinstance(bake, BakeParams) and bake.hold == 0.001
+
+
+def test_a_subject_overrides_one_nested_key(tmp_path: Path) -> None:
+    text = "subjects:\n  a: {source: actor, path: x, compress: {video: {crf: 30}}}\n  b: {source: actor, path: x}\n"
+    params = load_params(params_file(tmp_path, text + "compress: {video: {crf: 20, preset: slow}}\n"))
+    own, other = params.stage("compress", "a"), params.stage("compress", "b")
+    assert isinstance(own, CompressParams) and isinstance(other, CompressParams)
+    assert (own.video.crf, own.video.preset) == (30, "slow")
+    assert other.video.crf == 20
+
+
+def test_configs_round_trip(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL + "texture: {resolution: 77}\n"))
+    write_configs(params, "a", tmp_path)
+    assert read_stage(TextureParams, tmp_path) == TextureParams(resolution=77)
+    assert read_train(tmp_path) == params.stage("train", "a")
+    assert read_subject(tmp_path) == params.subject("a")
+
+
+def test_a_change_of_one_section_changes_one_file_only(tmp_path: Path) -> None:
+    written = []
+    for resolution in (64, 128):
+        folder = tmp_path / str(resolution)
+        params = load_params(params_file(tmp_path, MINIMAL + f"texture: {{resolution: {resolution}}}\n"))
+        written.append({path.name: path.read_bytes() for path in write_configs(params, "a", folder)})
+    assert [name for name in written[0] if written[0][name] != written[1][name]] == ["texture.json"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("subjects:\n  a: [\n", "line 3"),
+        ("train: {}\n", "no subjects"),
+        ("", "no subjects"),
+        (MINIMAL + "trian: {}\n", "trian"),
+        (MINIMAL + "train: {preset: fastest}\n", "there are"),
+        (MINIMAL + "train: {preset: [fast]}\n", "there are"),
+        (MINIMAL + "train: fast\n", "keys and values"),
+        (MINIMAL + "train: {lambda_veil: 0}\n", "the price of opacity is fixed now"),
+        (MINIMAL + "matte: {method: auto}\n", "its section is called `subject`"),
+        (MINIMAL + "matte: {}\nroom: {}\n", "`matte`: remove it"),
+        ("subjects:\n  a: {source: actor, path: x, matte: {train: all}}\n", "its section is called `subject`"),
+        (MINIMAL + "train: {start: {fog_gain: 1}}\n", "no fog is left"),
+        ("subjects:\n  a: {source: actor, path: x, mattes: ~/mine}\n", "subjects.a.mattes"),
+        (MINIMAL + "train: {mattes: {vote: {share: 0.9}}}\n", "its section is called `subject`"),
+        (
+            "subjects:\n  a: {source: actor, path: x, train: {preset: paper}}\ntrain: {geometry: {}}\n",
+            "to the subjects",
+        ),
+        (MINIMAL + "texture: {resolution: '64'}\n", "texture.resolution"),
+        (MINIMAL + "texture: {resolution: true}\n", "texture.resolution"),
+        (MINIMAL + "capture: {fps: 1.0e+300}\n", "capture.fps"),
+        (MINIMAL + "texture: {resolution: 0}\n", "texture.resolution"),
+        (MINIMAL + "texture: {resolution: .nan}\n", "texture.resolution"),
+        (MINIMAL + "texture: {size: 3}\n", "texture.size"),
+        ("subjects:\n  a: {source: video, path: x}\n", "subjects.a.source"),
+        ("subjects:\n  a: {source: actor}\n", "subjects.a.path"),
+        ("subjects:\n  a: {source: actor, path: x, texture: {resolution: -1}}\n", "for subject a"),
+        ("subjects:\n  a: {source: actor, path: x, holdout: {every: 1}}\n", "subjects.a.holdout"),
+    ],
+)
+def test_mistakes_name_the_file_and_the_key(tmp_path: Path, text: str, says: str) -> None:
+    path = params_file(tmp_path, text)
+    with pytest.raises(UserError) as caught:
+        load_params(path)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_unknown_subject_lists_those_there_are(tmp_path: Path) -> None:
+    params = load_params(params_file(tmp_path, MINIMAL))
+    with pytest.raises(UserError, match="expected: a"):
+        params.stage("train", "b")
+
+
+def test_missing_file_is_a_user_error(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="file not found"):
+        load_params(tmp_path / "params.yaml")
+
+
+def test_a_garbled_stage_config_is_a_user_error(tmp_path: Path) -> None:
+    (tmp_path / "texture.json").write_text("{")
+    with pytest.raises(UserError, match=r"texture\.json"):
+        read_stage(TextureParams, tmp_path)
+
+
+def test_every_file_of_the_configuration_is_an_object(tmp_path: Path) -> None:
+    """The report reads them all."""
+    levels = "[{name: small, mesh_resolution: 16, texture_resolution: 64, crf: 30}]"
+    path = tmp_path / "params.yaml"
+    path.write_text(f"subjects: {{a: {{source: actor, path: x}}}}\ncompress: {{levels: {levels}}}\n")
+    written = write_configs(load_params(path), "a", tmp_path / "config")
+    assert {type(json.loads(file.read_text())) for file in written} == {dict}
+    assert read_level_resolutions(tmp_path / "config") == (16,)

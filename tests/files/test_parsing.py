@@ -1,0 +1,95 @@
+"""JSON and YAML that is no JSON or YAML of ours: one clear message, whatever it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from facefolds_core.errors import UserError
+from facefolds_core.files.parsing import MAX_DEPTH, brief, parse_json, parse_yaml
+from facefolds_core.files.writing import read_json
+
+DIGITS = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (DIGITS, "too large"),
+        ("[" + "9" * 25 + "]", "too large"),
+        ("9223372036854775808", "too large"),
+        ("[" * 100_000, "too deeply"),
+        ("[" * (MAX_DEPTH + 1) + "]" * (MAX_DEPTH + 1), "too deeply"),
+        ('{"a":' * 100_000, "too deeply"),
+        ('{"a": 1, "a": 2}', "given twice"),
+        ("{", "line 1"),
+    ],
+)
+def test_json(text: str, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError, match=says) as caught:
+        read_json(path)
+    assert str(path) in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("text", ["9223372036854775807", "[" * MAX_DEPTH + "]" * MAX_DEPTH, '{"a": 1e300}', "-1", '""'])
+def test_sound_json(text: str) -> None:
+    assert parse_json(text, "a.json", "") == json.loads(text)
+
+
+LAUGHS = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{b}: &{b} [{', '.join([f'*{a}'] * 10)}]\n" for a, b in zip("abcdefg", "bcdefgh", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (f"a: {DIGITS}", "not of its type"),
+        ("a: 99999999999999999999", "too large"),
+        ("a: 0x" + "f" * 30, "too large"),
+        ("[" * 3000, "too deeply"),
+        ("[" * 80 + "]" * 80, "too deeply"),
+        ("a: 1\nb: 2\na: 3\n", "given twice"),
+        ("s: {a: {x: 1}, a: {x: 2}}", "line 1, column 16"),
+        (LAUGHS, "too many values"),
+        ("a: &a [*a]", "what it stands in"),
+        ("a: !!python/object/apply:os.system [ls]", "garbled YAML"),
+        ("a: !mine 3", "garbled YAML"),
+        ("a: !!int x", "not of its type"),
+        ("a: !!float x", "not of its type"),
+        ("a: !!bool x", "not of its type"),
+        ("a: !!timestamp x", "not of its type"),
+        ("a: 2024-13-45", "not of its type"),
+        ("? [a]\n: b", "garbled YAML"),
+        ("a: *b", "line 1"),
+        ("a: \x01", "garbled YAML"),
+        ("--- a\n--- b\n", "garbled YAML"),
+    ],
+)
+def test_yaml(text: str, says: str) -> None:
+    with pytest.raises(UserError, match=says) as caught:
+        parse_yaml(text, "params.yaml", "mend it")
+    assert "params.yaml" in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("", None),
+        ("a: &x {b: 1}\nc: *x\nd: {<<: *x, e: 2}", {"a": {"b": 1}, "c": {"b": 1}, "d": {"b": 1, "e": 2}}),
+        ("a: [1, 2.5, yes, ~, '1']", {"a": [1, 2.5, True, None, "1"]}),
+    ],
+)
+def test_sound_yaml(text: str, value: object) -> None:
+    assert parse_yaml(text, "params.yaml", "") == value
+
+
+def test_what_cannot_be_shown_is_said_in_short() -> None:
+    assert "int" in brief(10**5000)
+    assert brief("x" * 1000).endswith("...") and len(brief("x" * 1000)) == 100

@@ -1,0 +1,46 @@
+"""Large arrays lie in files, and are the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from facefolds_core.captures.capture import Tracking
+from facefolds_core.system import spill
+
+
+def test_small_arrays_stay_in_memory_and_large_ones_do_not() -> None:
+    small, large = spill.spilled((3, 4)), spill.spilled((spill.IN_MEMORY // 8 + 1,))
+    assert small.base is None
+    assert isinstance(large.base, np.memmap)
+    large[-1] = 2.0
+    assert large[-1] == 2.0
+
+
+def test_nothing_is_left_behind(tmp_path: Path) -> None:
+    with patch("tempfile.tempdir", str(tmp_path)), patch.object(spill, "IN_MEMORY", 0):
+        array = spill.spilled((5, 5))
+        array[:] = 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("frames", [None, [3, 0, 39]])
+def test_meshes_are_the_same_in_parts(frames: list[int] | None) -> None:
+    random = np.random.default_rng(0)
+    tracking = Tracking(random.normal(size=(40, 3, 4)), random.normal(size=(40, 50, 3)), None)
+    at_once = tracking.world_vertices(frames)
+    with patch.object(spill, "IN_MEMORY", 0):
+        in_parts = tracking.world_vertices(frames)
+    assert isinstance(in_parts.base, np.memmap)
+    assert np.array_equal(at_once, in_parts)
+    moved = np.einsum("kij,kvj->kvi", tracking.poses[:, :, :3], tracking.vertices) + tracking.poses[:, None, :, 3]
+    assert np.array_equal(at_once, moved if frames is None else moved[frames])
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 40, 300])
+def test_a_running_mean_is_the_mean(count: int) -> None:
+    arrays = np.random.default_rng(count).normal(size=(count, 50, 3))
+    assert np.array_equal(spill.running_mean(iter(arrays)), np.mean(list(arrays), 0))

@@ -1,0 +1,40 @@
+"""Stages let waiting threads sleep, and OpenBLAS has one thread, unless the environment says otherwise."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from facefolds_core.system.processes import THREADS, with_threads
+
+
+@pytest.mark.parametrize("package", ["stages", "bench"])
+@pytest.mark.parametrize(
+    ("name", "given", "expected"),
+    [
+        ("GOMP_SPINCOUNT", None, "0"),
+        ("GOMP_SPINCOUNT", "1000", "1000"),
+        ("OPENBLAS_NUM_THREADS", None, "1"),
+        ("OPENBLAS_NUM_THREADS", "2", "2"),
+    ],
+)
+def test_the_environment_has_the_last_word(package: str, name: str, given: str | None, expected: str) -> None:
+    environment = {key: value for key, value in os.environ.items() if key != name}
+    if given is not None:
+        environment[name] = given
+    code = f"import {package}, os; print(os.environ[{name!r}])"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == expected
+
+
+def test_no_stage_imports_numpy_before_the_threads_are_set() -> None:
+    code = "import stages, sys; print([name for name in ('numpy', 'scipy', 'torch') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_shares_of_a_machine_leave_openblas_one_thread() -> None:
+    assert with_threads(3) == dict.fromkeys(THREADS, "3") | {"OPENBLAS_NUM_THREADS": "1"}
