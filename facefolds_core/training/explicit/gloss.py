@@ -41,12 +41,20 @@ class GlossFit:
 
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
+        cameras: of which there are photos: virtual ones come after them, and show no gloss.
         how: it is fitted.
     """
 
     def __init__(
-        self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None, how: GlossParams = GLOSS
+        self,
+        chart: Chart,
+        window: Window,
+        params: ReflectionParams,
+        poses: Track | None,
+        cameras: int,
+        how: GlossParams = GLOSS,
     ) -> None:
+        self._cameras = cameras
         self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
@@ -165,7 +173,7 @@ class GlossFit:
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
-        opaque = np.flatnonzero(seen.opacity >= self.how.min_opacity)
+        opaque = np.flatnonzero((seen.opacity >= self.how.min_opacity) & (seen.camera < self._cameras))
         return seen.part(opaque[:: self._step(len(opaque))])
 
     def _step(self, count: int) -> int:

@@ -24,6 +24,7 @@ from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import model_bytes
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
@@ -104,7 +105,8 @@ def _fit(
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        trainer = Trainer(cameras, params, fit, device)
+        teacher = Teacher(cameras.scene, subject.splats, params.seed)
+        trainer = Trainer(cameras, params, fit, device, teacher)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
         levels = plan(fit, params, scene.num_frames, pixels)

@@ -30,6 +30,7 @@ from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_type
 from facefolds_core.training.explicit.targets import CutOuts
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
 
@@ -48,10 +49,12 @@ class Trainer:
 
     divergence = DivergenceParams()
 
-    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device) -> None:
+    def __init__(
+        self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device, teacher: Teacher
+    ) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
-        self.pictures = CutOuts(self.scene, cameras.gains)
+        self.pictures, self.virtual = CutOuts(self.scene, cameras.gains, teacher=teacher), teacher.virtual
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -62,7 +65,8 @@ class Trainer:
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses)
+        real = len(self.scene.indices("train"))
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, real)
         self.logged: list[tuple[int, float, int]] = []
         self.usual = np.zeros((0, 3), np.float32)
         self.keep: Callable[[Trainer, Attempt], None] | None = None
@@ -141,7 +145,8 @@ class Trainer:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
+        how = self.params.moving, self.device.gpu, self.virtual
+        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, *how)
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
