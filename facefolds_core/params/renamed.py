@@ -111,6 +111,7 @@ GONE: dict[str, str] = {
     "train.cameras": f"{FOUND}, and tells what single cameras do differently",
     **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
+    "train.gpu": "with `device: cuda` torch keeps what a step needs",
     "train.moving.background_rate": CUT_OUT,
     "train.losses": PRICE,
     "train.lambda_veil": PRICE,

@@ -1,6 +1,4 @@
-"""Activation of the texture grids and their Adam step, compiled for CPUs; GPUs: `kernels_gpu.py`.
-
-Reference: `reference.py`."""
+"""Activation of the texture grids and their Adam step, compiled. Reference: `reference.py`."""
 
 from __future__ import annotations
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.model.device import device_of
 from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in, subject_in
 from facefolds_core.training.checkpoints import fingerprint
-from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.checkpoints import Checkpoints
 from facefolds_core.training.explicit.fit import fit_scene
@@ -29,7 +29,7 @@ from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import open_log
 from facefolds_core.training.patience import check_space, patiently
-from facefolds_core.training.report import TrainingReport, make_report
+from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.trained import Trained
 
 
@@ -89,7 +89,7 @@ def _fit(
     scene: Scene, params: ExplicitParams, log: Path, place: Path | None, kept: Path | None
 ) -> tuple[Trained, Surroundings]:
     """The same of a scene whose subject was found."""
-    device = choose(params.device)
+    device = device_of(params)
     checkpoints = None if kept is None else Checkpoints(kept, params.segments)
     began = time.perf_counter()
     with open_log(log) as live:
@@ -122,8 +122,8 @@ def _fit(
     report = make_report(
         time.perf_counter() - began + (0.0 if checkpoints is None else checkpoints.before),
         trainer.iteration,
-        device.name,
-        device.peak_memory(),
+        device_name(device),
+        peak_memory(device),
         params.preset,
         trainer.rays,
         trainer.psnr,

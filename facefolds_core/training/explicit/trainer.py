@@ -19,7 +19,6 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import shells, texel_uv
-from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
@@ -28,7 +27,7 @@ from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.rates import falling, rates_of
-from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_type
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
@@ -48,7 +47,7 @@ class Trainer:
 
     divergence = DivergenceParams()
 
-    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device) -> None:
+    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: torch.device) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
         self.pictures = CutOuts(self.scene, cameras.gains)
@@ -141,12 +140,12 @@ class Trainer:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
+        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving)
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
         shape = (self.params.layers, self.scene.num_frames)
-        return state_type(self.device.gpu)(texels, *shape, start, self.params)
+        return state_on(self.device)(texels, *shape, start, self.params)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
         """Let the layers believe in the opacity of the subject's Gaussians, and begin with it; with their colours."""

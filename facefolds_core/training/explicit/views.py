@@ -95,16 +95,12 @@ FRAMES = 12
 
 
 class Tracer:
-    """Crosses pixels of training cameras with the layers.
+    """Crosses pixels of training cameras with the layers."""
 
-    Args:
-        gpu: whether on a GPU.
-    """
-
-    def __init__(self, scene: Scene, manifolds: RadialManifolds, gpu: bool = False) -> None:
+    def __init__(self, scene: Scene, manifolds: RadialManifolds) -> None:
         self._scene, self._mattes = scene, scene.open_mattes()
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
-        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
         self._belt = manifolds.chart.numbers
 
     def views(self, position: int, index: int, pixels: NDArray[np.int64], frames: Sequence[int], fine: bool) -> Views:
@@ -146,13 +142,13 @@ class Tracer:
         return found
 
 
-def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
+def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int) -> Views:
     """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    tracer, found = Tracer(scene, manifolds, gpu), []
+    tracer, found = Tracer(scene, manifolds), []
     frames = spread(range(scene.num_frames), FRAMES)
     for position, index in enumerate(scene.indices("train")):
         pixels = np.arange(first_pixel(position, stride), scene.height * scene.width, stride)
@@ -257,7 +253,6 @@ class MovingRays:
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how much is kept.
         first: number of the first share of frame 0.
-        gpu: whether they are traced on a GPU.
         sampling: how many shares a frame has in use.
     """
 
@@ -269,12 +264,11 @@ class MovingRays:
         share: float,
         params: MovingParams,
         first: int = 0,
-        gpu: bool = False,
         sampling: Sampling = SAMPLING,
     ) -> None:
         self._first = first
         self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
-        self._tracer = Tracer(scene, manifolds, gpu)
+        self._tracer = Tracer(scene, manifolds)
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = spread(range(scene.num_frames), sampling.frames)
@@ -319,17 +313,15 @@ def first_pixel(camera: int, stride: int) -> int:
     return camera * (7 if stride % 7 else 5) % stride
 
 
-def rays_of(
-    scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams, gpu: bool = False
-) -> Rays:
-    """The rays of a scene's training cameras, traced on a GPU if asked for; for `share` see `MovingRays`.
+def rays_of(scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams) -> Rays:
+    """The rays of a scene's training cameras; for `share` see `MovingRays`.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
     if scene.poses is None:
-        return StillRays(trace_views(scene, manifolds, stride, gpu))
-    return MovingRays(scene, manifolds, stride, share, params, gpu=gpu)
+        return StillRays(trace_views(scene, manifolds, stride))
+    return MovingRays(scene, manifolds, stride, share, params)
 
 
 class Images:

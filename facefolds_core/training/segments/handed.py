@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
+from facefolds_core.model.device import device_of
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.views import Views, trace_views
 from facefolds_core.training.segments.base import Base, read_base, with_its_cameras
 from facefolds_core.training.segments.cache import SegmentCache
@@ -44,7 +44,7 @@ class Fitting:
 
     def fitter(self, views: Views | None = None, shine: NDArray[np.float32] | None = None) -> FrameFitter:
         """Args: of a still head, if they are known, `views`: crossings of its rays, `shine`: see `FrameFitter`."""
-        base, device = read_base(self.base, self.fingerprint), choose(self.params.device)
+        base, device = read_base(self.base, self.fingerprint), device_of(self.params)
         return FrameFitter(with_its_cameras(self.scene, base), base, self.params, device, views, shine)
 
     def cache(self) -> SegmentCache:

@@ -19,6 +19,7 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import fact
 from facefolds_core.files.writing import read_json
+from facefolds_core.model.device import device_of
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
@@ -26,12 +27,11 @@ from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in
 from facefolds_core.training.checkpoints import fingerprint
-from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
-from facefolds_core.training.report import TrainingReport, make_report
+from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.segments.base import LOG, Base, forget_begun, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
 from facefolds_core.training.segments.fitting import fit_segment
@@ -78,7 +78,7 @@ class _Take:
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
-        self.device = choose(params.device)
+        self.device = device_of(params)
         self.began = time.perf_counter()
         self.plan = plan_take(scene, params, told.key_frames or 1)
         self.used = Used()
@@ -116,7 +116,7 @@ class _Take:
                 cache.read(cache.path(segment.names))
                 bar.set_postfix(segments=f"{log.there()} of {total}", refresh=False)
 
-            if processes > 1 and not self.device.gpu:
+            if processes > 1 and self.device.type == "cpu":
                 threads = max(1, numba.get_num_threads() // processes)
                 memory = processes * process_bytes(self.scene, self.params, h * w) / 1e9
                 tqdm.write(
@@ -147,8 +147,8 @@ class _Take:
             time.perf_counter() - self.began,
             int(read_json(base.folder / "training.json", _REMEDY)["iterations"])
             + self.params.segments.steps * self.scene.num_frames,
-            self.device.name,
-            self.device.peak_memory() + self.used.memory,
+            device_name(self.device),
+            peak_memory(self.device) + self.used.memory,
             self.params.preset,
             self.used.rays,
             psnr,
