@@ -34,11 +34,10 @@ from facefolds_core.training.patience import patiently
 from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.segments.base import LOG, Base, forget_begun, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.fitting import fit_segment
+from facefolds_core.training.segments.fitting import Fitting, fit_segment
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
-from facefolds_core.training.segments.handed import Fitting
 from facefolds_core.training.segments.plan import Segment, TakePlan, plan_take
-from facefolds_core.training.segments.workers import Used, Workers
+from facefolds_core.training.segments.workers import Used, fit_in_processes
 from facefolds_core.training.trained import Trained
 
 _REMEDY = "run the same command again: finished segments are kept"
@@ -122,7 +121,12 @@ class _Take:
                 tqdm.write(
                     f"train: {processes} processes fit segments, threads of each: {threads}; {memory:.1f} GB at most"
                 )
-                self.used = Workers(fitting, base, processes, threads, bar.update, done).fit(left)
+
+                def told(segment: Segment) -> None:
+                    bar.update(len(segment.frames))
+                    done(segment)
+
+                self.used = fit_in_processes(fitting, base, left, processes, threads, told)
             elif left:
                 fitter = fitting.fitter()
                 for segment in left:
@@ -148,12 +152,12 @@ class _Take:
             int(read_json(base.folder / "training.json", _REMEDY)["iterations"])
             + self.params.segments.steps * self.scene.num_frames,
             device_name(self.device),
-            peak_memory(self.device) + self.used.memory,
+            peak_memory(self.device) + sum(self.used.memory.values()),
             self.params.preset,
             self.used.rays,
             psnr,
         )
-        report = replace(report, processor_seconds=round(report.processor_seconds + self.used.seconds, 2))
+        report = replace(report, processor_seconds=round(report.processor_seconds + sum(self.used.seconds.values()), 2))
         drawn = base.folder / "fit.png"
         picture = drawn.read_bytes() if drawn.exists() else None
         return Trained(
