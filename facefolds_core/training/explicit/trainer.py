@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,9 +39,7 @@ class Trainer:
     """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings.
 
     Attributes:
-        logged: lines of the log: iteration, PSNR, rows of texels.
         usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
-        keep: called after each step; for checkpoints.
     """
 
     divergence = DivergenceParams()
@@ -62,25 +59,18 @@ class Trainer:
         self.psnr = 0.0
         self.events = list(cameras.notes)
         self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses)
-        self.logged: list[tuple[int, float, int]] = []
         self.usual = np.zeros((0, 3), np.float32)
-        self.keep: Callable[[Trainer, Attempt], None] | None = None
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
-    def run(self, level: Level, number: int, live: Live, bar: tqdm, begun: Attempt | None = None) -> None:
-        """One level, again from its start at a lower learning rate if it diverges.
-
-        Args:
-            begun: how far it has come, if a checkpoint was taken up.
-        """
-        if begun is None:
-            self._prepare(level)
+    def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+        """One level, again from its start at a lower learning rate if it diverges."""
+        self._prepare(level)
         assert self.state is not None and self.views is not None
         lit = self.gloss.maps, self.state.shine
-        at = begun or Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
+        at = Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
         while at.tries < self.divergence.attempts:
             if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
@@ -126,15 +116,6 @@ class Trainer:
         self._begin_with_subject(begun or moved, colours=begun)
         if new_rays:
             self.gloss.follow(self.state, self.views, self.pictures, self.middle)
-
-    def take_up(self, level: Level) -> TextureState:
-        """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
-        self._trace(level)
-        self.state = self._new_state(level.texels)
-        self._begin_with_subject(False, False)
-        assert self.views is not None
-        self.gloss.follow(self.state, self.views, self.pictures, self.middle)
-        return self.state
 
     def _trace(self, level: Level) -> None:
         finest = level.texels if level.stride > 1 else self.fit.texels
@@ -206,17 +187,11 @@ class Trainer:
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(at.recent, 1e-12)))
             if i % 10 == 9:
-                self._log(live, self.iteration, self.psnr, level.texels[0])
+                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
             at.step = i + 1
-            if self.keep is not None:
-                self.keep(self, at)
         return True
-
-    def _log(self, live: Live, iteration: int, psnr: float, rows: int) -> None:
-        self.logged.append((iteration, psnr, rows))
-        log_metrics(live, iteration, {"psnr": psnr, "texel_rows": rows})
 
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""

@@ -32,7 +32,7 @@ from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
 from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
-from facefolds_core.training.segments.base import LOG, Base, forget_begun, read_base, train_base
+from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
 from facefolds_core.training.segments.fitting import Fitting, fit_segment
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
@@ -203,7 +203,6 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
                 "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
             )
         train_base(scene, list(plan.keys), params, place, log)
-    forget_begun(folder)  # here: a kill may have come after the base was written
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)
