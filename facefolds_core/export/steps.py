@@ -89,13 +89,8 @@ def sample_model(
 
 
 def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:
-    """Surfaces of the layers, with what is to be said of them: `surfaces_in` takes it off."""
+    """Surfaces of the layers, with what is to be said of them."""
     return grid_sheets(grids, params.resolution) if params.method == "grid" else reconstruct_layers(grids, params)
-
-
-def surfaces_in(made: Gridded | list[Reconstruction]) -> Surfaces:
-    """The surfaces alone."""
-    return made.sheets if isinstance(made, Gridded) else [result.surface for result in made]
 
 
 @dataclass(frozen=True)
