@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.subject.drawing import differentiate, draw, view_of
+from facefolds_core.subject.drawing import differentiate, draw
 from facefolds_core.subject.fit import State, Target, improve, target_of
 from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.splats import COLOUR, Splats

@@ -127,8 +127,8 @@ def whole_window(chart: Chart, params: StartParams) -> Window:
 def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams) -> float:
     """Share of visible points that no sheet over the chart can hold.
 
-    They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their direction by more than two
-    voxels and what the surface's slope explains.
+    They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their
+    direction by more than two voxels and what the surface's slope explains.
     """
     uv, radius = chart.uv(points)
     u0, u1, v0, v1 = window = whole_window(chart, params)
@@ -162,7 +162,9 @@ def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Ch
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
     losses = {chart: lost_share(volume, chart, points, params) for chart in charts}
     least = min(losses.values())
-    best = min((c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: (c.centre[0], losses[c]))
+    best = min(
+        (c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: (c.centre[0], losses[c])
+    )
     return best, losses
 
 

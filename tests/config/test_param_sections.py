@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from dvc.utils.hydra import apply_overrides
 
+from docs.tools.params_page import PAGE, page
 from facefolds_core.config.params_file import load_params
-from facefolds_core.config.params_page import PAGE, page
 from facefolds_core.errors import UserError
 from facefolds_core.params import (
     PRESETS,
@@ -175,9 +175,7 @@ def test_dvc_can_set_every_key_with_two_plus_signs(tmp_path: Path, project_root:
 
 
 def test_the_page_of_all_keys_is_up_to_date(project_root: Path) -> None:
-    assert (project_root / PAGE).read_text(encoding="utf-8") == page(), (
-        "run python -m facefolds_core.config.params_page"
-    )
+    assert (project_root / PAGE).read_text(encoding="utf-8") == page(), "run python -m docs.tools.params_page"
 
 
 def test_every_key_is_described() -> None:

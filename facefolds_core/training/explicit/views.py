@@ -96,20 +96,14 @@ FRAMES = 12
 
 
 class Tracer:
-    """Crosses pixels of training cameras with the layers.
+    """Crosses pixels of training cameras with the layers."""
 
-    Args:
-        gpu: whether on a GPU.
-    """
-
-    def __init__(
-        self, scene: Scene, manifolds: RadialManifolds, gpu: bool = False, virtual: Virtual | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, manifolds: RadialManifolds, virtual: Virtual | None = None) -> None:
         self._scene, self._mattes, self._virtual = scene, scene.open_mattes(), virtual
         self._real = scene.indices("train")
         self.count = len(self._real) + (0 if virtual is None else len(virtual.cameras))
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
-        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
         self._belt = manifolds.chart.numbers
 
     def views(self, position: int, first: int, stride: int, frames: Sequence[int], fine: bool) -> Views:
@@ -164,16 +158,14 @@ class Tracer:
             yield from (self._mattes.image(*key)[..., 0] for key in keys if key in self._mattes)
 
 
-def trace_views(
-    scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False, virtual: Virtual | None = None
-) -> Views:
+def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, virtual: Virtual | None = None) -> Views:
     """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers, and fewer of the
     virtual cameras.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    tracer, frames = Tracer(scene, manifolds, gpu, virtual), spread(range(scene.num_frames), FRAMES)
+    tracer, frames = Tracer(scene, manifolds, virtual), spread(range(scene.num_frames), FRAMES)
     cameras = range(tracer.count)
     views = Views.together([tracer.views(k, first_pixel(k, stride), stride, frames, stride == 1) for k in cameras])
     if len(views.pixel) == 0:
@@ -275,7 +267,6 @@ class MovingRays:
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how much is kept.
         first: number of the first share of frame 0.
-        gpu: whether they are traced on a GPU.
         sampling: how many shares a frame has in use.
     """
 
@@ -287,12 +278,11 @@ class MovingRays:
         share: float,
         params: MovingParams,
         first: int = 0,
-        gpu: bool = False,
         sampling: Sampling = SAMPLING,
         virtual: Virtual | None = None,
     ) -> None:
         self._first, self._stride = first, stride
-        self._tracer = Tracer(scene, manifolds, gpu, virtual)
+        self._tracer = Tracer(scene, manifolds, virtual)
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = spread(range(scene.num_frames), sampling.frames)
@@ -341,18 +331,17 @@ def rays_of(
     stride: int,
     share: float,
     params: MovingParams,
-    gpu: bool = False,
     virtual: Virtual | None = None,
 ) -> Rays:
-    """The rays of a scene's training cameras, and of virtual ones, traced on a GPU if asked for; for `share` see
+    """The rays of a scene's training cameras, and of virtual ones; for `share` see
     `MovingRays`.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
     if scene.poses is None:
-        return StillRays(trace_views(scene, manifolds, stride, gpu, virtual))
-    return MovingRays(scene, manifolds, stride, share, params, gpu=gpu, virtual=virtual)
+        return StillRays(trace_views(scene, manifolds, stride, virtual))
+    return MovingRays(scene, manifolds, stride, share, params, virtual=virtual)
 
 
 class Images:
