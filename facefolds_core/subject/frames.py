@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,10 @@ from facefolds_core.subject.splats import COLOUR, Splats
 
 Array = NDArray[np.float32]
 
-PASSES = 8
-"""Steps on each picture of a frame."""
+STEPS = 64
+"""Of a frame, on one picture each."""
+RATE_COLOUR = 0.015
+"""Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
 CHANGED = 0.02
 """A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
 
@@ -45,7 +48,7 @@ def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[Target
     return found
 
 
-def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], params: GaussianParams, seed: int) -> Splats:
+def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:
     """The Gaussians as one frame's pictures show them; those that the pictures do not contradict stay as they are.
 
     Args:
@@ -56,10 +59,10 @@ def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], params: 
     chosen = mean_errors(splats, targets) - usual > CHANGED
     if not chosen.any():
         return splats
+    params = replace(GaussianParams(), rate_colour=RATE_COLOUR)
     random, state = np.random.default_rng(seed), State.of(splats.values.copy())
-    count = PASSES * len(targets)
-    order = np.concatenate([random.permutation(len(targets)) for _ in range(PASSES)])
-    for step, which in enumerate(order):
+    order = np.concatenate([random.permutation(len(targets)) for _ in range(-(-STEPS // len(targets)))])
+    for step, which in enumerate(order[:STEPS]):
         behind = random.random(3, np.float32)
-        improve(state, targets[which], behind, params, step / count, step, random, chosen)
+        improve(state, targets[which], behind, params, step / STEPS, step, random, chosen)
     return Splats(state.values, splats.background)

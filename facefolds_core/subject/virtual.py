@@ -13,16 +13,18 @@ from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
 
-GAP = 9.0
+GAP = 12.0
 """Degrees, seen from the subject: wherever a camera is wanted there is one nearer than this, real or virtual."""
-REACH = 15.0
-"""Degrees beyond the real cameras in which virtual ones are wanted: farther off Gaussians were seen by nobody."""
-MOST = 32
-"""Virtual cameras, at most."""
+REACH = 18.0
+"""Degrees from a real camera within which virtual ones are wanted: farther off Gaussians were seen by nobody."""
+VIEWS = 24
+"""Real and virtual cameras together, at most: so many photos say more than Gaussians do."""
 DIRECTIONS = 3000
 """Places that are tried, evenly on the sphere: 4 degrees apart."""
 ASIDE = math.radians(80)
 """Azimuth from the front up to which virtual cameras stand: layers have no back."""
+SMALLEST = 0.01
+"""Least radius that a subject is taken to have, units."""
 QUANTILE = 0.01
 """Share of the Gaussians on each side that the subject's box leaves out."""
 
@@ -37,7 +39,7 @@ def virtual_cameras(real: Sequence[Camera], splats: Splats, size: tuple[int, int
         size: width and height of the pictures.
     """
     low, high = (edge.astype(np.float64) for edge in np.quantile(splats.means, [QUANTILE, 1 - QUANTILE], axis=0))
-    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    middle, radius = 0.5 * (low + high), max(0.5 * float(np.linalg.norm(high - low)), SMALLEST)
     offsets = np.array([camera.centre - middle for camera in real])
     away = float(np.median(np.linalg.norm(offsets, axis=1)))
     focal = float(np.median([camera.K[0, 0] / np.linalg.norm(o) for camera, o in zip(real, offsets, strict=True)]))
@@ -54,7 +56,7 @@ def _places(real: Array) -> list[Array]:
     wanted = tried[(nearest >= math.cos(math.radians(REACH))) & (np.abs(np.arctan2(tried[:, 1], tried[:, 0])) <= ASIDE)]
     nearest = (wanted @ real.T).max(1, initial=-1)
     chosen: list[Array] = []
-    while len(chosen) < min(MOST, len(wanted)):
+    while len(chosen) < min(VIEWS - len(real), len(wanted)):
         farthest = int(nearest.argmin())
         if nearest[farthest] > math.cos(math.radians(GAP)):
             break

@@ -41,8 +41,8 @@ class GlossFit:
 
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
-        cameras: of which there are photos: virtual ones come after them, and show no gloss.
         how: it is fitted.
+        photographed: cameras of which there are photos, the first ones; others show no gloss. None: all.
     """
 
     def __init__(
@@ -51,10 +51,10 @@ class GlossFit:
         window: Window,
         params: ReflectionParams,
         poses: Track | None,
-        cameras: int,
         how: GlossParams = GLOSS,
+        photographed: int | None = None,
     ) -> None:
-        self._cameras = cameras
+        self._photographed = photographed
         self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
@@ -173,7 +173,10 @@ class GlossFit:
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
-        opaque = np.flatnonzero((seen.opacity >= self.how.min_opacity) & (seen.camera < self._cameras))
+        counts = seen.opacity >= self.how.min_opacity
+        if self._photographed is not None:
+            counts &= seen.camera < self._photographed
+        opaque = np.flatnonzero(counts)
         return seen.part(opaque[:: self._step(len(opaque))])
 
     def _step(self, count: int) -> int:

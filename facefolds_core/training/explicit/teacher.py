@@ -18,7 +18,6 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.find import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, targets_of
-from facefolds_core.subject.gaussians import GaussianParams
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.virtual import virtual_cameras
 
@@ -70,7 +69,7 @@ class Teacher:
             if not len(self._usual):
                 self._usual = mean_errors(splats, targets_of(self._real(self._first), first))
             targets = targets_of(self._real(frame), photos)
-            splats = changed_to(splats, self._usual, targets, GaussianParams(), self._seed + frame)
+            splats = changed_to(splats, self._usual, targets, self._seed + frame)
         return self._drawn(splats)
 
     @property

@@ -62,7 +62,7 @@ class Trainer:
         self.psnr = 0.0
         self.events = list(cameras.notes)
         real = len(self.scene.indices("train"))
-        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, real)
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, photographed=real)
         self.usual = np.zeros((0, 3), np.float32)
 
     def manifolds(self) -> RadialManifolds:
