@@ -84,12 +84,13 @@ export function slice(i, n, near, far) {
 
 /**
  * Depths in normalised device coordinates of a sphere's nearest and farthest points.
- * @param {ArrayLike<number>} projection 4 x 4 by columns; the camera looks along -z
+ * @param {ArrayLike<number>} projection 4 x 4 by columns
  * @param {number} distance of the sphere's centre, along the axis
  * @param {number} radius
+ * @param {number} along which z the camera looks: -1, or 1 where the axes are left-handed
  */
-export function depths(projection, distance, radius) {
-  const at = (d) => (projection[14] - projection[10] * d) / (projection[15] - projection[11] * d);
+export function depths(projection, distance, radius, along = -1) {
+  const at = (d) => (projection[14] + along * projection[10] * d) / (projection[15] + along * projection[11] * d);
   const [near, far] = [distance - radius, distance + radius];
   const inFront = projection[11] === 0 || near > 0; // an eye inside the sphere: from the near plane on
   return [inFront ? Math.max(at(near), -1) : -1, Math.min(at(Math.max(far, 1e-6)), 1)];
