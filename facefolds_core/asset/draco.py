@@ -121,6 +121,13 @@ def decode_mesh(data: bytes) -> TexturedMesh:
     return TexturedMesh(vertices, np.asarray(faces).astype(np.int32), st)
 
 
+def attribute_ids(data: bytes) -> dict[str, int]:
+    """The unique ids of a layer's attributes, by the names that glTF has for them."""
+    names = {0: "POSITION", 3: "TEXCOORD_0"}  # draco::GeometryAttribute::Type
+    attributes = DracoPy.decode(data).attributes
+    return {names[one["attribute_type"]]: one["unique_id"] for one in attributes if one["attribute_type"] in names}
+
+
 def _check_claims(data: bytes) -> None:
     """Refuse a mesh that claims more than any has, before the decoder makes room for it.
 

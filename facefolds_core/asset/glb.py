@@ -37,7 +37,8 @@ TO_Y_UP = [-0.5, -0.5, -0.5, 0.5]
 UNLIT = "KHR_materials_unlit"
 FLOAT, UNSIGNED_INT = 5126, 5125
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
-LINEAR, CLAMP_TO_EDGE = 9729, 33071
+SAMPLER = {"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071}
+"""Linear, clamped to the edge."""
 CUTOFF = 0.9
 """Of the core's alpha; it is 1 there, and filtered at its rim."""
 
@@ -58,13 +59,18 @@ class Builder:
         self.binary += data
         return len(self.views) - 1
 
-    def accessor(self, kind: str, component: int, values: NDArray[Any], view: int, bounds: bool = False) -> int:
-        """Describe an array (count, ...); returns its index."""
-        entry: dict[str, Any] = {"componentType": component, "count": len(values), "type": kind, "bufferView": view}
-        if bounds:
-            entry |= {"min": values.min(0).tolist(), "max": values.max(0).tolist()}
-        self.accessors.append(entry)
+    def describe(self, kind: str, component: int, count: int, **extra: Any) -> int:
+        """An accessor; returns its index."""
+        self.accessors.append({"componentType": component, "count": count, "type": kind, **extra})
         return len(self.accessors) - 1
+
+    def accessor(
+        self, kind: str, component: int, values: NDArray[Any], view: int, bounds: bool = False, **extra: Any
+    ) -> int:
+        """Describe a stored array (count, ...); returns the accessor's index."""
+        if bounds:
+            extra |= {"min": np.atleast_1d(values.min(0)).tolist(), "max": np.atleast_1d(values.max(0)).tolist()}
+        return self.describe(kind, component, len(values), bufferView=view, **extra)
 
     def array(self, kind: str, values: NDArray[Any], bounds: bool = False) -> int:
         """Store floats (count, ...), a value a vertex; returns the index of their accessor."""
@@ -96,11 +102,11 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
         )
     textures = opaque_where_covered(level.frame(frame), level.windows)
     builder = Builder()
-    primitives = _primitives(builder, level, [texture[..., 3] == 255 for texture in textures])
-    picture = builder.view(_png(_picture(level, textures)))
+    primitives = _primitives(builder, level, triangles_of(level, textures))
+    picture = builder.view(png(picture_of(level, textures)))
     nodes: list[dict[str, Any]] = [{"name": "layers", "mesh": 0, "extras": {"layers": level.num_layers}}]
     if level.track is not None:
-        nodes.append({"name": "head", "children": [0], **_pose(level.track, frame)})
+        nodes.append({"name": "head", "children": [0], **pose_of(level.track, frame)})
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
         "extensionsUsed": [UNLIT],
@@ -108,48 +114,75 @@ def write_glb(path: Path, level: AssetLevel, name: str, frame: int = 0) -> None:
         "scenes": [{"nodes": [len(nodes)]}],
         "nodes": [*nodes, {"name": name, "rotation": TO_Y_UP, "children": [len(nodes) - 1]}],
         "meshes": [{"name": "layers", "primitives": primitives}],
-        "materials": [_material("core", alphaMode="MASK", alphaCutoff=CUTOFF), _material("shell", alphaMode="BLEND")],
+        "materials": materials(),
         "textures": [{"source": 0, "sampler": 0}],
         "images": [{"name": "layers", "mimeType": "image/png", "bufferView": picture}],
-        "samplers": [{"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE}],
+        "samplers": [SAMPLER],
         "accessors": builder.accessors,
         "bufferViews": builder.views,
         "buffers": [{"byteLength": len(builder.binary)}],
     }
     with atomic_file(path) as temporary:
-        temporary.write_bytes(_container(document, bytes(builder.binary)))
+        temporary.write_bytes(container(document, bytes(builder.binary)))
 
 
-def _primitives(builder: Builder, level: AssetLevel, opaque: Sequence[NDArray[np.bool_]]) -> list[dict[str, Any]]:
-    """The core's triangles and the shell's, over the same vertices.
+@dataclass(frozen=True)
+class Triangles:
+    """All layers' vertices in one list, with the triangles of the still.
+
+    Attributes:
+        vertices: (V, 3), those of the outermost layer first.
+        st: (V, 2) in the picture of all layers.
+        core: (F, 3) that show opaque texels.
+        shell: (F, 3) that show anything, as they are drawn: of the innermost layer first, from the back to the front.
+    """
+
+    vertices: NDArray[np.float32]
+    st: NDArray[np.float64]
+    core: NDArray[np.intp]
+    shell: NDArray[np.intp]
+
+
+def triangles_of(level: AssetLevel, textures: Sequence[NDArray[np.uint8]]) -> Triangles:
+    """What a still is drawn of.
 
     Args:
-        opaque: of each layer, (h, w): its texels that are of the core.
+        textures: of each layer, as `opaque_where_covered` made them.
     """
     _, _, width, height = level.entry.texture.colour_rect
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in level.layers])
-    st, chart, core, shell = [], [], [], []
-    for mesh, layer, mask, start in zip(level.layers, level.entry.layers, opaque, starts, strict=False):
+    st, core, shell = [], [], []
+    for mesh, layer, texture, start in zip(level.layers, level.entry.layers, textures, starts, strict=False):
         x, y, w, h = layer.texture_rect
         st.append((mesh.st * (w, h) + (x, y)) / (width, height))
-        uv = st_to_uv(mesh.st.astype(np.float64), layer.uv_window)
-        chart.append(np.stack([(uv[:, 1] + 2) / 4, (2 - uv[:, 0]) / 4], -1))
-        core.append(mesh.faces[faces_over(mesh, mask)].astype(np.intp) + start)
-        shell.append(back_to_front(mesh).astype(np.intp) + start)
+        core.append(mesh.faces[faces_over(mesh, texture[..., 3] == 255)].astype(np.intp) + start)
+        seen = faces_over(mesh, texture[..., 3] > 0)
+        shown = TexturedMesh(mesh.vertices, mesh.faces[seen], mesh.st)
+        shell.append(back_to_front(shown).astype(np.intp) + start)
+    vertices = np.concatenate([mesh.vertices for mesh in level.layers])
+    return Triangles(vertices, np.concatenate(st), np.concatenate(core), np.concatenate(shell[::-1]))
+
+
+def _primitives(builder: Builder, level: AssetLevel, triangles: Triangles) -> list[dict[str, Any]]:
+    """The core's triangles and the shell's, over the same vertices."""
+    uv = [
+        st_to_uv(mesh.st.astype(np.float64), window) for mesh, window in zip(level.layers, level.windows, strict=True)
+    ]
+    chart = np.concatenate([np.stack([(one[:, 1] + 2) / 4, (2 - one[:, 0]) / 4], -1) for one in uv])
     attributes = {
-        "POSITION": builder.array("VEC3", np.concatenate([mesh.vertices for mesh in level.layers]), bounds=True),
-        "TEXCOORD_0": builder.array("VEC2", np.concatenate(st)),
-        "TEXCOORD_1": builder.array("VEC2", np.concatenate(chart)),
+        "POSITION": builder.array("VEC3", triangles.vertices, bounds=True),
+        "TEXCOORD_0": builder.array("VEC2", triangles.st),
+        "TEXCOORD_1": builder.array("VEC2", chart),
     }
-    parts = [np.concatenate(core), np.concatenate(shell[::-1])]
+    parts = [triangles.core, triangles.shell]
     return [
-        {"attributes": attributes, "indices": builder.indices(part), "material": material}
-        for material, part in enumerate(parts)
+        {"attributes": attributes, "indices": builder.indices(part), "material": index}
+        for index, part in enumerate(parts)
         if len(part)
     ]
 
 
-def _picture(level: AssetLevel, textures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+def picture_of(level: AssetLevel, textures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """All layers in one RGBA picture, where the asset's colour image has them, with gutters."""
     _, _, width, height = level.entry.texture.colour_rect
     picture = np.zeros((height, width, 4), np.uint8)
@@ -161,20 +194,23 @@ def _picture(level: AssetLevel, textures: Sequence[NDArray[np.uint8]]) -> NDArra
     return picture
 
 
-def _pose(track: Track, frame: int) -> dict[str, list[float]]:
+def pose_of(track: Track, frame: int) -> dict[str, list[float]]:
     """Of a node: where the head stands in a frame."""
     w, x, y, z = track.quaternions[frame].tolist()
     return {"rotation": [x, y, z, w], "translation": track.translations[frame].tolist()}
 
 
-def _material(name: str, **alpha: Any) -> dict[str, Any]:
-    return {
-        "name": name,
-        **alpha,
-        "doubleSided": False,
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0},
-        "extensions": {UNLIT: {}},
+def materials() -> list[dict[str, Any]]:
+    """Of core and shell: unlit, the first texture, without backs."""
+    modes: dict[str, dict[str, Any]] = {
+        "core": {"alphaMode": "MASK", "alphaCutoff": CUTOFF},
+        "shell": {"alphaMode": "BLEND"},
     }
+    colour = {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0}
+    return [
+        {"name": name, **mode, "doubleSided": False, "pbrMetallicRoughness": colour, "extensions": {UNLIT: {}}}
+        for name, mode in modes.items()
+    ]
 
 
 def back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
@@ -183,13 +219,14 @@ def back_to_front(mesh: TexturedMesh) -> NDArray[np.int32]:
     return mesh.faces[np.argsort(depth, kind="stable")]
 
 
-def _png(texture: NDArray[np.uint8]) -> bytes:
+def png(texture: NDArray[np.uint8]) -> bytes:
+    """A picture's file."""
     buffer = io.BytesIO()
     Image.fromarray(texture).save(buffer, "PNG", compress_level=6)
     return buffer.getvalue()
 
 
-def _container(document: dict[str, Any], binary: bytes) -> bytes:
+def container(document: dict[str, Any], binary: bytes) -> bytes:
     """The GLB container: a header and two chunks, each padded to 4 bytes."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)

@@ -19,9 +19,9 @@ from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering import render_asset
-from tests.asset.test_glb import opened
 from tests.assets import SOURCE, make_asset
 from tests.geometry.test_track import SHIFTS, TURNS
+from tests.gltf_files import opened
 from tests.hostile.fuzz_assets import seal
 from tests.older import make_older
 from tests.scenes import look_at_origin

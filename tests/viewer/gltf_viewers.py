@@ -7,21 +7,22 @@ import io
 import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, Page
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from tests.pictures import GREY
 
 VIEWER = Path(__file__).parents[2] / "viewer"
-GltfViewer = Literal["three", "model_viewer"]
+GltfViewer = Literal["three", "model_viewer", "layered_three", "layered_babylon"]
 
 
 def build(folder: Path, viewer: GltfViewer) -> None:
@@ -34,15 +35,30 @@ def build(folder: Path, viewer: GltfViewer) -> None:
     (folder / "index.html").write_text(f'<!doctype html><link rel="icon" href="data:,"><body>{script}')
 
 
-def pictures(browser: Browser, folder: Path, glb: Path, cameras: Sequence[Camera]) -> dict[str, NDArray[np.float64]]:
-    """By camera's name, (H, W, 3) in [0, 1] over grey; `folder` is what `build` filled."""
+@contextmanager
+def page_with(browser: Browser, folder: Path, glb: Path) -> Iterator[Page]:
+    """The page that `build` made in `folder`, with the GLB beside it as head.glb."""
     shutil.copy(glb, folder / "head.glb")
-    given = [{"K": c.K.tolist(), "w2c": c.w2c.tolist(), "width": c.width, "height": c.height} for c in cameras]
     with serving(folder, {}) as address:
         page = browser.new_page()
         page.goto(address)
         page.wait_for_function("() => window.show")
-        found = page.evaluate("([cameras, background]) => show('head.glb', cameras, background)", [given, GREY])
+        yield page
         page.close()
+
+
+def pictures(
+    browser: Browser, folder: Path, glb: Path, cameras: Sequence[Camera], frame: int = 0
+) -> dict[str, NDArray[np.float64]]:
+    """By camera's name, (H, W, 3) in [0, 1] over grey.
+
+    Args:
+        folder: what `build` filled.
+        frame: for pages that play.
+    """
+    given = [{"K": c.K.tolist(), "w2c": c.w2c.tolist(), "width": c.width, "height": c.height} for c in cameras]
+    with page_with(browser, folder, glb) as page:
+        code = "([cameras, background, frame]) => show('head.glb', cameras, background, frame)"
+        found = page.evaluate(code, [given, GREY, frame])
     shown = [Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB") for data in found]
     return {camera.name: np.asarray(picture) / 255 for camera, picture in zip(cameras, shown, strict=True)}

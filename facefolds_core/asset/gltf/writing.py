@@ -1,0 +1,217 @@
+"""An asset's level as one GLB with the extension: layers and video as the asset has them, a still for other viewers.
+
+The still is plain, so that every viewer opens it: nothing is required. The layers, which only readers of the extension
+decode, are the asset's own Draco meshes: bytes compared in docs/research/engines.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.asset.draco import attribute_ids
+from facefolds_core.asset.glb import (
+    ARRAY_BUFFER,
+    ELEMENT_ARRAY_BUFFER,
+    FLOAT,
+    SAMPLER,
+    TO_Y_UP,
+    UNLIT,
+    UNSIGNED_INT,
+    Builder,
+    Triangles,
+    container,
+    materials,
+    picture_of,
+    png,
+    pose_of,
+    triangles_of,
+)
+from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, LayeredVideo, Reflection
+from facefolds_core.asset.manifest import REMEDY, Video
+from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.opaque import opaque_where_covered
+from facefolds_core.asset.reader import AssetLevel, layer_bytes
+from facefolds_core.asset.stored import read_slice
+from facefolds_core.files.writing import atomic_file
+from facefolds_core.geometry.reflections import window_to_window
+from facefolds_core.geometry.track import Track
+
+UNSIGNED_SHORT = 5123
+PLAYS_ANYWHERE = "h264"
+STILL, LAYERS = 0, 1
+"""Indices of the meshes."""
+STILL_IMAGE, VIDEO, MAPS = 0, 1, 2
+"""Indices of the textures."""
+
+
+def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0) -> int:
+    """Write a level; returns the bytes of the file.
+
+    Args:
+        name: of the root node.
+        still: the frame that viewers without the extension show.
+
+    Raises:
+        IndexError: if there is no such frame.
+        UserError: if the asset is damaged.
+    """
+    textures = opaque_where_covered(level.frame(still), level.windows)
+    builder = Builder()
+    meshes = [_still(builder, triangles_of(level, textures)), _layers(builder, level)]
+    images = [_image(builder, "still", png(picture_of(level, textures)))]
+    document_textures: list[dict[str, Any]] = [
+        {"source": 0, "sampler": 0},
+        {"sampler": 0, "extensions": {TEXTURE_VIDEO: {"source": 0, "autoplay": True, "loop": True}}},
+    ]
+    maps = level.entry.reflection
+    if maps is not None:
+        images.append(_image(builder, "reflection", _stored(level, maps)))
+        document_textures.append({"source": 1, "sampler": 0})
+    node: dict[str, Any] = {"name": "layers", "mesh": STILL}
+    animations = []
+    if level.track is not None:
+        node |= pose_of(level.track, still)
+        animations.append(_animation(builder, level.track, level.entry.texture.fps))
+    node["extensions"] = {NAME: _said(level, still).model_dump(mode="json", exclude_none=True)}
+    video = _chosen(level.entry.texture.videos)
+    videos = [{"bufferView": builder.view(_stored(level, video)), "mimeType": video.mime}]
+    document = {
+        "asset": {"version": "2.0", "generator": "facefolds"},
+        "extensionsUsed": [UNLIT, DRACO, TEXTURE_VIDEO, NAME],
+        "scene": 0,
+        "scenes": [{"nodes": [1]}],
+        "nodes": [node, {"name": name, "rotation": TO_Y_UP, "children": [0]}],
+        "meshes": meshes,
+        "materials": materials(),
+        "textures": document_textures,
+        "images": images,
+        "samplers": [SAMPLER],
+        **({"animations": animations} if animations else {}),
+        "accessors": builder.accessors,
+        "bufferViews": builder.views,
+        "buffers": [{"byteLength": len(builder.binary)}],
+        "extensions": {TEXTURE_VIDEO: {"videos": videos}},
+    }
+    data = container(document, bytes(builder.binary))
+    with atomic_file(path) as temporary:
+        temporary.write_bytes(data)
+    return len(data)
+
+
+def _said(level: AssetLevel, still: int) -> LayeredVideo:
+    texture, maps = level.entry.texture, level.entry.reflection
+    return LayeredVideo(
+        mesh=LAYERS,
+        textures=(VIDEO,),
+        width=texture.width,
+        height=texture.height,
+        color_rectangle=texture.colour_rect,
+        alpha_rectangle=texture.alpha_rect,
+        rectangles=tuple(layer.texture_rect for layer in level.entry.layers),
+        frames=texture.frames,
+        frame_rate=texture.frame_rate,
+        still_frame=still,
+        animation=None if level.track is None else 0,
+        reflection=None
+        if maps is None
+        else Reflection(
+            texture=MAPS,
+            transforms=tuple(window_to_window(window, maps.uv_window) for window in level.windows),
+            environment_rectangle=maps.environment_rect,
+            gloss_rectangle=maps.gloss_rect,
+            offset_rectangle=maps.offset_rect,
+            normals_rectangle=maps.normals_rect,
+            environment_scale=maps.environment_scale,
+            gloss_scale=maps.gloss_scale,
+            offset_scale=maps.offset_scale,
+        ),
+    )
+
+
+def _still(builder: Builder, triangles: Triangles) -> dict[str, Any]:
+    """What viewers show that do not know the extension."""
+    used, places = np.unique(np.concatenate([triangles.core, triangles.shell]), return_inverse=True)
+    attributes = {
+        "POSITION": builder.array("VEC3", triangles.vertices[used], bounds=True),
+        "TEXCOORD_0": _shares(builder, triangles.st[used]),
+    }
+    parts = np.split(places.reshape(-1, 3), [len(triangles.core)])
+    kind, component = ("<u2", UNSIGNED_SHORT) if len(used) < 65536 else ("<u4", UNSIGNED_INT)
+    primitives = []
+    for material, part in enumerate(parts):
+        if len(part):
+            values = part.astype(kind).ravel()
+            view = builder.view(values.tobytes(), ELEMENT_ARRAY_BUFFER)
+            indices = builder.accessor("SCALAR", component, values, view)
+            primitives.append({"attributes": attributes, "indices": indices, "material": material})
+    return {"name": "still", "primitives": primitives}
+
+
+def _layers(builder: Builder, level: AssetLevel) -> dict[str, Any]:
+    """Of every layer its Draco mesh."""
+    primitives = []
+    for mesh, entry in zip(level.layers, level.entry.layers, strict=True):
+        data = layer_bytes(level.folder, entry)
+        corners = {"min": mesh.vertices.min(0).tolist(), "max": mesh.vertices.max(0).tolist()}
+        kinds = {"POSITION": ("VEC3", corners), "TEXCOORD_0": ("VEC2", {})}
+        attributes = {
+            name: builder.describe(kind, FLOAT, len(mesh.vertices), **bounds) for name, (kind, bounds) in kinds.items()
+        }
+        compressed = {"bufferView": builder.view(data), "attributes": attribute_ids(data)}
+        primitives.append(
+            {
+                "attributes": attributes,
+                "indices": builder.describe("SCALAR", UNSIGNED_INT, mesh.faces.size),
+                "extensions": {DRACO: compressed},
+            }
+        )
+    return {"name": "layers", "primitives": primitives}
+
+
+def _shares(builder: Builder, st: NDArray[np.float64]) -> int:
+    """Places (V, 2) in [0, 1] in 16 bits: off by a sixtieth of a pixel where the picture has 2000."""
+    values = np.rint(np.clip(st, 0, 1) * 65535).astype("<u2")
+    view = builder.view(values.tobytes(), ARRAY_BUFFER)
+    return builder.accessor("VEC2", UNSIGNED_SHORT, values, view, normalized=True)
+
+
+def _animation(builder: Builder, track: Track, fps: float) -> dict[str, Any]:
+    """The poses at the times of the pictures, of node 0."""
+
+    def numbers(kind: str, values: NDArray[np.float64], bounds: bool = False) -> int:
+        stored = values.astype("<f4")
+        return builder.accessor(kind, FLOAT, stored, builder.view(stored.tobytes()), bounds)
+
+    times = numbers("SCALAR", np.arange(len(track)) / fps, bounds=True)
+    parts = {
+        "rotation": numbers("VEC4", track.quaternions[:, [1, 2, 3, 0]]),
+        "translation": numbers("VEC3", track.translations),
+    }
+    return {
+        "name": "track",
+        "samplers": [{"input": times, "output": output, "interpolation": "LINEAR"} for output in parts.values()],
+        "channels": [{"sampler": i, "target": {"node": 0, "path": path}} for i, path in enumerate(parts)],
+    }
+
+
+def _image(builder: Builder, name: str, data: bytes) -> dict[str, Any]:
+    return {"name": name, "mimeType": "image/png", "bufferView": builder.view(data)}
+
+
+def _chosen(videos: Sequence[Video]) -> Video:
+    """One is enough: what plays anywhere if it is there."""
+    return next((video for video in videos if video.codec == PLAYS_ANYWHERE), videos[0])
+
+
+def _stored(level: AssetLevel, entry: StoredFile) -> bytes:
+    """A file of the asset.
+
+    Raises:
+        UserError: if it is not what the manifest says.
+    """
+    return read_slice(level.folder / entry.file, 0, entry.bytes, entry.sha256, REMEDY)

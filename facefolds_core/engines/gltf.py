@@ -1,0 +1,14 @@
+"""The whole sequence as one .glb: layers and video by EXT_layered_volumetric_video, a still for other viewers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from facefolds_core.asset.gltf.writing import write_layered
+from facefolds_core.asset.reader import AssetLevel
+
+
+def export(out: Path, level: AssetLevel, subject: str) -> str:
+    """See `write_layered`; the still is the first frame."""
+    size = write_layered(out, level, subject)
+    return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.2f} MB"

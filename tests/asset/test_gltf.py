@@ -1,0 +1,140 @@
+"""EXT_layered_volumetric_video: its schema, its document's example, and what the exporter writes."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import DracoPy
+import jsonschema
+import numpy as np
+import pytest
+
+from facefolds_core.asset import read_asset
+from facefolds_core.asset.gltf.extension import NAME, SCHEMA, LayeredVideo, schema, write_schema
+from facefolds_core.asset.gltf.writing import write_layered
+from facefolds_core.cli.export import export
+from facefolds_core.geometry.track import Track
+from facefolds_core.params import CompressParams, MeshCodec
+from tests.assets import SOURCE, make_asset
+from tests.geometry.test_track import SHIFTS, TURNS
+from tests.gltf_files import complaints, opened, part, validator_report
+from tests.viewer.fixtures import add_reflection
+
+HOME = Path(__file__).parents[2] / "docs" / "reference" / NAME
+FRAMES = 3
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An asset with all that the extension says: a track and a reflection."""
+    folder = tmp_path_factory.mktemp("gltf") / "asset"
+    params = CompressParams(mesh=MeshCodec(quantization_bits=14, compression_level=7))
+    source = replace(SOURCE, track=Track.of(TURNS, SHIFTS))
+    make_asset(folder, layers=3, frames=FRAMES, params=params, source=source)
+    add_reflection(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(folder: Path) -> tuple[dict[str, Any], bytes]:
+    write_layered(folder.with_suffix(".glb"), read_asset(folder).full, "caps", still=1)
+    return opened(folder.with_suffix(".glb"))
+
+
+def said(document: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = document["nodes"][0]["extensions"][NAME]
+    return found
+
+
+def examples() -> list[dict[str, Any]]:
+    text = (HOME / "README.md").read_text(encoding="utf-8")
+    return [json.loads(block) for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL)]
+
+
+def test_the_schema_is_the_models(tmp_path: Path) -> None:
+    write_schema(tmp_path)
+    assert (tmp_path / SCHEMA).read_text() == (HOME / "schema" / SCHEMA).read_text()
+    jsonschema.Draft202012Validator.check_schema(schema())
+
+
+def test_the_documents_example_is_valid() -> None:
+    [example] = examples()
+    one = said(example)
+    jsonschema.validate(one, schema())
+    LayeredVideo.model_validate_json(json.dumps(one))
+
+
+def test_the_documents_table_names_every_property() -> None:
+    text = (HOME / "README.md").read_text(encoding="utf-8")
+    table = text[text.index("### Properties") : text.index("### JSON Schema")]
+    named = set(re.findall(r"`(\w+)`", table)) - {"KHR_texture_video", "KHR_audio_emitter"}
+    keys = set(schema()["properties"]) | set(schema()["$defs"]["Reflection"]["properties"])
+    assert named == keys - {"extensions", "extras"}
+
+
+@pytest.mark.parametrize("key", ["mesh", "textures", "rectangles", "frameRate"])
+def test_schema_and_models_refuse_the_same(key: str) -> None:
+    [example] = examples()
+    for value in (None, -1, [], "0", 1.5, [[1, 2, 3]], [0, -1]):
+        one = {**said(example), key: value}
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(one, schema())
+        with pytest.raises(ValueError):
+            LayeredVideo.model_validate_json(json.dumps(one))
+
+
+def test_khronos_validator(folder: Path, written: tuple[dict[str, Any], bytes]) -> None:
+    report = validator_report(folder.with_suffix(".glb"))
+    assert complaints(report) == []
+    assert report["info"]["animationCount"] == 1
+
+
+def test_what_is_said_is_the_assets(folder: Path, written: tuple[dict[str, Any], bytes]) -> None:
+    document, binary = written
+    one, level = said(document), read_asset(folder).full
+    jsonschema.validate(one, schema())
+    texture = level.entry.texture
+    assert one["colorRectangle"] == list(texture.colour_rect) and one["alphaRectangle"] == list(texture.alpha_rect)
+    assert one["rectangles"] == [list(layer.texture_rect) for layer in level.entry.layers]
+    assert (one["frames"], one["frameRate"], one["stillFrame"]) == (FRAMES, [30, 1], 1)
+    source = document["textures"][one["textures"][0]]["extensions"]["KHR_texture_video"]["source"]
+    video = document["extensions"]["KHR_texture_video"]["videos"][source]
+    assert part(document, binary, video["bufferView"]) == (folder / texture.videos[0].file).read_bytes()
+    assert "extensionsRequired" not in document
+
+
+def test_layers_are_the_assets_meshes(folder: Path, written: tuple[dict[str, Any], bytes]) -> None:
+    document, binary = written
+    for primitive, layer in zip(document["meshes"][1]["primitives"], read_asset(folder).layers, strict=True):
+        compressed = primitive["extensions"]["KHR_draco_mesh_compression"]
+        mesh = DracoPy.decode(part(document, binary, compressed["bufferView"]))
+        ids = compressed["attributes"]
+        np.testing.assert_array_equal(mesh.get_attribute_by_unique_id(ids["POSITION"])["data"], layer.vertices)
+        np.testing.assert_array_equal(mesh.get_attribute_by_unique_id(ids["TEXCOORD_0"])["data"], layer.st)
+        accessors = [document["accessors"][i] for i in (*primitive["attributes"].values(), primitive["indices"])]
+        assert [one["count"] for one in accessors] == [len(layer.vertices)] * 2 + [layer.faces.size]
+
+
+def test_the_animation_is_the_track(written: tuple[dict[str, Any], bytes]) -> None:
+    document, binary = written
+    one = document["animations"][0]
+    track = Track.of(TURNS, SHIFTS)
+    wanted = {"rotation": track.quaternions[:, [1, 2, 3, 0]], "translation": track.translations}
+    for channel in one["channels"]:
+        sampler, path = one["samplers"][channel["sampler"]], channel["target"]["path"]
+        views = [document["accessors"][sampler[end]]["bufferView"] for end in ("input", "output")]
+        times, values = (np.frombuffer(part(document, binary, view), "<f4") for view in views)
+        np.testing.assert_allclose(times, np.arange(FRAMES) / 30, rtol=1e-6)
+        np.testing.assert_allclose(values.reshape(FRAMES, -1), wanted.pop(path), atol=1e-6)
+        np.testing.assert_allclose(document["nodes"][0][path], values.reshape(FRAMES, -1)[1], atol=1e-6)
+    assert not wanted
+
+
+def test_the_command_writes_it(folder: Path, tmp_path: Path) -> None:
+    words = export("gltf", folder, tmp_path / "face.glb", None)
+    assert words.startswith("3 layers, 3 frames, 0.0")
+    assert said(opened(tmp_path / "face.glb")[0])["stillFrame"] == 0

@@ -1,0 +1,92 @@
+"""Readers of EXT_layered_volumetric_video in Chromium, five views against the reference renderer."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser
+
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset.glb import container
+from facefolds_core.asset.gltf.writing import write_layered
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.track import Track
+from facefolds_core.rendering.pixels import render
+from tests.assets import SOURCE, make_asset
+from tests.geometry.test_track import SHIFTS, TURNS
+from tests.gltf_files import opened
+from tests.pictures import GREY_VALUE, expected_means, five_cameras, psnr
+from tests.viewer.fixtures import add_reflection
+from tests.viewer.gltf_viewers import GltfViewer, build, page_with, pictures
+
+SIZE, FRAME = 96, 2
+AGREE = 50.0
+"""dB, of means over pixels. Seen: 56 and more."""
+
+
+@pytest.fixture(scope="module", params=["layered_three", "layered_babylon"])
+def reader(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, player_folder: Path) -> Path:
+    name: GltfViewer = request.param
+    folder = tmp_path_factory.mktemp(name)
+    build(folder, name)
+    shutil.copytree(player_folder / "draco", folder / "draco")
+    return folder
+
+
+def exported(folder: Path, moving: bool = False, glossy: bool = False) -> tuple[Asset, Path]:
+    """An asset, and its GLB."""
+    source = replace(SOURCE, track=Track.of(TURNS, SHIFTS)) if moving else SOURCE
+    make_asset(folder / "asset", layers=4, frames=3, resolution=96, source=source)
+    if glossy:
+        add_reflection(folder / "asset")
+    asset = read_asset(folder / "asset")
+    write_layered(folder / "face.glb", asset.full, "caps")
+    return asset, folder / "face.glb"
+
+
+def shown(browser: Browser, reader: Path, glb: Path, cameras: Sequence[Camera]) -> dict[str, NDArray[np.float64]]:
+    """Means over pixels: drawn at twice the size."""
+    fine = [Camera(c.name, np.diag([2.0, 2, 1]) @ c.K, c.w2c, 2 * c.width, 2 * c.height) for c in cameras]
+    found = pictures(browser, reader, glb, fine, FRAME)
+    return {name: picture.reshape(SIZE, 2, SIZE, 2, 3).mean((1, 3)) for name, picture in found.items()}
+
+
+def test_five_views_agree_with_the_reference(browser: Browser, reader: Path, tmp_path: Path) -> None:
+    asset, glb = exported(tmp_path)
+    cameras = five_cameras(SIZE)
+    found, expected = shown(browser, reader, glb, cameras), expected_means(asset, cameras, [FRAME])
+    scores = {name: psnr(picture, expected[name, FRAME]) for name, picture in found.items()}
+    assert len(scores) == 5 and min(scores.values()) >= AGREE, scores
+
+
+def test_a_head_that_moves_in_the_light_of_its_room(browser: Browser, reader: Path, tmp_path: Path) -> None:
+    asset, glb = exported(tmp_path, moving=True, glossy=True)
+    cameras = five_cameras(SIZE)[:2]
+    for name, picture in shown(browser, reader, glb, cameras).items():
+        camera = next(camera for camera in cameras if camera.name == name)
+        expected, _ = render(asset, camera, FRAME, (GREY_VALUE,) * 3)
+        assert psnr(picture, expected) >= AGREE, name
+
+
+def test_the_video_plays(browser: Browser, reader: Path, tmp_path: Path) -> None:
+    _, glb = exported(tmp_path)
+    with page_with(browser, reader, glb) as page:
+        assert sorted(page.evaluate("play('head.glb')")) == [0, 1, 2]
+
+
+def test_a_video_that_cannot_be_decoded_leaves_the_still(browser: Browser, reader: Path, tmp_path: Path) -> None:
+    _, glb = exported(tmp_path)
+    document, binary = opened(glb)
+    view = document["bufferViews"][document["extensions"]["KHR_texture_video"]["videos"][0]["bufferView"]]
+    start = view["byteOffset"]
+    glb.write_bytes(container(document, binary[:start] + bytes(view["byteLength"])))
+    with page_with(browser, reader, glb) as page:
+        found = page.evaluate("fallback('head.glb')")
+    assert found["videos"] == 0 and found["meshes"] == 2
+    assert "no video can be decoded" in found["said"][0]
