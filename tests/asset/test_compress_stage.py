@@ -142,8 +142,10 @@ def test_poster_photos_and_sound(folders: SubjectFolders) -> None:
     assert [(photo.camera, photo.frame) for photo in manifest.photos] == [("cam1", 0), ("cam1", 1)]
     scene = read_scene(folders.scene)
     train, unseen = ([scene.cameras[i] for i in scene.indices(split)] for split in ("train", "holdout"))
-    assert manifest.view == filmed_view(train, unseen)
     assert manifest.view is not None and manifest.view.measured is not None
+    assert manifest.view.model_copy(update={"good": None}) == filmed_view(train, unseen)
+    good = manifest.view.good
+    assert good is not None and good.azimuth[0] < 0 < good.azimuth[1]
     assert manifest.audio.mime == 'audio/mp4; codecs="mp4a.40.2"'
     assert manifest.poster.K is not None and manifest.poster.background == BACKGROUND
     camera = read_scene(folders.scene).cameras[1]
