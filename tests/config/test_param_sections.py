@@ -58,10 +58,6 @@ NUMBERS = [
 ]
 
 
-def test_there_are_numbers_in_most_sections() -> None:
-    assert {stage for stage, *_ in NUMBERS} >= {"capture", "normalize", "train", "bake", "compress", "evaluate"}
-
-
 NULLABLE = ("resolution", "mesh.max_error_pixels", "video.target_psnr")
 """Keys whose numbers may be null."""
 
@@ -94,21 +90,22 @@ def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
     assert made.follow.min_error == 1.0 and made.geometry.rounds == (3.0, 1.0)
 
 
-@pytest.mark.parametrize("key", sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD))
-def test_keys_of_the_perceptrons_are_refused_by_the_explicit_model(key: str) -> None:
+OF_PERCEPTRONS = sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD)
+
+
+@pytest.mark.parametrize(
+    ("preset", "model", "other", "key", "named"),
+    [
+        *(("fast", "explicit", "mlp", key, "geometry") for key in OF_PERCEPTRONS),
+        *(("paper", "mlp", "explicit", key, "lr_manifold") for key in ("follow", "geometry", "textures")),
+    ],
+)
+def test_keys_of_the_other_model_are_refused(preset: str, model: str, other: str, key: str, named: str) -> None:
     with pytest.raises(UserError) as caught:
-        train_params({"preset": "fast", key: 1})
+        train_params({"preset": preset, key: 1})
     assert caught.value.place == f"train.{key}"
-    assert "model `explicit`" in str(caught.value.expected) and "geometry" in str(caught.value.expected)
-    assert "`mlp`" in str(caught.value.remedy)
-
-
-@pytest.mark.parametrize("key", ["follow", "geometry", "textures"])
-def test_keys_of_the_explicit_model_are_refused_by_the_perceptrons(key: str) -> None:
-    with pytest.raises(UserError) as caught:
-        train_params({"preset": "paper", key: {}})
-    assert "model `mlp`" in str(caught.value.expected) and "lr_manifold" in str(caught.value.expected)
-    assert "`explicit`" in str(caught.value.remedy)
+    assert f"model `{model}`" in str(caught.value.expected) and named in str(caught.value.expected)
+    assert f"`{other}`" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize(("old", "new"), [(old, new) for old, new in RENAMED.items()])
