@@ -7,22 +7,21 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.splats import Splats
 
 Array = NDArray[np.float64]
 
-GAP = 12.0
-"""Degrees, seen from the subject: wherever a camera is wanted there is one nearer than this, real or virtual."""
-REACH = 18.0
-"""Degrees from a real camera within which virtual ones are wanted: farther off Gaussians were seen by nobody."""
+GAP = 15.0
+"""Degrees, seen from the subject: gaps between cameras that are wider get a virtual one."""
 VIEWS = 24
 """Real and virtual cameras together, at most: so many photos say more than Gaussians do."""
 DIRECTIONS = 3000
 """Places that are tried, evenly on the sphere: 4 degrees apart."""
-ASIDE = math.radians(80)
-"""Azimuth from the front up to which virtual cameras stand: layers have no back."""
+SLOPE = 0.2
+"""Least cosine of the angle between a place and the cameras' mean direction."""
 SMALLEST = 0.01
 """Least radius that a subject is taken to have, units."""
 QUANTILE = 0.01
@@ -30,8 +29,8 @@ QUANTILE = 0.01
 
 
 def virtual_cameras(real: Sequence[Camera], splats: Splats, size: tuple[int, int]) -> tuple[Camera, ...]:
-    """Cameras between and beside the real ones, each where the nearest other one is farthest, upright and aimed at the
-    subject; as far away as the real ones, and with the pixels of the median one unless the subject is larger than that.
+    """Cameras between the real ones, each where the nearest other one is farthest, upright and aimed at the subject; as
+    far away as the real ones, and with the pixels of the median one unless the subject is larger than that.
 
     Args:
         real: training cameras, in the head's own frame.
@@ -52,8 +51,7 @@ def virtual_cameras(real: Sequence[Camera], splats: Splats, size: tuple[int, int
 def _places(real: Array) -> list[Array]:
     """Unit directions of the virtual cameras, given those of the real ones (C, 3)."""
     tried = _sphere(DIRECTIONS)
-    nearest = (tried @ real.T).max(1)
-    wanted = tried[(nearest >= math.cos(math.radians(REACH))) & (np.abs(np.arctan2(tried[:, 1], tried[:, 0])) <= ASIDE)]
+    wanted = tried[_between(tried, real)]
     nearest = (wanted @ real.T).max(1, initial=-1)
     chosen: list[Array] = []
     while len(chosen) < min(VIEWS - len(real), len(wanted)):
@@ -63,6 +61,21 @@ def _places(real: Array) -> list[Array]:
         chosen.append(wanted[farthest])
         nearest = np.maximum(nearest, wanted @ wanted[farthest])
     return chosen
+
+
+def _between(tried: Array, real: Array) -> NDArray[np.bool_]:
+    """(n,) which of the directions (n, 3) lie within the convex hull of the real ones (C, 3), seen from the subject:
+    what Gaussians show beyond it was seen by nobody. The hull is that of their central projection."""
+    mean = real.mean(0) / max(float(np.linalg.norm(real.mean(0))), 1e-9)
+    across = np.linalg.svd(mean[None])[2][1:]
+    before, ahead = real @ mean, tried @ mean
+    if len(real) < 3:
+        return np.zeros(len(tried), bool)
+    if before.min() < SLOPE:  # all around
+        return np.asarray(ahead >= SLOPE)
+    hull = Delaunay((real @ across.T) / before[:, None], qhull_options="QJ")
+    places = (tried @ across.T) / np.maximum(ahead, SLOPE)[:, None]
+    return np.asarray((ahead >= SLOPE) & (hull.find_simplex(places) >= 0))
 
 
 def _sphere(count: int) -> Array:

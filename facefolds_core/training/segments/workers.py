@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from loky import ProcessPoolExecutor
@@ -143,12 +144,12 @@ def _taken(folder: Path | None) -> tuple[Views | None, NDArray[np.float32] | Non
     """In a process: what was handed to it, arrays mapped."""
     if folder is None:
         return None, None
-    arrays = {path.stem: _mapped(path) for path in folder.glob("*.npy")}
+    arrays: dict[str, Any] = {path.stem: _mapped(path) for path in folder.glob("*.npy")}
     shine = arrays.pop(SHINE)
     return Views(**arrays), shine
 
 
-def _mapped(path: Path) -> NDArray[np.generic]:
+def _mapped(path: Path) -> Any:
     try:
         # "c": kernels are compiled for arrays that can be written to.
         return np.load(path, mmap_mode="c").view(np.ndarray)
