@@ -1,6 +1,6 @@
 """A closed-form model for the export tests: nested ellipsoids around c with smooth textures in (u, v) and time.
 
-It offers what `facefolds_core.export.protocol.LayeredModel` asks for. An ellipsoid around c with semi-axes a, b, d is
+It offers what the export asks of `RadianceManifolds`. An ellipsoid around c with semi-axes a, b, d is
 met in the direction n at the radius 1 / |(n_x / a, n_y / b, n_z / d)|. Only the front half (n_x > 0) exists.
 """
 

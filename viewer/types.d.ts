@@ -137,6 +137,10 @@ export class FacefoldsPlayer extends HTMLElement {
     onPart?: (part: number) => void;
   }): Promise<Blob>;
   compare(photo: number | null): void;
+  /** The device can show the head in the room around (WebXR); known some time after `ready`. */
+  readonly canActivateAR: boolean;
+  /** Shows the head in the room, or ends that; after a click only. */
+  activateAR(): Promise<void>;
   /** Plays an asset that is at hand: name -> content, manifest.json among them. */
   openFiles(files: Map<string, Blob>): void;
   addEventListener<K extends keyof PlayerEvents>(

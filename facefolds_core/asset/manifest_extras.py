@@ -66,26 +66,21 @@ class Pose(Part):
     translation: Vector
 
 
-class FilmedView(Part):
-    """Directions that the subject was filmed from, seen from the origin: a player need not go beyond them.
+class Directions(Part):
+    """A range of directions, seen from the origin.
 
     Attributes:
-        azimuth: the smallest arc with all training cameras, degrees from +x towards +y; its middle is in [-180, 180].
-        elevation: the range of the training cameras, degrees.
-        distance: the range of the training cameras, units; absent where it is not known.
-        measured: (azimuth, elevation, distance) of cameras that training did not see and that quality is measured
-            with; absent where there are none.
+        azimuth: degrees from +x towards +y; its middle is in [-180, 180].
+        elevation: degrees.
     """
 
     azimuth: tuple[Annotated[float, Field(ge=-360, le=360)], Annotated[float, Field(ge=-360, le=360)]]
     elevation: tuple[Annotated[float, Field(ge=-90, le=90)], Annotated[float, Field(ge=-90, le=90)]]
-    distance: Maybe[tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]] = None
-    measured: Maybe[tuple[Vector, ...]] = None
 
-    @field_validator("azimuth", "elevation", "distance")
+    @field_validator("azimuth", "elevation")
     @classmethod
     def _in_order(cls, value: tuple[float, float]) -> tuple[float, float]:
-        if value is not None and not value[0] <= value[1]:
+        if not value[0] <= value[1]:
             raise ValueError("from the lower to the higher")
         return value
 
@@ -94,6 +89,29 @@ class FilmedView(Part):
     def _a_turn(cls, value: tuple[float, float]) -> tuple[float, float]:
         if value[1] > value[0] + 360:
             raise ValueError("at most a full turn")
+        return value
+
+
+class FilmedView(Directions):
+    """Directions that the subject was filmed from: a player need not go beyond them. `azimuth` is the smallest arc with
+    all training cameras, `elevation` their range.
+
+    Attributes:
+        distance: the range of the training cameras, units; absent where it is not known.
+        measured: (azimuth, elevation, distance) of cameras that training did not see and that quality is measured
+            with; absent where there are none.
+        good: where the picture is good, as far as the asset's own pictures tell; absent where that was not measured.
+    """
+
+    distance: Maybe[tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]] = None
+    measured: Maybe[tuple[Vector, ...]] = None
+    good: Maybe[Directions] = None
+
+    @field_validator("distance")
+    @classmethod
+    def _near_first(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        if value is not None and not value[0] <= value[1]:
+            raise ValueError("from the lower to the higher")
         return value
 
 

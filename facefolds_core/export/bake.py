@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -164,25 +164,12 @@ def _finished(shown: Float) -> Image:
 
 
 def baked_frame(baker: Baker, textures: FrameStore, samples: FrameStore, frame: int, iterations: int) -> Image:
-    """(N, size, size, 4) of one frame; `textures` and `samples` as in `baked_rows`."""
-    layers = range(baker.rays.shipped.shape[1])
-    own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
-    return baker.frame(own, theirs, iterations)
-
-
-def baked_rows(
-    baker: Baker, textures: FrameStore, samples: FrameStore, iterations: int, progress: bool = True
-) -> Iterator[tuple[int, int, Image]]:
-    """All textures, one frame in memory at a time.
+    """(N, size, size, 4) of one frame.
 
     Args:
         textures, samples: layered frame stores (camera := layer) of the same layers and frames.
-        iterations: steps a frame.
-
-    Yields:
-        (layer, frame, (size, size, 4) uint8).
+        iterations: steps.
     """
-    frames = sorted({frame for _, frame in textures})
-    for frame in progress_bar(frames, desc="bake", unit="frame", disable=not progress):
-        for layer, image in enumerate(baked_frame(baker, textures, samples, frame, iterations)):
-            yield layer, frame, image
+    layers = range(baker.rays.shipped.shape[1])
+    own, theirs = (np.stack([store.image(n, frame) for n in layers]) for store in (textures, samples))
+    return baker.frame(own, theirs, iterations)

@@ -8,13 +8,11 @@ makes the result the same, bit for bit, from run to run; layers run side by side
 from __future__ import annotations
 
 import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
-from threading import Thread
 from typing import Any
 
 import numpy as np
+from loky import ProcessPoolExecutor
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -26,6 +24,7 @@ from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import row_strides
 from facefolds_core.params import ReconstructParams
 from facefolds_core.progress import progress as progress_bar
+from facefolds_core.system.processes import end_with_parent
 
 POINT_WEIGHT = 4.0
 """Weight of the samples (screening)."""
@@ -82,20 +81,8 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool =
     with progress_bar(total=len(jobs), desc="surfaces", unit="layer", disable=not progress) as bar:
         if workers == 1:
             return [_advance(bar, _reconstruct_job(job)) for job in jobs]
-        # spawn: a fork of a process that has run torch or pymeshlab threads may hang.
-        with ProcessPoolExecutor(workers, get_context("spawn"), initializer=_end_with_parent) as pool:
+        with ProcessPoolExecutor(workers, initializer=end_with_parent) as pool:
             return [_advance(bar, result) for result in pool.map(_reconstruct_job, jobs)]
-
-
-def _end_with_parent() -> None:
-    """A process of the pool whose parent is killed would wait for its next layer for ever."""
-
-    def wait() -> None:
-        if (parent := parent_process()) is not None:
-            parent.join()
-            os._exit(1)
-
-    Thread(target=wait, daemon=True).start()
 
 
 def _advance(bar: Any, result: Reconstruction) -> Reconstruction:

@@ -1,6 +1,6 @@
 """Sample a model: grids of surface points with normals, and texture frames (paper, "Exporting Layered Meshes").
 
-Only the model's own interface is used (`protocol.LayeredModel`), so that any model can be exported.
+Only the model's own interface is used, so that any model can be exported.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -18,12 +19,14 @@ from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
-from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.stores import Grids
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
 from facefolds_core.progress import progress as progress_bar
+
+if TYPE_CHECKING:
+    from facefolds_core.model.radiance import RadianceManifolds
 
 DIRECTIONS_AT_ONCE = 16384
 """Directions searched for surfaces at a time: bounds the memory, and paces the progress bar."""
@@ -34,7 +37,7 @@ LEAST = 512
 Array = NDArray[np.float64]
 
 
-def samples_for(model: LayeredModel, window: Window) -> int:
+def samples_for(model: RadianceManifolds, window: Window) -> int:
     """R of `sample.resolution: auto`: no texel of the model over the window is lost, up to 4096."""
     grid = model.texel_grid()
     if grid is None:
@@ -44,7 +47,7 @@ def samples_for(model: LayeredModel, window: Window) -> int:
     return max(LEAST, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
 
 
-def sample_grids(model: LayeredModel, resolution: int, window: Window, progress: bool = True) -> Grids:
+def sample_grids(model: RadianceManifolds, resolution: int, window: Window, progress: bool = True) -> Grids:
     """N grids of R x R points at the texel centres of `window`, with normals.
 
     Args:
@@ -137,7 +140,7 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], chart: C
 
 
 def texture_rows(
-    model: LayeredModel, grids: Grids, kept: KeptFrames | None = None, progress: bool = True
+    model: RadianceManifolds, grids: Grids, kept: KeptFrames | None = None, progress: bool = True
 ) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """Texture images: frame by frame, in each the layers from the outermost in.
 
@@ -176,7 +179,7 @@ class _Sheet:
         window, valid: of the layer's grid.
     """
 
-    def __init__(self, model: LayeredModel, layer: int, window: Window, valid: NDArray[np.bool_]) -> None:
+    def __init__(self, model: RadianceManifolds, layer: int, window: Window, valid: NDArray[np.bool_]) -> None:
         self._model, self._layer, self._valid = model, layer, valid
         self._grid = grid = model.texel_grid()
         if grid is None:
@@ -203,7 +206,7 @@ class _Sheet:
 
 
 @torch.no_grad()
-def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[np.float32]:
+def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> NDArray[np.float32]:
     """(M, 4) RGBA in [0, 1] at uv [M, 2]."""
     rgb, alpha = model.texture(uv, layer, float(frame))
     rgba = torch.cat([rgb, alpha[:, None]], -1)
@@ -220,7 +223,7 @@ def _texels(model: LayeredModel, uv: Tensor, layer: int, frame: int) -> NDArray[
 
 def write_textures(
     path: Path,
-    model: LayeredModel,
+    model: RadianceManifolds,
     grids: Grids,
     kept: Path | None = None,
     among: Collection[int] | None = None,

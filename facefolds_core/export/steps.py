@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,6 @@ from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
-from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.export.sheets import Gridded, grid_sheets
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.facts import Fact
@@ -34,6 +33,9 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
 from facefolds_core.progress import progress
+
+if TYPE_CHECKING:
+    from facefolds_core.model.radiance import RadianceManifolds
 
 TEXTURES = "textures.arrow"
 """Name of a frame store of textures, N layers x K frames, in its folder."""
@@ -48,7 +50,7 @@ Surfaces = Sheets | list[Surface]
 """Of all layers, outermost first: the sampled grids themselves, or triangle surfaces."""
 
 
-def check_frames(model: LayeredModel, scene: Scene, file: Path | None = None) -> None:
+def check_frames(model: RadianceManifolds, scene: Scene, file: Path | None = None) -> None:
     """Raises UserError if the model was trained on another number of frames; `file` is named."""
     if model.num_frames != scene.num_frames:
         raise UserError(
@@ -61,7 +63,7 @@ def check_frames(model: LayeredModel, scene: Scene, file: Path | None = None) ->
 
 
 def sample_model(
-    model: LayeredModel,
+    model: RadianceManifolds,
     cameras: Sequence[Camera],
     params: SampleParams,
     folder: Path,
@@ -87,13 +89,8 @@ def sample_model(
 
 
 def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:
-    """Surfaces of the layers, with what is to be said of them: `surfaces_in` takes it off."""
+    """Surfaces of the layers, with what is to be said of them."""
     return grid_sheets(grids, params.resolution) if params.method == "grid" else reconstruct_layers(grids, params)
-
-
-def surfaces_in(made: Gridded | list[Reconstruction]) -> Surfaces:
-    """The surfaces alone."""
-    return made.sheets if isinstance(made, Gridded) else [result.surface for result in made]
 
 
 @dataclass(frozen=True)

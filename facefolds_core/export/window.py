@@ -11,15 +11,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.export.protocol import LayeredModel
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.spacing import spread
+
+if TYPE_CHECKING:
+    from facefolds_core.model.radiance import RadianceManifolds
 
 MAX_CHANGE = 1 / 255
 """Largest change of a ray's colour by what the window leaves out: one step of an 8-bit image."""
@@ -35,7 +38,7 @@ MARGIN = 2.0
 
 
 def visible_window(
-    model: LayeredModel,
+    model: RadianceManifolds,
     cameras: Sequence[Camera],
     among: Sequence[int] | None = None,
 ) -> Window:
@@ -65,7 +68,9 @@ def visible_window(
     return float(u0), float(u1), float(v0), float(v1)
 
 
-def removed_weight(model: LayeredModel, camera: Camera, stride: int, frame: int, window: Window) -> NDArray[np.float64]:
+def removed_weight(
+    model: RadianceManifolds, camera: Camera, stride: int, frame: int, window: Window
+) -> NDArray[np.float64]:
     """(rays,) weight that each ray of a lattice loses outside `window`: the bound on its change of colour."""
     uv, weights, hit, _ = _crossings(model, camera, stride, [frame])
     u0, u1, v0, v1 = window
@@ -74,7 +79,7 @@ def removed_weight(model: LayeredModel, camera: Camera, stride: int, frame: int,
 
 
 def _seen_uv(
-    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int]
+    model: RadianceManifolds, camera: Camera, stride: int, frames: Sequence[int]
 ) -> tuple[NDArray[np.float64], float]:
     """(u, v) (M, 2) of the crossings that count, and the distance of neighbouring rays on the surface, in (u, v)."""
     uv, weights, hit, points = _crossings(model, camera, stride, frames)
@@ -88,7 +93,7 @@ def _seen_uv(
 
 
 def _crossings(
-    model: LayeredModel, camera: Camera, stride: int, frames: Sequence[int]
+    model: RadianceManifolds, camera: Camera, stride: int, frames: Sequence[int]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
     """uv [R, N, 2], largest weight over `frames` [R, N], hit [R, N] and points [R, N, 3] on a lattice of rays."""
     x = np.arange(stride // 2, camera.width, stride) + 0.5

@@ -1,4 +1,4 @@
-"""`Chart.uv` of one point, compiled, for kernels on CPUs and GPUs."""
+"""`Chart.uv` of one point, compiled, for kernels."""
 
 from __future__ import annotations
 

@@ -66,23 +66,6 @@ def inlined(function: Code) -> Code:
     return cast(Code, numba.njit(error_model="numpy", inline="always")(function))
 
 
-@inlined
-def add(array, at, value):  # type: ignore[no-untyped-def]
-    """Add to a sum that others add to: plainly here, where each has its own; atomically on a GPU (`gpu.py`)."""
-    array[at] += value
-
-
-@inlined
-def add4(array, at, v0, v1, v2, v3):  # type: ignore[no-untyped-def]
-    """`add` to the four sums (..., 4) that begin there; all are read before one is written, so that they go at once."""
-    a0, a1, a2, a3 = at + (0,), at + (1,), at + (2,), at + (3,)  # noqa: RUF005 - numba knows no (*at, 0)
-    s0, s1, s2, s3 = array[a0], array[a1], array[a2], array[a3]
-    array[a0] = s0 + v0
-    array[a1] = s1 + v1
-    array[a2] = s2 + v2
-    array[a3] = s3 + v3
-
-
 def fingerprint(function: Any) -> str:
     """SHA-256 of what compiling a kernel builds in: bytecode, constants, options, of itself and of all that it calls.
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.kernels.jit import add, add4, compiled, inlined
+from facefolds_core.kernels.jit import compiled, inlined
 
 CHUNK = 32768
 """Rays whose wishes are noted at once: few enough for the cache."""
@@ -26,6 +26,16 @@ def spread(task, tasks):  # type: ignore[no-untyped-def]
     """A permutation: a thread takes neighbouring tasks, and of neighbouring layers one is met as often as the other."""
     group, size = task % 4, tasks // 4
     return group * size + min(group, tasks % 4) + task // 4
+
+
+@inlined
+def _add4(sums, i, j, v0, v1, v2, v3):  # type: ignore[no-untyped-def]
+    """Add to four sums; all are read before one is written, so that they go at once."""
+    s0, s1, s2, s3 = sums[i, j, 0], sums[i, j, 1], sums[i, j, 2], sums[i, j, 3]
+    sums[i, j, 0] = s0 + v0
+    sums[i, j, 1] = s1 + v1
+    sums[i, j, 2] = s2 + v2
+    sums[i, j, 3] = s3 + v3
 
 
 def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
@@ -45,7 +55,7 @@ def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
             di, dj = tap >> 1, tap & 1
             w = (a if di else one - a) * (b if dj else one - b)
             for q in range(values):
-                add(sums, (i + di, j + dj, q), w * wish[k, 2 + q])
+                sums[i + di, j + dj, q] += w * wish[k, 2 + q]
 
     @inlined
     def put4(texel: Any, wish: Any, k: Any, sums: Any) -> None:
@@ -54,13 +64,13 @@ def put_of(values: int) -> Callable[[Any, Any, Any, Any], None]:
         # All is read before anything is written: for all a compiler knows, the wishes may lie in the sums.
         a, b, g0, g1, g2, g3 = wish[k, 0], wish[k, 1], wish[k, 2], wish[k, 3], wish[k, 4], wish[k, 5]
         w = (one - a) * (one - b)
-        add4(sums, (i, j), w * g0, w * g1, w * g2, w * g3)
+        _add4(sums, i, j, w * g0, w * g1, w * g2, w * g3)
         w = (one - a) * b
-        add4(sums, (i, j + next_one), w * g0, w * g1, w * g2, w * g3)
+        _add4(sums, i, j + next_one, w * g0, w * g1, w * g2, w * g3)
         w = a * (one - b)
-        add4(sums, (i + next_one, j), w * g0, w * g1, w * g2, w * g3)
+        _add4(sums, i + next_one, j, w * g0, w * g1, w * g2, w * g3)
         w = a * b
-        add4(sums, (i + next_one, j + next_one), w * g0, w * g1, w * g2, w * g3)
+        _add4(sums, i + next_one, j + next_one, w * g0, w * g1, w * g2, w * g3)
 
     return put4 if values == 4 else put
 

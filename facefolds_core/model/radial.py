@@ -86,15 +86,11 @@ class RadialManifolds(nn.Module):
         """(R, 3) float64 origins minus c, and directions -> (R, N) float32 distances, 0 where missed."""
         return self.tracer()(offsets, directions)
 
-    def tracer(self, gpu: bool = False) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """`compiled_distances` with the surfaces as they are now, prepared for many calls; on a GPU if asked for."""
+    def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
         rho = self.radii().detach().cpu().numpy()
         window, belt = np.array(self.window), self.chart.numbers
         top, bound = ceiling(rho, window, belt), self.radius
-        if gpu:
-            from facefolds_core.model.radial_gpu import Tracer
-
-            return Tracer(rho, window, belt, top, bound, STEP)
 
         def distances(offsets: np.ndarray, directions: np.ndarray) -> np.ndarray:
             offsets, directions = np.ascontiguousarray(offsets), np.ascontiguousarray(directions)

@@ -1,4 +1,4 @@
-"""First crossings of rays with radius maps, compiled for CPUs; GPUs: `radial_gpu.py`.
+"""First crossings of rays with radius maps, compiled.
 
 Reference: `radial.reference_crossings` (torch)."""
 

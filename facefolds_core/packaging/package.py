@@ -19,11 +19,13 @@ from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import Level, Manifest
-from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.parts import Parts
+from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.streams import make_streams
+from facefolds_core.asset.track_file import read_track
 from facefolds_core.asset.writer import (
     FULL,
     AssetSource,
@@ -41,6 +43,7 @@ from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content
+from facefolds_core.packaging.limits import Model, good_view
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.settings import LevelSetting
@@ -168,7 +171,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     train = scene.indices("train")
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
-        update["view"] = filmed_view([scene.cameras[index] for index in train], unseen)
+        update["view"] = _with_good(folder, manifest, filmed_view([scene.cameras[index] for index in train], unseen))
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))
     camera = write_poster(path, manifest, side, JPEG_QUALITY)
@@ -181,6 +184,14 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
         background=BACKGROUND,
     )
     return manifest.model_copy(update=update)
+
+
+def _with_good(folder: Path, manifest: Manifest, view: FilmedView | None) -> FilmedView | None:
+    """What was filmed, and from where the full level's picture is good."""
+    if view is None:
+        return None
+    level = read_level(folder, manifest.full, read_track(folder, manifest))
+    return view.model_copy(update={"good": good_view(Model.of(level), view)})
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 else:
     CodecName = Literal[CODECS.names]
 ConstantRateFactor = Annotated[int, Field(ge=0, le=51)]
-Decibels = Annotated[float, Field(ge=0, le=100)]
 
 
 def _one_or_several(value: Any) -> Any:

@@ -72,13 +72,6 @@ class MovingParams(Section):
     """Memory for the crossings of all frames' rays, MB; what does not fit is traced anew each time."""
 
 
-class GpuParams(Section):
-    """With `device: cuda`."""
-
-    cache_megabytes: Annotated[int, Field(ge=0, le=1_000_000)] = 4096
-    """GPU memory for pictures and crossings of frames, MB; what does not fit is sent again when needed."""
-
-
 class ExplicitParams(Section):
     """Model `explicit`: nested radius maps with texel grids. Its defaults are the preset `fast`."""
 
@@ -90,10 +83,7 @@ class ExplicitParams(Section):
     """Follows from the preset."""
 
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """ "cuda" needs the extra `cuda` and an NVIDIA GPU; "auto" is "cpu", since no GPU has been measured yet."""
-
-    gpu: GpuParams = GpuParams()
-    """What a GPU needs beside."""
+    """ "cuda" runs the texture steps in torch, and needs its CUDA build; "auto" is "cpu": no GPU has been measured."""
 
     seed: Seed = 0
     """Seed of the draws of rays and frames."""

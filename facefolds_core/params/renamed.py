@@ -55,7 +55,6 @@ FIXED: dict[str, str] = {
     "train.segments.vertices": "training/segments/keys.py",
     "train.segments.neighbours": "training/segments/keys.py",
     "train.segments.blend": "training/segments/keys.py",
-    "train.segments.checkpoint_share": "params/segments.py",
     "sample.least": "export/sampling.py",
     "sample.auto_window": "export/window.py",
     "reconstruct.point_weight": "export/poisson.py",
@@ -96,6 +95,8 @@ MATTES = (
     "names corrected ones"
 )
 
+NO_CHECKPOINTS = "a base that was cut off is trained again, as a take that is trained at once is"
+
 GONE: dict[str, str] = {
     "matte": MATTES,
     "capture.fps": "she plays as fast as she was filmed; `subjects.NAME.fps` sets another rate",
@@ -111,6 +112,7 @@ GONE: dict[str, str] = {
     "train.cameras": f"{FOUND}, and tells what single cameras do differently",
     **{f"train.start.{key}": f"{FOUND}; no fog is left" for key in ("fog_depth", "fog_gain", "fog_holes")},
     "train.background": CUT_OUT,
+    "train.gpu": "with `device: cuda` torch keeps what a step needs",
     "train.moving.background_rate": CUT_OUT,
     "train.losses": PRICE,
     "train.lambda_veil": PRICE,
@@ -124,6 +126,8 @@ GONE: dict[str, str] = {
     },
     "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel`, `geometry.max_halfwidth` "
     "and `geometry.blur` can be set",
+    "train.segments.checkpoint_seconds": NO_CHECKPOINTS,
+    "train.segments.checkpoint_share": NO_CHECKPOINTS,
     "train.segments.rate": "frames are fitted at the base's rate",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.between": "an asset has the capture's frames",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from pydantic import Field
 
@@ -32,12 +32,6 @@ class SegmentParams(Section):
 
     steps: Count = 16
     """Steps of each frame against the base, all at full resolution."""
-
-    checkpoint_seconds: Annotated[float, Field(ge=0, le=1e6)] = 60.0
-    """Seconds between checkpoints of a base while it is trained, at least."""
-
-    checkpoint_share: ClassVar[float] = 0.05
-    """Largest share of the time that writing checkpoints may take."""
 
     processes: Natural = 0
     """Processes that fit segments at once. 0: as many as cores, memory and work allow; 1: the training's own. The

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import prange
 
-from facefolds_core.kernels.adam import EPSILON
+from facefolds_core.kernels.adam import adam
 from facefolds_core.kernels.jit import kernel
 
 
@@ -30,11 +30,7 @@ def adam_step(values, first, second, gradient, seen, rates, correct, decay):
             continue
         far = math.sqrt(values[n, 0] ** 2 + values[n, 1] ** 2 + values[n, 2] ** 2)
         for k in range(values.shape[1]):
-            g = gradient[n, k]
-            one = decay[0] * first[n, k] + decay[1] * g
-            two = decay[2] * second[n, k] + decay[3] * g * g
-            first[n, k], second[n, k] = one, two
             rate = rates[k] * max(far, np.float32(1)) if k < 3 else rates[k]
-            values[n, k] -= rate * (one * correct[0]) / (math.sqrt(two * correct[1]) + np.float32(EPSILON))
+            values[n, k] -= adam(first, second, (n, k), gradient[n, k], rate, correct[0], correct[1], decay)
         for k in range(11, 14):
             values[n, k] = min(max(values[n, k], np.float32(0)), np.float32(1))

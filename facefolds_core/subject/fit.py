@@ -100,11 +100,11 @@ def fit_pictures(
         if size != level:
             alphas = [None] * len(cameras) if opacities is None else opacities
             level = size
-            targets = [_target(*each, size) for each in zip(cameras, pictures, alphas, strict=True)]
+            targets = [target_of(*each, size) for each in zip(cameras, pictures, alphas, strict=True)]
         if not len(order):
             order = random.permutation(len(targets))
         behind = background if opacities is None else random.random(3, np.float32)
-        _improve(state, targets[order[0]], behind, params, step, step - first, random)
+        improve(state, targets[order[0]], behind, params, done, step - first, random)
         order = order[1:]
         if (step + 1) % params.every == 0 and done < params.grown:
             wanted = starting + (count - starting) * (step + 1) / (params.grown * params.iterations)
@@ -116,29 +116,38 @@ def _over_grey(picture: Array, opacity: Array) -> Array:
     return np.asarray(picture + (1 - opacity[..., None]) * np.float32(0.5))
 
 
-def _improve(
+def improve(
     state: State,
     target: Target,
     behind: Array,
     params: GaussianParams,
-    step: int,
+    done: float,
     before: int,
     random: np.random.Generator,
+    chosen: NDArray[np.bool_] | None = None,
 ) -> None:
     """One step of Adam, after so many `before`, towards one picture over a colour (3,); some Gaussians are left out, so
-    that none hides what another gets wrong (DropGaussian, Park et al. 2025)."""
+    that none hides what another gets wrong (DropGaussian, Park et al. 2025).
+
+    Args:
+        done: share of the steps that are done.
+        chosen: (N,) which Gaussians move; None for all.
+    """
     values = state.values.copy()
     values[random.random(len(values)) < params.dropped, OPACITY] = ABSENT
     drawing = draw(values, target.view)
     wish, wish_light = picture_loss(drawing, target.over(behind), behind, params.structure)
     gradient, moved = differentiate(values, drawing, wish, wish_light)
     seen = np.diff(drawing.first) > 0
+    if chosen is not None:
+        seen &= chosen
     state.moved += moved * max(target.view.size) / 2
-    rates, correct = _rates(params, step / params.iterations), np.array(corrections(BETAS, before + 1), np.float32)
+    rates, correct = _rates(params, done), np.array(corrections(BETAS, before + 1), np.float32)
     adam_step(state.values, state.first, state.second, gradient, seen, rates, correct, decays(BETAS))
 
 
-def _target(camera: Camera, picture: Array, opacity: Array | None, size: float) -> Target:
+def target_of(camera: Camera, picture: Array, opacity: Array | None, size: float) -> Target:
+    """A picture (H, W, 3) with its opacity (H, W), `size` times as large."""
     width, height = max(8, round(camera.width * size)), max(8, round(camera.height * size))
     view = view_of(camera.resized(width, height))
     whole = np.zeros((4, *view.padded), np.float32)

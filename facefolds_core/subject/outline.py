@@ -19,6 +19,8 @@ from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
+MIN_RADIUS = 0.08
+"""Least radius of a layer's middle, units: at c the search for crossings ends."""
 BEYOND = 3.0
 """Voxels: a surface between two voxels is blurred by so much."""
 
@@ -125,8 +127,8 @@ def whole_window(chart: Chart, params: StartParams) -> Window:
 def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams) -> float:
     """Share of visible points that no sheet over the chart can hold.
 
-    They lie behind it or at its rim, or beneath or above the outermost surface in their direction by more than two
-    voxels and what the surface's slope explains.
+    They lie behind it or at its rim, nearer to c than layers may, or beneath or above the outermost surface in their
+    direction by more than two voxels and what the surface's slope explains.
     """
     uv, radius = chart.uv(points)
     u0, u1, v0, v1 = window = whole_window(chart, params)
@@ -138,7 +140,7 @@ def lost_share(volume: Volume, chart: Chart, points: Array, params: StartParams)
     within = (i >= 0) & (i <= rows - 1) & (j >= 0) & (j <= columns - 1)
     i, j = np.rint(i).astype(int).clip(0, rows - 1), np.rint(j).astype(int).clip(0, columns - 1)
     margin = 2 * volume.voxel
-    held = within & (radius <= high[i, j] + margin) & (radius >= low[i, j] - margin)
+    held = within & (radius <= high[i, j] + margin) & (radius >= np.maximum(low[i, j] - margin, MIN_RADIUS))
     return float(1 - held.mean())
 
 
@@ -160,7 +162,9 @@ def choose_chart(volume: Volume, points: Array, params: StartParams) -> tuple[Ch
     charts = [chart for x in params.centres for chart in _charts(x, points, params)]
     losses = {chart: lost_share(volume, chart, points, params) for chart in charts}
     least = min(losses.values())
-    best = min((c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: c.centre[0])
+    best = min(
+        (c for c, loss in losses.items() if loss <= least + params.centre_tie), key=lambda c: (c.centre[0], losses[c])
+    )
     return best, losses
 
 

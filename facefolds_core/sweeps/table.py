@@ -9,7 +9,6 @@ somebody set that).
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +19,6 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 
 from facefolds_core.errors import UserError
-from facefolds_core.files.parsing import parse_json
 from facefolds_core.files.writing import atomic_file
 
 NAMES = ("experiment", "revision", "subject", "error")
@@ -49,9 +47,6 @@ class Run:
     figures: Mapping[str, float] = field(default_factory=dict)
     error: str = ""
 
-    def figure(self, name: str) -> float | None:
-        return self.figures.get(name)
-
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:
     """Write the table in the format that the suffix names.
@@ -75,53 +70,6 @@ def write_runs(path: Path, runs: Sequence[Run]) -> None:
             pa_csv.write_csv(table, temporary)
         else:
             pa_parquet.write_table(table, temporary)
-
-
-def read_runs(path: Path) -> list[Run]:
-    """Read a table again.
-
-    Raises:
-        UserError: if it is missing or not such a table.
-    """
-    _check_suffix(path)
-    remedy = "`facefolds collect` writes one"
-    try:
-        if path.suffix == ".csv":
-            texts = pa_csv.ConvertOptions(
-                null_values=[""], strings_can_be_null=True, column_types=dict.fromkeys(NAMES, pa.string())
-            )
-            table = pa_csv.read_csv(path, convert_options=texts)
-        else:
-            table = pa_parquet.read_table(path)
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=remedy) from None
-    except (pa.ArrowInvalid, OSError) as error:
-        raise UserError("not a table of a sweep", file=path, found=str(error)[:200], remedy=remedy) from None
-    missing = [name for name in NAMES if name not in table.column_names]
-    if missing:
-        raise UserError("not a table of a sweep", file=path, expected=f"columns {', '.join(missing)}", remedy=remedy)
-    return [_run(row, path) for row in table.to_pylist()]
-
-
-def _run(row: dict[str, Any], path: Path) -> Run:
-    named = {name: row.pop(name) or "" for name in NAMES}
-    params, figures = {}, {}
-    for name, value in row.items():
-        if value is None:
-            continue
-        if "." in name:
-            params[name] = _value(value, name, path)
-        elif isinstance(value, (int, float)) and math.isfinite(value):
-            figures[name] = float(value)
-        else:
-            raise UserError("not a number", file=path, place=f"column {name}", found=value, remedy="collect it again")
-    return Run(**named, params=params, figures=figures)
-
-
-def _value(value: Any, name: str, path: Path) -> Any:
-    if not isinstance(value, str):
-        return value
-    return parse_json(value, path, f"column {name} holds something that is no JSON: collect it again")
 
 
 def _union(mappings: Any) -> list[str]:

@@ -22,16 +22,6 @@ from facefolds_core.model.tensor_files import check_tensors, read_tensors, write
 from facefolds_core.params import TrainParams
 
 CHECKPOINT = "checkpoint.safetensors"
-PROCESSES = {
-    "processes",
-    "process_seconds",
-    "ray_nanoseconds",
-    "free_share",
-    "checkpoint_seconds",
-    "checkpoint_share",
-}
-"""Keys of `segments` that say who fits them, what is foretold, and how often what is done is kept."""
-
 _MOMENTS = ("step", "exp_avg", "exp_avg_sq")
 
 
@@ -64,8 +54,7 @@ def fingerprint(params: TrainParams, scene: Scene) -> str:
     """
     digest = hashlib.sha256()
     values = params.model_dump(mode="json", exclude={"device", "checkpoint_seconds", "preset"})
-    for key in PROCESSES & values.get("segments", {}).keys():
-        del values["segments"][key]
+    values.get("segments", {}).pop("processes", None)
     digest.update(json.dumps(values, sort_keys=True).encode())
     digest.update((scene.folder / "scene.json").read_bytes())
     surface = scene.folder / "surface.npz"

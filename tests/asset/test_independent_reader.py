@@ -44,6 +44,9 @@ def test_its_score_is_evaluates(tmp_path: Path, codec: str) -> None:
         return float(-10 * np.log10(((seen - truths.image(HELD_OUT, frame).reshape(-1, 3) / 255) ** 2).mean()))
 
     for k, (picture, expected) in enumerate(zip(player.pictures(), ours, strict=True)):
+        for layer, texture in zip(player.level["layers"], asset.frame(k), strict=True):
+            x, y, w, h = layer["texture_rect"]
+            assert np.abs(255 * picture[y : y + h, x : x + w] - texture).max() < 0.51
         assert expected is not None and expected > 20
         assert abs(score(picture, k, reflection=True) - expected) < 0.1, k
         assert abs(score(picture, k, reflection=False) - expected) > 0.5, k  # it is strong enough to be seen here

@@ -36,14 +36,16 @@ def test_layout_has_no_problems(sizes: list[tuple[int, int]]) -> None:
     assert min(layout.width, layout.height) >= MIN_SIDE
 
 
-def test_equal_layers_stay_within_hardware_limits() -> None:
+def test_shapes_that_decoders_take() -> None:
     assert AtlasLayout.pack([(512, 512)] * 12).long_side <= HARDWARE_SIDE
-
-
-def test_equal_layers_waste_nothing() -> None:
-    layout = AtlasLayout.pack([(56, 56)] * 12)
-    assert layout.pixels == 2 * 12 * 64**2
-    assert layout.long_side <= 512
+    assert AtlasLayout.pack([(1016, 600)] * 12).long_side <= HARDWARE_SIDE
+    small = AtlasLayout.pack([(56, 56)] * 12)
+    assert small.pixels == 2 * 12 * 64**2 and small.long_side <= 512  # nothing is wasted
+    check_layout(AtlasLayout.pack([(1024, 1024)] * 12), 1024)  # the paper's
+    # One column of these has the least area, and no encoder takes it.
+    cropped = AtlasLayout.pack([(1024, 1024)] * 5 + [(1024, 1008)] * 7)
+    assert cropped.long_side <= LARGE_SIDE
+    check_layout(cropped, 1024)
 
 
 @pytest.mark.parametrize("sizes", SIZES.values(), ids=SIZES)
@@ -95,21 +97,6 @@ def test_neighbours_do_not_leak_into_chroma_placed_otherwise() -> None:
         inside = cb[y // 2 : (y + h) // 2, x // 2 : (x + w) // 2]
         around = cb[y // 2 - 1 : (y + h) // 2 + 1, x // 2 - 1 : (x + w) // 2 + 1]
         assert around.min() >= inside.min() - 4 and around.max() <= inside.max() + 4
-
-
-def test_paper_size_fits() -> None:
-    check_layout(AtlasLayout.pack([(1024, 1024)] * 12), 1024)
-
-
-def test_hardware_limit_decides_between_shapes() -> None:
-    assert AtlasLayout.pack([(1016, 600)] * 12).long_side <= HARDWARE_SIDE
-
-
-def test_cropped_layers_of_the_paper_size_are_not_stacked_into_one_column() -> None:
-    """One column of these has the least area, and no encoder takes it."""
-    layout = AtlasLayout.pack([(1024, 1024)] * 5 + [(1024, 1008)] * 7)
-    assert layout.long_side <= LARGE_SIDE
-    check_layout(layout, 1024)
 
 
 def test_too_large_a_picture_names_the_resolution_that_fits() -> None:

@@ -12,7 +12,6 @@ import torch
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.reflection import ReflectionPicture
 from facefolds_core.asset.validation import validate_asset
-from facefolds_core.errors import UserError
 from facefolds_core.export.stores import read_reflection_maps
 from facefolds_core.geometry.sphere_uv import st_to_uv, uv_to_st
 from facefolds_core.model.reflection import Reflection, ReflectionShape
@@ -73,18 +72,6 @@ def test_a_rotation_to_the_room_turns_the_light(asset: Asset) -> None:
     expected = reflected_colours(hits, camera, windows, upside_down)
     for one, other in zip(turned, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-5)
-
-
-def test_an_asset_with_a_reflection_is_sound(made: Path) -> None:
-    assert validate_asset(made) == []
-
-
-def test_a_damaged_picture_is_refused(made: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "asset"
-    shutil.copytree(made, folder)
-    (folder / "full_reflection.png").write_bytes(b"no picture")
-    with pytest.raises(UserError, match=r"full_reflection\.png"):
-        read_asset(folder)
 
 
 def test_a_rectangle_beside_the_picture_is_refused(made: Path, tmp_path: Path) -> None:

@@ -60,20 +60,6 @@ def test_a_failed_training_is_a_cell(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert made.failure == "training diverged" and made.psnr is None and not made.converged
 
 
-def test_the_seed_draws_the_hazard_and_the_world_moves_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: list[float] = []
-
-    def world(shots: object, strength: float, random: np.random.Generator) -> object:
-        drawn.append(float(random.random()))
-        return shots
-
-    monkeypatch.setattr(hazards, "of_split", lambda shots, _: shots)
-    hazard = Hazard("x", "x", (1, 2, 3), "{}", world=world)  # type: ignore[arg-type]
-    for seed in (0, 0, 1):
-        hazards.disturbed(hazard, 1.0, seed, object(), Path())  # type: ignore[arg-type]
-    assert drawn[0] == drawn[1] == drawn[2] == drawn[3] != drawn[4] == drawn[5]
-
-
 def test_rates_multiply_the_usual_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     project = Project(tmp_path, "cell")
     written: list[dict[str, Any]] = []
@@ -140,25 +126,6 @@ def test_finer_textures_are_sampled_as_finely() -> None:
     assert sweeps.changes("texture", 128, "actor") == {"texture.resolution": 128, **given}
     finer = {"sample.resolution": 1024, "reconstruct.resolution": 512}
     assert sweeps.changes("texture", 1024, "actor") == {"texture.resolution": 1024, **given, **finer}
-
-
-def test_every_cell_is_an_experiment_of_its_own_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[list[str]] = []
-
-    def ran(command: list[str], **_: object) -> subprocess.CompletedProcess[str]:
-        asked.append(command[3:])
-        return subprocess.CompletedProcess(command, 0, "", "")
-
-    monkeypatch.setattr(sweeps.subprocess, "run", ran)
-    assert invoke_app("queue", "rate").exit_code == 0
-    assert len({command[5] for command in asked}) == len(asked) == 25
-    assert asked[1][:6] == ["exp", "run", "--quiet", "--queue", "--name", "paper-actor-22"]
-    assert asked[1][-1] == "evaluate@actor"
-    for wanted in ("capture.frames=60", "compress.video.target_psnr=null", 'sample.window="full"'):
-        assert f"++subjects.actor.{wanted}" in asked[1]
-    asked.clear()
-    assert invoke_app("queue", "mesh", "--values", "16,32").exit_code == 0
-    assert [command[5] for command in asked] == ["mesh-actor-16", "mesh-actor-32"]
 
 
 @pytest.mark.parametrize("arguments", [("wind",), ("mesh", "--values", "ten"), ("mesh", "--values", "0")])

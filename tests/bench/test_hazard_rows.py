@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench import hazard_rows as hazards
-from bench.hazard_film import Film, Shots, keep_frames, of_split, read_shots, write_shots
+from bench.hazard_film import Film, Shots, of_split, read_shots, write_shots
 from bench.hazard_rows import HAZARDS, Hazard
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from tests.scenes import OPAQUE, make_scene
@@ -109,16 +109,7 @@ def test_a_wrong_radius_is_the_mesh_alone(shots: Shots) -> None:
     assert np.linalg.norm(moved.surface[0] - np.array(SPHERE_CENTRE), axis=-1) == pytest.approx(0.8 * 0.33, abs=1e-5)
 
 
-def test_every_row_has_three_strengths_of_its_own_name() -> None:
-    assert len({hazard.key for hazard in HAZARDS}) == len(HAZARDS)
-    assert all(len({hazard.label(s) for s in hazard.strengths}) == 3 for hazard in HAZARDS)
-
-
 @pytest.mark.parametrize("hazard", HAZARDS, ids=lambda hazard: hazard.key)
 def test_the_truth_is_never_disturbed(hazard: Hazard) -> None:
     film = hazard.truth(hazard.strengths[2]) if hazard.truth else Film()
     assert film.options.shutter == 0 and (film.height, film.width) == (Film().height, Film().width)
-
-
-def test_frames_are_kept_by_position(shots: Shots) -> None:
-    assert keep_frames(shots, [0, 3]).scene.frame_ids == (shots.scene.frame_ids[0], shots.scene.frame_ids[3])

@@ -8,7 +8,6 @@ import pytest
 import torch
 import yaml
 
-from bench.results import ROOT
 from bench.run import Project, own_params, score_model, training_of
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
@@ -75,7 +74,3 @@ def test_a_model_is_scored_on_its_held_out_cameras(tmp_path: Path) -> None:
     assert [(name, k) for name, k, _ in found] == [("front", 0), ("front", FRAMES - 1)]
     assert [v["psnr_subject"] is not None for _, _, v in found] == [True, False]
     assert all(v["psnr"] and 5 < v["psnr"] < 30 for _, _, v in found)
-
-
-def test_the_projects_own_params_hold_the_actor() -> None:
-    assert list(own_params("actor", {}, ROOT / "params.yaml")["subjects"]) == ["actor"]

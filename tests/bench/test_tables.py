@@ -8,7 +8,7 @@ import pytest
 
 from bench.hazard_rows import EXTREME, HAZARDS, loss_of
 from bench.results import Cell, Row
-from bench.tables import hazard_tables, interpolated, markdown, rate_tables, replace_between, sweep_table
+from bench.tables import hazard_tables, interpolated, rate_tables, replace_between, sweep_table
 from facefolds_core.errors import UserError
 
 GLOSS = next(hazard for hazard in HAZARDS if hazard.key == "gloss")
@@ -26,10 +26,6 @@ def test_a_missing_marker_is_said(tmp_path: Path, document: str) -> None:
     (tmp_path / "page.md").write_text(document)
     with pytest.raises(UserError, match="no place"):
         replace_between(tmp_path / "page.md", "<1>", "<2>", "new")
-
-
-def test_a_table() -> None:
-    assert markdown(["", "x"], [["a", ""]]) == "| | x |\n|---|---|\n| a |  |"
 
 
 def test_interpolation_ends_where_points_do() -> None:

@@ -71,12 +71,6 @@ def test_a_jittered_focal_length_is_averaged_and_said(tmp_path: Path) -> None:
     assert [one.values["worst"] for one in capture.left_out] == [camera.name]
 
 
-def test_fixed_cameras_are_taken_as_they_stand(tmp_path: Path) -> None:
-    capture = read(write(tmp_path, "{c}/{k}.png", jitter=0))
-    assert not capture.left_out
-    assert np.abs(capture.views[1].camera.w2c - film().cameras[1].w2c).max() < 1e-9
-
-
 def test_a_camera_that_moves_is_none_of_several(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="one time only"):
         read(write(tmp_path, "{c}/{k}.png", jitter=0.05, timed=True))

@@ -206,27 +206,20 @@ def test_a_size_that_no_image_has(size: tuple[int, int]) -> None:
         Subject(source="multiface", path="x", krt_size=size)
 
 
-@pytest.mark.parametrize("source", ["multiface", "transforms"])
-def test_an_address_of_the_net_must_be_downloaded_first(tmp_path: Path, source: str) -> None:
-    subject = Subject(source=source, path="https://example.org/capture")
-    folders = SubjectFolders(tmp_path / "data" / "head")
-    write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", folders.config)
-    for stage in (capture, normalize):
-        with pytest.raises(UserError, match="not a path") as caught:
-            stage(folders)
-        assert caught.value.place == "subjects.head.path"
-
-
-@pytest.mark.parametrize("path", ["x" * 300, "a\0b", "x" * 300 + ".json", "x/" * 3000])
+@pytest.mark.parametrize(
+    "path", ["https://example.org/capture", "x" * 300, "a\0b", "x" * 300 + ".json", "x/" * 3000], ids=lambda x: x[:9]
+)
 @pytest.mark.parametrize("source", ["multiface", "transforms"])
 def test_a_path_that_cannot_be(tmp_path: Path, source: str, path: str) -> None:
+    """An address of the net must be downloaded first."""
     subject = Subject(source=source, path=path)
     folders = SubjectFolders(tmp_path / "data" / "head")
     write_configs(Params(subjects={"head": subject}, sections={}, path="params.yaml"), "head", folders.config)
     for stage in (capture, normalize):
-        with pytest.raises(UserError) as caught:
+        with pytest.raises(UserError, match="not a path" if "://" in path else None) as caught:
             stage(folders)
         assert caught.value.remedy
+        assert "://" not in path or caught.value.place == "subjects.head.path"
 
 
 def test_a_sound_that_is_shorter_than_it_says(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
-from facefolds_core.params import FrameRange, HoldoutEvery, NormalizeParams, Subject
+from facefolds_core.params import HoldoutEvery, NormalizeParams, Subject
 from facefolds_core.pipeline.normalize import left_out
 from tests.captures.fixtures import (
     FACES,
@@ -96,12 +96,6 @@ def test_without_a_tracked_head_the_cameras_say_where_it_is(tmp_path: Path, fron
     assert angles[:, 0] == pytest.approx([elevation for _, _, elevation in RING], abs=degrees)
 
 
-def test_median_camera_distance_is_one(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "c")
-    distances = [np.linalg.norm(camera.centre) for camera in plan_multiface(tmp_path / "c").scene.cameras]
-    assert np.median(distances) == pytest.approx(1)
-
-
 def test_the_point_nearest_to_the_axes_ignores_a_camera_that_looks_elsewhere() -> None:
     good = [world_camera(str(a), a, 10 * (a % 3)) for a in range(-80, 81, 20)]
     away = world_camera("away", 33, 0)
@@ -161,17 +155,6 @@ def test_a_wrong_choice_for_validation_is_named(validate: list[str], says: str) 
     assert error.value.place == "validate"
 
 
-def test_cameras_for_validation_keep_their_masks(tmp_path: Path) -> None:
-    made = write_multiface(tmp_path / "c")
-    for camera in made.cameras:
-        for frame in made.frames:
-            save(tmp_path / "c" / "masks" / SEGMENT / camera.name / f"{frame}.png", np.zeros((64, 40), np.uint8))
-    plan = plan_multiface(tmp_path / "c", validate=("400001",))
-    masks = write_plan(plan, NormalizeParams()).open_masks()
-    assert masks is not None
-    assert {plan.scene.splits[camera] for camera, _ in masks} == {"holdout", "validate"}
-
-
 def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
     plan = plan_multiface(tmp_path / "c")
@@ -183,14 +166,14 @@ def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
     assert np.array_equal(store.image(3, 1), expected)
 
 
-def test_masks_are_kept_for_held_out_cameras_only(tmp_path: Path) -> None:
+def test_masks_are_kept_for_cameras_held_out_and_for_validation(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
-    for camera in ("400003", "400004"):
+    for camera in ("400001", "400003", "400004"):
         save(tmp_path / "c" / "masks" / SEGMENT / camera / "000006.png", np.full((64, 40), 200, np.uint8))
-    write_plan(plan_multiface(tmp_path / "c"), NormalizeParams())
+    write_plan(plan_multiface(tmp_path / "c", validate=("400001",)), NormalizeParams())
     masks = read_scene(tmp_path / "scene").open_masks()
     assert masks is not None
-    assert masks.keys() == [(2, 1)]
+    assert masks.keys() == [(0, 1), (2, 1)]
     assert int(masks.image(2, 1)[5, 5, 0]) == 200
 
 
@@ -232,12 +215,6 @@ def test_a_camera_that_lacks_most_frames_is_left_out_instead(tmp_path: Path) -> 
     assert (cameras, frames, len(lines)) == ([0, 2, 3, 4], [0, 1, 2], 1)
 
 
-def test_times_follow_the_rate(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "c")
-    scene = plan_multiface(tmp_path / "c", frames=FrameRange(step=2), fps=20.0).scene
-    assert (scene.fps, scene.times.tolist()) == (10.0, [0.0, 0.1])
-
-
 def test_entries_turned_by_90_degrees_do_not_matter_when_there_is_a_front_camera(tmp_path: Path) -> None:
     path, cameras = write_transforms(tmp_path / "c")
     turned = replace(cameras[1], w2c=np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) @ cameras[1].w2c)
@@ -247,15 +224,10 @@ def test_entries_turned_by_90_degrees_do_not_matter_when_there_is_a_front_camera
 
 
 @pytest.mark.captures
-def test_the_shared_face_keeps_32_cameras(captures_folder: Path) -> None:
-    scene = plan_multiface(captures_folder / "mugsy", holdout=("400013", "400060"), pixel_centres=0.5).scene
-    assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (30, 2)
-
-
-@pytest.mark.captures
-def test_the_shared_statue_keeps_21_cameras(captures_folder: Path) -> None:
-    scene = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
-    assert (len(scene.indices("train")), len(scene.indices("holdout"))) == (19, 2)
+def test_the_shared_captures_keep_the_cameras_that_see_the_front(captures_folder: Path) -> None:
+    face = plan_multiface(captures_folder / "mugsy", holdout=("400013", "400060"), pixel_centres=0.5).scene
+    statue = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
+    assert [(len(s.indices("train")), len(s.indices("holdout"))) for s in (face, statue)] == [(30, 2), (19, 2)]
 
 
 def test_notes_are_said_before_lists_of_what_is_missing(tmp_path: Path) -> None:

@@ -56,15 +56,6 @@ def test_poses_come_back_exactly(tmp_path: Path) -> None:
     assert np.array_equal(back.poses.translations, track.translations)
 
 
-@pytest.mark.parametrize("poses", [[], [{"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]}], "none", [{}, {}]])
-def test_poses_that_are_none_are_refused(tmp_path: Path, poses: object) -> None:
-    write_scene(scene(tmp_path), tmp_path)
-    path = tmp_path / "scene.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"poses": poses}))
-    with pytest.raises(UserError, match="garbled"):
-        read_scene(tmp_path)
-
-
 def test_views_of_a_turning_head_spread_over_the_frames(tmp_path: Path) -> None:
     turned = replace(scene(tmp_path), poses=Track.of([np.eye(3)] * 2, [[0, 0, 0], [0.1, 0, 0]]))
     assert [view.name for view in turned.views_of("train")] == ["a", "c"]
@@ -73,10 +64,6 @@ def test_views_of_a_turning_head_spread_over_the_frames(tmp_path: Path) -> None:
     assert second == turned.camera_in_head(2, 1).w2c.tolist()
     assert len(turned.views_of("train", 2)) == 4
     assert [view.name for view in scene(tmp_path).views_of("train", 2)] == ["a", "c"]
-
-
-def test_indices_of_a_split(tmp_path: Path) -> None:
-    assert scene(tmp_path).indices("train") == [0, 2]
 
 
 def test_masks_and_surface_are_optional(tmp_path: Path) -> None:
@@ -112,9 +99,17 @@ def test_a_damaged_tracked_mesh_is_refused(tmp_path: Path, content: bytes) -> No
     assert caught.value.file == tmp_path / "surface.npz"
 
 
+POSE = {"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]}
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
-    [({"version": 99}, "another version"), ({"cameras": [{"name": "a"}]}, "garbled"), ({"times": "soon"}, "garbled")],
+    [
+        ({"version": 99}, "another version"),
+        ({"cameras": [{"name": "a"}]}, "garbled"),
+        ({"times": "soon"}, "garbled"),
+        *(({"poses": poses}, "garbled") for poses in ([], [POSE], "none", [{}, {}])),
+    ],
 )
 def test_a_garbled_scene_is_refused(tmp_path: Path, change: dict[str, Any], message: str) -> None:
     write_scene(scene(tmp_path), tmp_path)

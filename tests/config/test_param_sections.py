@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from dvc.utils.hydra import apply_overrides
 
+from docs.tools.params_page import PAGE, page
 from facefolds_core.config.params_file import load_params
-from facefolds_core.config.params_page import PAGE, page
 from facefolds_core.errors import UserError
 from facefolds_core.params import (
     PRESETS,
@@ -58,10 +58,6 @@ NUMBERS = [
 ]
 
 
-def test_there_are_numbers_in_most_sections() -> None:
-    assert {stage for stage, *_ in NUMBERS} >= {"capture", "normalize", "train", "bake", "compress", "evaluate"}
-
-
 NULLABLE = ("resolution", "mesh.max_error_pixels", "video.target_psnr")
 """Keys whose numbers may be null."""
 
@@ -94,21 +90,22 @@ def test_whole_numbers_and_lists_do_for_floats_and_tuples() -> None:
     assert made.follow.min_error == 1.0 and made.geometry.rounds == (3.0, 1.0)
 
 
-@pytest.mark.parametrize("key", sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD))
-def test_keys_of_the_perceptrons_are_refused_by_the_explicit_model(key: str) -> None:
+OF_PERCEPTRONS = sorted(set(MlpParams.model_fields) - set(ExplicitParams.model_fields) - OLD)
+
+
+@pytest.mark.parametrize(
+    ("preset", "model", "other", "key", "named"),
+    [
+        *(("fast", "explicit", "mlp", key, "geometry") for key in OF_PERCEPTRONS),
+        *(("paper", "mlp", "explicit", key, "lr_manifold") for key in ("follow", "geometry", "textures")),
+    ],
+)
+def test_keys_of_the_other_model_are_refused(preset: str, model: str, other: str, key: str, named: str) -> None:
     with pytest.raises(UserError) as caught:
-        train_params({"preset": "fast", key: 1})
+        train_params({"preset": preset, key: 1})
     assert caught.value.place == f"train.{key}"
-    assert "model `explicit`" in str(caught.value.expected) and "geometry" in str(caught.value.expected)
-    assert "`mlp`" in str(caught.value.remedy)
-
-
-@pytest.mark.parametrize("key", ["follow", "geometry", "textures"])
-def test_keys_of_the_explicit_model_are_refused_by_the_perceptrons(key: str) -> None:
-    with pytest.raises(UserError) as caught:
-        train_params({"preset": "paper", key: {}})
-    assert "model `mlp`" in str(caught.value.expected) and "lr_manifold" in str(caught.value.expected)
-    assert "`explicit`" in str(caught.value.remedy)
+    assert f"model `{model}`" in str(caught.value.expected) and named in str(caught.value.expected)
+    assert f"`{other}`" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize(("old", "new"), [(old, new) for old, new in RENAMED.items()])
@@ -175,9 +172,7 @@ def test_dvc_can_set_every_key_with_two_plus_signs(tmp_path: Path, project_root:
 
 
 def test_the_page_of_all_keys_is_up_to_date(project_root: Path) -> None:
-    assert (project_root / PAGE).read_text(encoding="utf-8") == page(), (
-        "run python -m facefolds_core.config.params_page"
-    )
+    assert (project_root / PAGE).read_text(encoding="utf-8") == page(), "run python -m docs.tools.params_page"
 
 
 def test_every_key_is_described() -> None:

@@ -13,7 +13,6 @@ from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.engines.godot import CONTENTS, write_godot
-from facefolds_core.errors import UserError
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
@@ -70,13 +69,6 @@ def test_a_picture_holds_colour_and_alpha_of_its_frame(caps: Asset, exported: Pa
     colour, alpha = entry["colour_rect"], entry["alpha_rect"]
     assert psnr(picture[colour[1] + y :, colour[0] + x :][:h, :w], expected[..., :3]) > 38
     assert psnr(picture[alpha[1] + y :, alpha[0] + x :][:h, :w, 0], expected[..., 3]) > 38
-
-
-def test_a_folder_with_other_files_is_left_alone(caps: Asset, tmp_path: Path) -> None:
-    (tmp_path / "precious").write_text("mine")
-    with pytest.raises(UserError, match="not empty"):
-        write_godot(tmp_path, caps.full, "caps")
-    assert (tmp_path / "precious").is_file()
 
 
 @pytest.mark.usefixtures("_godot")

@@ -12,7 +12,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.export.bake import Baker, baked_rows, gather_rays
+from facefolds_core.export.bake import Baker, baked_frame, gather_rays
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.poisson import gather_samples, reconstruct
@@ -96,7 +96,8 @@ def test_each_step_of_the_grid_export_loses_no_more_than_this(
     samples = FrameStore(tmp_path / "samples.arrow")
     coarse = decimate_sheets(sheets, resolution**2)
     baker = Baker(coarse, sheets, gather_rays(RIG, coarse, sheets, progress=False), 192)
-    rows = baked_rows(baker, samples, samples, 4, progress=False)
+    frames = range(model.num_frames)
+    rows = ((n, k, image) for k in frames for n, image in enumerate(baked_frame(baker, samples, samples, k, 4)))
     write_frames(tmp_path / "baked.arrow", (192, 192, 4), rows)
     steps = [
         Exported(full_meshes(sheets), samples),

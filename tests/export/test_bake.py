@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.export.bake import MIN_LIGHT, Baker, cast_codes, gather_rays, reproject, reprojection
+from facefolds_core.export.bake import MIN_LIGHT, Baker, cast_codes, gather_rays, reproject
 from facefolds_core.export.bake_kernel import accumulate, render, update
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.sampling import sample_grids, texture_rows
 from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.sphere_uv import Window, uv_to_st
+from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.kernels.hit_codes import SCALE
 from tests.ellipsoids import Ellipsoids
 from tests.export import bake_reference
@@ -99,22 +99,6 @@ def samples() -> np.ndarray:
     grids = sample_grids(MODEL, R, WINDOW, progress=False)
     rows = [(frame, layer, image) for layer, frame, image in texture_rows(MODEL, grids, progress=False)]
     return np.stack([np.stack([image for f, _, image in rows if f == k]) for k in range(MODEL.num_frames)])
-
-
-def test_reprojection_finds_the_direction_of_the_point_where_a_texel_lies(
-    coarse: list[TexturedMesh], sheets: Sheets
-) -> None:
-    mesh = coarse[0]
-    positions = reprojection(mesh, sheets, R)
-    share = np.array([0.2, 0.3, 0.5])
-    places = uv_to_st(sheets.chart.uv((share @ mesh.vertices[mesh.faces]).astype(np.float64))[0], WINDOW)
-    corners = mesh.faces[np.abs(places - share @ mesh.st[mesh.faces]).max(-1).argmax()]  # where it matters most
-    uv, _ = sheets.chart.uv(share @ mesh.vertices[corners].astype(np.float64))
-    at, true = share @ mesh.st[corners].astype(np.float64) * R - 0.5, uv_to_st(uv, WINDOW) * R - 0.5
-    column, row = np.rint(at).astype(int)
-    # Positions are smooth inside a triangle: compared through the difference to the texel's own place.
-    assert positions[row, column] - (column, row) == pytest.approx(true - at, abs=0.15)
-    assert np.abs(true - at).max() > 0.2
 
 
 def test_reprojection_onto_the_samples_themselves_changes_nothing(sheets: Sheets, samples: np.ndarray) -> None:

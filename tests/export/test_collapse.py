@@ -6,18 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from facefolds_core.export.collapse import contribution, decimate_sheets, decimated_ladder
 from facefolds_core.export.decimation import exact_st, layer_order
 from facefolds_core.export.poisson import boundary_loops
-from facefolds_core.export.refit import radial_cosines, refit_radii
+from facefolds_core.export.refit import radial_cosines
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.sheets import grid_sheets, sheet_mesh, vertex_uv
+from facefolds_core.export.sheets import grid_sheets, vertex_uv
 from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.rendering.intersection import EmbreeMesh
 from tests.ellipsoids import Ellipsoids
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
@@ -52,33 +50,6 @@ def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
         assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.chart)).max() < 1e-5
         drift = mesh.st[mesh.faces].mean(1) - exact_st(middle.astype(np.float32), WINDOW, sheets.chart)
         assert np.abs(drift).max() < 0.005
-
-
-def test_fitted_radii_err_less_than_those_of_the_samples(sheets: Sheets) -> None:
-    faces = coarse_faces()
-    fitted = refit_radii(sheets, np.ones(sheets.radii.shape), faces, vertex_uv(sheets))
-    for layer in range(sheets.num_layers):
-        before, after = (radial_errors(kept, sheets, layer, faces) for kept in (sheets, fitted))
-        assert np.sqrt((after**2).mean()) < 0.5 * np.sqrt((before**2).mean())  # seen: 0.34 for both
-    assert (np.diff(fitted.radii, axis=0) <= 0).all()
-
-
-def coarse_faces() -> NDArray[np.int64]:
-    """Two triangles for each square of 21 x 21 cells of the grid."""
-    index = np.arange(N * N).reshape(N, N)[::21, ::21]
-    a, b, c, d = (x.reshape(-1) for x in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
-    return np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
-
-
-def radial_errors(coarse: Sheets, sheets: Sheets, layer: int, faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Radius of a coarse mesh, by casting the chart's rays, minus that of the samples."""
-    uv = vertex_uv(sheets)
-    mesh, origins = sheet_mesh(coarse, layer, faces, uv), sheets.chart.origins(uv)
-    hits = EmbreeMesh(mesh.vertices, mesh.faces).nearest(origins, sheets.chart.directions(uv))
-    found = hits.triangle >= 0
-    corners = mesh.vertices[mesh.faces[hits.triangle[found]]].astype(np.float64)
-    points = (hits.barycentric[found][..., None] * corners).sum(1)
-    return np.linalg.norm(points - origins[found], axis=-1) - sheets.radii[layer].reshape(-1)[found]
 
 
 def test_cosines_are_those_of_the_normals(sheets: Sheets) -> None:

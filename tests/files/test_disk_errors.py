@@ -38,6 +38,8 @@ def test_errors_of_the_disk_name_the_file_and_the_remedy(name: str, capsys: pyte
     status, text = said(OSError(number, os.strerror(number), "data/x/model"), capsys)
     assert status == 1
     assert "data/x/model" in text and "remedy" in text and "Traceback" not in text
+    assert name != "ENOSPC" or "free some space" in text
+    assert name != "EACCES" or "no permission" in text
 
 
 def test_an_error_without_a_name_does_not_invent_one(capsys: pytest.CaptureFixture[str]) -> None:

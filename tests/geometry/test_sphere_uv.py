@@ -39,9 +39,6 @@ def test_directions_with_known_coordinates(direction: tuple[float, ...], uv: tup
 
 def test_uv_to_directions_and_back() -> None:
     assert np.abs(directions_to_uv(uv_to_directions(UV)) - UV).max() < 1e-9
-
-
-def test_uv_to_directions_gives_unit_vectors() -> None:
     assert np.linalg.norm(uv_to_directions(UV), axis=-1) == pytest.approx(1)
 
 
@@ -71,11 +68,8 @@ def test_gradients_are_finite_at_the_poles() -> None:
     assert torch.isfinite(directions.grad).all()
 
 
-def test_st_and_back() -> None:
+def test_st_and_back_and_the_corners_of_a_window() -> None:
     assert st_to_uv(uv_to_st(UV, WINDOW), WINDOW) == pytest.approx(UV)
-
-
-def test_corners_of_a_window_in_texture_coordinates() -> None:
     u0, u1, v0, v1 = WINDOW
     corners = uv_to_st(np.array([[u1, v0], [u0, v1]]), WINDOW)
     assert corners == pytest.approx(np.array([[0, 0], [1, 1]]))  # top left is (u1, v0)

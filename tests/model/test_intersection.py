@@ -158,16 +158,18 @@ def test_no_surface_behind_the_centre_plane() -> None:
     assert not spheres().crossings(origins, directions).hit[:, 2].any()
 
 
-def test_a_ray_from_behind_meets_nothing() -> None:
-    # It enters the domain inside the surface and leaves it outwards: never from outside to inside.
-    origins = torch.tensor([[-1.0, 0.02, 0.01]], dtype=torch.float64)
-    directions = torch.tensor([[1.0, 0, 0]], dtype=torch.float64)
-    assert not spheres().crossings(origins, directions).hit.any()
-
-
-def test_starting_inside_a_surface_is_no_crossing() -> None:
-    origins = torch.tensor([[0.0, 0, 0]], dtype=torch.float64)
-    directions = torch.tensor([[-1.0, 0, 0]], dtype=torch.float64)
+@pytest.mark.parametrize(
+    ("origin", "direction"),
+    [
+        (
+            [-1.0, 0.02, 0.01],
+            [1.0, 0, 0],
+        ),  # from behind: it enters inside the surface and leaves it outwards
+        ([0.0, 0, 0], [-1.0, 0, 0]),  # from inside
+    ],
+)
+def test_only_a_way_in_is_a_crossing(origin: list[float], direction: list[float]) -> None:
+    origins, directions = torch.tensor([origin], dtype=torch.float64), torch.tensor([direction], dtype=torch.float64)
     assert not spheres().crossings(origins, directions).hit.any()
 
 

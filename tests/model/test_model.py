@@ -86,25 +86,11 @@ def test_surface_points_lie_in_the_asked_directions() -> None:
     torch.testing.assert_close(found, uv.expand_as(found), atol=1e-5, rtol=0)
 
 
-def test_latents_interpolate_linearly() -> None:
+def test_latents_interpolate_linearly_and_are_held_beyond_the_ends() -> None:
     textures = make_model().textures
-    latents = textures.latents
-    times = torch.tensor([0.0, 0.25, 1.0, 1.5, 2.0])
-    expected = torch.stack(
-        [
-            latents[0],
-            0.75 * latents[0] + 0.25 * latents[1],
-            latents[1],
-            0.5 * (latents[1] + latents[2]),
-            latents[2],
-        ]
-    )
-    torch.testing.assert_close(textures.latent(times), expected)
-
-
-def test_latents_are_held_beyond_the_ends() -> None:
-    textures = make_model().textures
-    torch.testing.assert_close(textures.latent(torch.tensor([-1.0, 7.0])), textures.latents[[0, 2]])
+    a, b, c = textures.latents
+    times = torch.tensor([-1.0, 0.0, 0.25, 1.0, 1.5, 2.0, 7.0])
+    torch.testing.assert_close(textures.latent(times), torch.stack([a, a, 0.75 * a + 0.25 * b, b, 0.5 * (b + c), c, c]))
 
 
 def test_initial_alpha_lets_all_layers_be_seen() -> None:

@@ -15,8 +15,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from facefolds_core.cli import COMMANDS, app, view
-from facefolds_core.sweeps.table import read_runs
 from tests.pipeline.tiny import TinyProject
+from tests.sweeps.tables import read_runs
 
 ASSET = "data/actor/asset"
 

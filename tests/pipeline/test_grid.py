@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from facefolds_core.sweeps.table import Run, read_runs
+from facefolds_core.sweeps.table import Run
 from tests.pipeline.test_dvc_yaml import STAGES
+from tests.sweeps.tables import read_runs
 
 COMPUTING = STAGES[1:]
 STUB = Path(__file__).with_name("stub_stage.py")
@@ -87,8 +88,8 @@ def test_a_failed_cell_does_not_lose_the_others(grid: tuple[list[Run], Counter[s
     assert set(found) == {13, 128}
     assert found[13].error and not found[13].figures
     assert not found[128].error
-    assert found[128].figure("psnr_subject") == pytest.approx(10 + 16 / 10 + 128 / 100)
-    assert found[128].figure("bytes") == 16 + 100 * 128
+    assert found[128].figures["psnr_subject"] == pytest.approx(10 + 16 / 10 + 128 / 100)
+    assert found[128].figures["bytes"] == 16 + 100 * 128
 
 
 def test_the_working_folder_has_a_row_too(grid: tuple[list[Run], Counter[str]]) -> None:

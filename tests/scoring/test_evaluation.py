@@ -35,8 +35,14 @@ def run(folder: Path, params: EvaluateParams | None = None, **masks: object) -> 
     return evaluate(scene, tiny_model(), flat_asset(), params or EvaluateParams(), NO_PERCEPTUAL)
 
 
-def test_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
-    found = [s.values for s in run(tmp_path).scores if s.variant == "asset"]
+def test_every_image_has_every_score_and_an_asset_that_shows_the_truth_is_perfect(tmp_path: Path) -> None:
+    scores = run(tmp_path).scores
+    keys = [(s.camera, s.frame, s.variant) for s in scores]
+    assert keys == [("front", f"{k:06d}", v) for k in range(FRAMES) for v in VARIANTS]
+    assert all(list(s.values) == list(ALL_METRICS) for s in scores)
+    lacking = [*SUBJECT_METRICS, *(name for name in METRICS if "lpips" in name)]  # neither masks nor weights
+    assert all(s.values[name] is None for s in scores for name in lacking)
+    found = [s.values for s in scores if s.variant == "asset"]
     assert [v["psnr"] for v in found] == [MAX_PSNR] * FRAMES
     np.testing.assert_allclose([v["ssim"] for v in found], 1)  # type: ignore[arg-type]
 
@@ -56,24 +62,9 @@ def test_an_asset_stands_where_its_own_track_says(tmp_path: Path) -> None:
     assert all(cast(float, s.values["psnr"]) < 20 for s in without.scores if s.variant == "asset")
 
 
-def test_every_image_is_scored_for_every_variant(tmp_path: Path) -> None:
-    scores = run(tmp_path).scores
-    keys = [(s.camera, s.frame, s.variant) for s in scores]
-    assert keys == [("front", f"{k:06d}", v) for k in range(FRAMES) for v in VARIANTS]
-    assert all(list(s.values) == list(ALL_METRICS) for s in scores)
-
-
-def test_without_masks_the_subject_has_no_scores(tmp_path: Path) -> None:
-    assert all(s.values[name] is None for s in run(tmp_path).scores for name in SUBJECT_METRICS)
-
-
 def test_an_image_without_a_mask_and_one_with_an_empty_mask_are_not_counted(tmp_path: Path) -> None:
     scores = run(tmp_path, masks={0: half_mask(), 2: np.zeros_like(half_mask())}).scores
     assert [s.values["psnr_subject"] is not None for s in scores if s.variant == "asset"] == [True, False, False]
-
-
-def test_without_weights_perceptual_scores_are_none(tmp_path: Path) -> None:
-    assert all(s.values[n] is None for s in run(tmp_path).scores for n in METRICS if "lpips" in n)
 
 
 def test_an_error_outside_the_mask_spares_the_subject() -> None:

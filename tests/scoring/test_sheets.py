@@ -73,13 +73,10 @@ def test_captions_under_narrow_pictures_do_not_meet(tmp_path: Path) -> None:
         assert np.ptp(sheet[top + 2 : top + CAPTION - 2, gap : gap + GAP]) == 0
 
 
-def test_images_keep_their_aspect() -> None:
-    width, height = plan(128, 192, 2, 3).cell
-    assert width / height == pytest.approx(128 / 192, abs=0.01)
-
-
-def test_two_portrait_cameras_stand_side_by_side() -> None:
-    assert plan(128, 192, 2, 3).across == 2
+def test_images_keep_their_aspect_and_two_portrait_cameras_stand_side_by_side() -> None:
+    layout = plan(128, 192, 2, 3)
+    assert layout.cell[0] / layout.cell[1] == pytest.approx(128 / 192, abs=0.01)
+    assert layout.across == 2
 
 
 def test_captures_without_masks_have_a_sheet_too(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from facefolds_core.cli.collect import command as collect
-from facefolds_core.sweeps.table import read_runs
+from tests.sweeps.tables import read_runs
 from tests.sweeps.test_experiments import SHOWN
 
 

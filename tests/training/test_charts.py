@@ -19,7 +19,7 @@ from facefolds_core.training.explicit.fit import fit_window
 PARAMS = ExplicitParams()
 START = PARAMS.start.model_copy(update={"centres": (-0.15, -0.2, -0.25), "belts": (10.0,)})
 AXIS, VOXEL = -0.2, 0.0125
-HEAD, NECK, RIM, ROOT, EDGE, FLOOR = 0.16, 0.07, 0.3, -0.2, -0.3, -0.36
+HEAD, NECK, RIM, ROOT, EDGE, FLOOR = 0.16, 0.09, 0.3, -0.2, -0.3, -0.36
 """A ball 0.05 above the origin, a neck down to ROOT, and a collar that slopes from there to its RIM at EDGE."""
 
 Array = NDArray[np.float64]
@@ -98,6 +98,16 @@ def test_a_ball_keeps_the_sphere_farthest_back() -> None:
     assert losses[chosen] < 0.02
     alike = [chart for chart, loss in losses.items() if loss <= min(losses.values()) + START.centre_tie]
     assert any(chart.belt is not None and chart.centre == chosen.centre for chart in alike)  # it was a tie
+
+
+def test_surface_nearer_to_the_centre_than_layers_may_lie_is_lost() -> None:
+    flat, z = nodes()
+    near = outline.MIN_RADIUS - 0.01
+    points = around(near * np.ones(50), np.zeros(50))
+    small = volume_of(near - np.hypot(flat, z))
+    within, behind = (Chart((x, 0.0, 0.0)) for x in (AXIS, AXIS - 0.2))
+    assert outline.lost_share(small, within, points, START) == 1
+    assert outline.lost_share(small, behind, points, START) < 0.5
 
 
 def test_no_belt_is_tried_where_none_is_asked_for() -> None:

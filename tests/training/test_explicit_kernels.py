@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core import scatter
 from facefolds_core.geometry.sphere_uv import st_to_uv
+from facefolds_core.kernels import scatter
 from facefolds_core.kernels.adam import decays
 from facefolds_core.model.grids import GridTextures
 from facefolds_core.training.explicit import adam_kernel, reference, shading_kernel

@@ -23,7 +23,8 @@ from facefolds_core.model import load_model
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.training.segments.frames import FrameFitter
-from facefolds_core.training.segments.loop import fit_take, train_take
+from facefolds_core.training.segments.loop import base_of, fit_take, train_take
+from facefolds_core.training.segments.plan import plan_take
 from tests.scenes import make_scene
 
 pytestmark = pytest.mark.slow
@@ -194,6 +195,20 @@ def test_a_damaged_segment_is_named(keep: int, again: tuple[Scene, Path]) -> Non
     path.write_bytes(content[:keep])
     with pytest.raises(UserError, match=r"00001\.safetensors"):
         load_model(again[1] / "model")
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_another_base_than_before_is_said(
+    before: int, trained: tuple[Scene, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A changed frame that is chosen as a key frame trains all others anew, too."""
+    scene, _ = trained
+    for number in range(before):
+        (tmp_path / f"base-{number}").mkdir()
+    training = "facefolds_core.training.segments.loop.train_base"
+    with patch(training, side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
+        base_of(plan_take(scene, params(), 2), scene, params(), tmp_path, tmp_path / "log")
+    assert ("train.segments.named" in capsys.readouterr().out) == bool(before)
 
 
 def test_an_unknown_key_frame_is_refused(again: tuple[Scene, Path]) -> None:

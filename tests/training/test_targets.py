@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
+from facefolds_core.subject.splats import Splats
 from facefolds_core.training.explicit.targets import CutOuts, OneFrame
+from facefolds_core.training.explicit.teacher import Teacher
 from tests.scenes import make_scene
+from tests.subject.splats import some_splats
 
 SIZE = 24
 
@@ -86,3 +89,16 @@ def test_without_plates_half_covered_pixels_get_the_colours_of_the_subject(scene
     edge = (disc().ravel() > 80) & (disc().ravel() < 250)
     straight = 255 * cut[edge, :3] / cut[edge, 3:]
     assert np.abs(straight - [200, 120, 60]).mean() < 25
+
+
+def test_virtual_cameras_come_after_the_photos_and_show_the_gaussians_of_the_frame(scene: Scene) -> None:
+    teacher = Teacher(scene, Splats(some_splats(200), np.zeros(3, np.float32)), seed=0)
+    real, virtual = len(scene.indices("train")), len(teacher.virtual.cameras)
+    pictures = CutOuts(scene, teacher=teacher)
+    assert virtual > 0 and pictures.behind.shape == (real + virtual, 3)
+    for frame in range(scene.num_frames):
+        cut = pictures.cut(frame)
+        np.testing.assert_array_equal(cut[:real], CutOuts(scene).cut(frame))
+    shown = pictures.cut(teacher.first)[real:].reshape(virtual, SIZE, SIZE, 4)
+    np.testing.assert_array_equal(shown[..., 3], teacher.virtual.mattes)
+    assert shown[..., 3].max() > 200

@@ -11,8 +11,11 @@ import torch
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.subject.splats import Splats
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Views, trace_views
 from tests.scenes import CENTRE, make_scene
+from tests.subject.splats import some_splats
 
 
 @pytest.fixture
@@ -61,3 +64,17 @@ def test_parts_and_what_is_put_together_keep_their_rays(scene: Scene) -> None:
     np.testing.assert_array_equal(again.which < 0, views.which < 0)
     fine = views.which >= 0
     np.testing.assert_array_equal(again.finer[again.which[fine]], views.finer[views.which[fine]])
+
+
+def test_virtual_cameras_have_fewer_pixels_and_finer_rays_at_their_outlines(scene: Scene) -> None:
+    teacher = Teacher(scene, Splats(some_splats(200), np.zeros(3, np.float32)), seed=0).virtual
+    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
+    layers = RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
+    plain, views = trace_views(scene, layers, 1), trace_views(scene, layers, 1, teacher)
+    real = len(scene.indices("train"))
+    photos = views.part(np.flatnonzero(views.camera < real))
+    for name, array in vars(plain).items():
+        np.testing.assert_array_equal(getattr(photos, name), array)
+    own = np.flatnonzero(views.camera >= real)
+    assert set(views.camera[own]) == set(range(real, real + len(teacher.cameras)))
+    assert len(own) <= len(photos.pixel) * 1.2 and (views.which[own] >= 0).any()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -13,12 +13,13 @@ import pytest
 
 from facefolds_core.captures.scene import Scene, read_scene
 from facefolds_core.errors import UserError
+from facefolds_core.training.segments import workers
 from facefolds_core.training.segments.base import Base
+from facefolds_core.training.segments.fitting import Fitting
 from facefolds_core.training.segments.forecast import forecast, processes_for
-from facefolds_core.training.segments.handed import Fitting
 from facefolds_core.training.segments.loop import base_of
 from facefolds_core.training.segments.plan import Segment, plan_take
-from facefolds_core.training.segments.workers import Workers
+from facefolds_core.training.segments.workers import fit_in_processes
 from tests.scenes import make_scene
 from tests.training.test_segments import FRAMES, params, train
 
@@ -46,22 +47,25 @@ def unfitted(serial: tuple[Scene, Path], tmp_path: Path) -> Path:
 class Fit:
     """The segments of a take, fitted in two processes."""
 
-    def __init__(self, folder: Path, tell: Callable[[Workers], object] = lambda workers: None) -> None:
+    def __init__(self, folder: Path) -> None:
         scene = read_scene(folder / "scene")
-        place = folder / "checkpoints" / "take"
+        self.place = folder / "checkpoints" / "take"
         self.plan = plan_take(scene, params(), forecast(scene, params()).key_frames or 1)
-        self.base: Base = base_of(self.plan, scene, params(), place, folder / "log")
-        fitting = Fitting(scene, params(), self.base.folder, self.base.fingerprint, place)
-        self.frames, self.done = 0, list[Segment]()
-        self.tell = tell
-        self.workers = Workers(fitting, self.base, 2, 1, self._frames, self.done.append)
+        self.base: Base = base_of(self.plan, scene, params(), self.place, folder / "log")
+        self.fitting = Fitting(scene, params(), self.base.folder, self.base.fingerprint, self.place)
+        self.done = list[Segment]()
 
-    def _frames(self, more: int) -> None:
-        self.frames += more
-        self.tell(self.workers)
+    def run(self, tell: Callable[[Segment], object] = lambda segment: None) -> None:
+        def told(segment: Segment) -> None:
+            self.done.append(segment)
+            tell(segment)
 
-    def run(self) -> None:
-        self.workers.fit(self.plan.segments)
+        fit_in_processes(self.fitting, self.base, self.plan.segments, 2, 1, told)
+
+
+def processes() -> list[psutil.Process]:
+    """Of this one's, those that fit segments."""
+    return [one for one in psutil.Process().children() if "popen_loky" in " ".join(one.cmdline())]
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -82,43 +86,42 @@ def test_processes_make_the_same_files(serial: tuple[Scene, Path], unfitted: Pat
     assert files(unfitted) == files(serial[1])
 
 
-def test_a_lost_workers_segment_is_run_again(serial: tuple[Scene, Path], unfitted: Path) -> None:
+def test_what_a_lost_process_had_is_fitted_again(serial: tuple[Scene, Path], unfitted: Path) -> None:
     killed: list[int] = []
 
-    def kill(workers: Workers) -> None:
+    def kill(_: Segment) -> None:
         if not killed:
-            killed.append(workers.workers[0].process.pid)
-            os.kill(killed[0], signal.SIGKILL)
+            killed.append(len(processes()))
+            for process in processes():
+                process.kill()
 
-    fit = Fit(unfitted, kill)
-    fit.run()
-    assert killed
+    fit = Fit(unfitted)
+    fit.run(kill)
+    assert killed == [2]
     assert sorted(segment.number for segment in fit.done) == [0, 1, 2]
-    assert fit.frames == FRAMES
-    made = {path.name: path.read_bytes() for path in (unfitted / "checkpoints" / "take").glob("segment-*")}
+    made = {path.name: path.read_bytes() for path in fit.place.glob("segment-*")}
     assert made == {path.name: path.read_bytes() for path in (serial[1] / "checkpoints" / "take").glob("segment-*")}
+    assert not list(fit.place.glob("rays-*"))
 
 
-def test_a_segment_that_loses_two_workers_is_named(unfitted: Path) -> None:
-    def kill(workers: Workers) -> None:
-        for worker in workers.workers:
-            if worker.segment is not None and worker.segment.number == 0:
-                worker.process.kill()
-
-    fit = Fit(unfitted, kill)
-    with pytest.raises(UserError, match="segment 1"):
+def test_processes_that_are_lost_again_and_again_end_the_training(
+    unfitted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = Fit(unfitted)
+    monkeypatch.setattr(workers, "_begin", partial(os._exit, 7))
+    with pytest.raises(UserError, match="a worker process was lost") as caught:
         fit.run()
+    assert "processes: 1" in str(caught.value) and "1, 2, 3" in str(caught.value)
 
 
 def test_an_error_ends_all_processes(unfitted: Path) -> None:
-    def interrupt(workers: Workers) -> None:
+    def interrupt(_: Segment) -> None:
         raise KeyboardInterrupt
 
-    fit = Fit(unfitted, interrupt)
-    before = set(psutil.Process().children())
+    fit = Fit(unfitted)
     with pytest.raises(KeyboardInterrupt):
-        fit.run()
-    assert not set(psutil.Process().children()) - before
+        fit.run(interrupt)
+    assert not processes()
 
 
 def test_what_a_user_can_mend_comes_back(unfitted: Path) -> None:

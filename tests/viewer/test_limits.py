@@ -46,6 +46,16 @@ def test_a_link_beyond_what_is_good_shows_the_nearest_that_is(player: Player) ->
     assert [view["azimuth"], view["elevation"]] == pytest.approx([GOOD["azimuth"][1], GOOD["elevation"][1]])
 
 
+def test_what_was_measured_bounds_the_view(new_player: NewPlayer, rich_copy: Path) -> None:
+    good = {"azimuth": [-29, 43], "elevation": [-4, 12]}
+    change_manifest(rich_copy, lambda value: value.update(view={**FILMED, "good": good}))
+    player = new_player({"asset": rich_copy})
+    player.open("asset")
+    view = player.run("e.state = { view: { azimuth: -80, elevation: 60 } }; return e.player.view.get()")
+    assert isinstance(view, dict)
+    assert [view["azimuth"], view["elevation"]] == pytest.approx([-29, 12])
+
+
 def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) -> None:
     player.page.locator("canvas").focus()
     player.page.keyboard.press("p")

@@ -455,6 +455,16 @@ export class FacefoldsPlayer extends HTMLElement {
     return index === null ? this.comparison?.close() : this.comparison?.open(index);
   }
 
+  /** Whether the device can show the head in the room around (WebXR); known some time after `ready`. */
+  get canActivateAR() {
+    return this.ready && !this.shadowRoot.querySelector('[data-do="ar"]').hidden;
+  }
+
+  /** Shows the head in the room, or ends that; after a click only, as browsers ask. */
+  async activateAR() {
+    await this.actions?.ar();
+  }
+
   /** To set, parts are enough, also of the view. @returns {import("./viewstate.js").ViewState} */
   get state() {
     const player = this.#player;

@@ -1,8 +1,9 @@
 /**
  * The part of the orbit from where the picture is good: movements beyond it meet resistance, and the picture fades there.
  *
- * It is the middle of the range that was filmed. What lies at the outline of a picture from an outermost camera, that camera
- * saw alone and at a grazing angle, so that nothing told its depth: there hems fray. A tenth of the range is left at each end.
+ * The asset says how far that is, as measured when it was made. Where it does not, it is the middle of what was filmed: what
+ * lies at the outline of a picture from an outermost camera, that camera saw alone, so that nothing told its depth, and hems
+ * fray. A tenth of the range is left at each end.
  */
 
 const KEPT = 0.8; // of the range that was filmed
@@ -11,16 +12,20 @@ const SOFT = 22; // degrees that a movement can be pushed beyond at most
 const FAINTEST = 0.06;
 const ROUND = 300; // degrees: cameras that go round so far have filmed from everywhere
 
-/** @typedef {{azimuth: [number, number], elevation: [number, number]}} Range degrees, of the manifest's `view` */
+/**
+ * @typedef {{azimuth: [number, number], elevation: [number, number]}} Range degrees
+ * @typedef {Range & {good?: Range | null}} Filmed the manifest's `view`
+ */
 
-/** @param {Range | null} range that was filmed @returns {Range} its good part; infinite where nothing bounds it */
+/** @param {Filmed | null} range that was filmed @returns {Range} its good part; infinite where nothing bounds it */
 export function bounded(range) {
   const all = [-Infinity, Infinity];
   if (!range) return { azimuth: all, elevation: [-89, 89] };
-  const [low, high] = kept(range.elevation);
-  const [a, b] = range.azimuth;
+  const { azimuth, elevation } = range.good ?? range;
+  const [low, high] = range.good ? elevation : kept(elevation);
+  const round = azimuth[1] - azimuth[0] >= ROUND;
   return {
-    azimuth: b - a >= ROUND ? all : kept(range.azimuth),
+    azimuth: round ? all : range.good ? azimuth : kept(azimuth),
     elevation: [Math.max(-89, low), Math.min(89, high)],
   };
 }

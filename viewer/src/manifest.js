@@ -21,7 +21,7 @@ const PLAIN_NAME = /^[A-Za-z0-9_][A-Za-z0-9_.-]*$/;
  * @typedef {{file: FileEntry, camera: string, frame: number, width: number, height: number, K: number[][],
  *   w2c: number[][]}} Photo
  * @typedef {{subject: string, generator: string, centre: number[], levels: Level[], audio: FileEntry & {mime: string} | null,
- *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Range | null,
+ *   poster: FileEntry | null, photos: Photo[], view: import("./limits.js").Filmed | null,
  *   track: import("./track.js").Pose[] | null, trackFile: FileEntry | null}} Manifest `track`: of version 3
  */
 
@@ -100,7 +100,7 @@ function readManifest(value) {
     photos: (value.photos ?? []).map(readPhoto),
     trackFile: value.track_file ? readTrackFile(value.track_file, levels[0].texture.frames) : null,
     track: value.track ? readTrack(value.track, levels[0].texture.frames) : null,
-    view: value.view ? { azimuth: range(value.view, "azimuth"), elevation: range(value.view, "elevation") } : null,
+    view: value.view ? { ...directions(value.view), good: value.view.good ? directions(value.view.good) : null } : null,
   };
 }
 
@@ -249,6 +249,8 @@ function readTrack(value, frames) {
     return { quaternion, translation };
   });
 }
+
+const directions = (view) => ({ azimuth: range(view, "azimuth"), elevation: range(view, "elevation") });
 
 function range(view, key) {
   const [low, high] = list(view[key], `view.${key}`);

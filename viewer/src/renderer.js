@@ -173,14 +173,15 @@ export class LayerRenderer {
   /**
    * Draws into a part of a framebuffer. @param {number[]} rect x, y, width, height
    * @param {WebGLFramebuffer | null} target null: the graphics' own canvas
+   * @param {number[]} [ground] RGBA behind the layers
    */
-  render(projection, view, rect, target) {
+  render(projection, view, rect, target, ground = this.#ground()) {
     const { gl } = this.graphics;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.viewport(...rect);
     gl.scissor(...rect);
     gl.enable(gl.SCISSOR_TEST);
-    const [r, g, b, a] = this.#ground();
+    const [r, g, b, a] = ground;
     gl.clearColor(a * r, a * g, a * b, a);
     gl.colorMask(true, true, true, true);
     gl.depthMask(true);

@@ -43,7 +43,7 @@ export class View {
     this.gestures = connectGestures(surface, this);
   }
 
-  /** @param {import("./limits.js").Range | null} range degrees that were filmed */
+  /** @param {import("./limits.js").Filmed | null} range degrees that were filmed */
   setFilmed(range) {
     this.filmed = range;
     this.setFree(this.free);

@@ -302,6 +302,10 @@ test("movements beyond the middle of what was filmed meet resistance, and fade",
   assert.equal(unwound(350, range.azimuth), -10);
   // The front stays where it was filmed, and where one camera stood there is room to move.
   assert.deepEqual(bounded({ azimuth: [-3, 57], elevation: [7, 7] }), { azimuth: [0, 51], elevation: [3, 11] });
+  // What was measured goes before any rule.
+  const good = { azimuth: [-44, 12], elevation: [-2, 30] };
+  assert.deepEqual(bounded({ azimuth: [-40, 60], elevation: [-10, 20], good }), good);
+  assert.equal(bounded({ azimuth: [-170, 170], elevation: [0, 0], good }).azimuth[1], 12);
 });
 
 /** What is said while pictures come every `seconds` and take `work`, for `total` seconds. */

@@ -1,6 +1,4 @@
-"""Activation of the texture grids and their Adam step, compiled for CPUs; GPUs: `kernels_gpu.py`.
-
-Reference: `reference.py`."""
+"""Activation of the texture grids and their Adam step, compiled. Reference: `reference.py`."""
 
 from __future__ import annotations
 
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.kernels.adam import EPSILON
+from facefolds_core.kernels.adam import adam
 from facefolds_core.kernels.jit import compiled, inlined, kernel
 
 
@@ -34,10 +32,7 @@ def activate_texel(k: Any, colour: Any, layers: Any, frame_colour: Any, frame_al
 @inlined
 def _adam(values, first, second, index, g, rate, correct1, correct2, keep, decay):  # type: ignore[no-untyped-def]
     """One Adam step on values[index], then shrinking by `keep`."""
-    first[index] = decay[0] * first[index] + decay[1] * g
-    second[index] = decay[2] * second[index] + decay[3] * g * g
-    step = rate * (first[index] * correct1) / (math.sqrt(second[index] * correct2) + np.float32(EPSILON))
-    values[index] = (values[index] - step) * keep
+    values[index] = (values[index] - adam(first, second, index, g, rate, correct1, correct2, decay)) * keep
 
 
 @kernel(parallel=True)

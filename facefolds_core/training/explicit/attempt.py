@@ -1,4 +1,4 @@
-"""How far the training of a level has come: with the values that are trained, all that its next step depends on."""
+"""How far the training of a level has come, and when it is begun again."""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.subject.find import reference_frame
 from facefolds_core.subject.outline import (
+    MIN_RADIUS,
     Profile,
     choose_chart,
     profile,
@@ -40,8 +41,6 @@ WINDOW_MARGIN = 0.04
 """Margin of the window in u and v beyond what holds the subject."""
 MAX_HALFWIDTH_PIXELS = 8.0
 """Largest distance of a layer from the middle, pixels of the median camera; `geometry.halfwidth` is always allowed."""
-MIN_RADIUS = 0.08
-"""Least radius of a layer's middle, units: at c the search for crossings ends."""
 RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""

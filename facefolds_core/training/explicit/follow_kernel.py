@@ -4,14 +4,13 @@ Reference: `reference.py`."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numba import prange
 
-from facefolds_core.kernels.adam import EPSILON
-from facefolds_core.kernels.jit import compiled, inlined, kernel
+from facefolds_core.kernels.adam import adam
+from facefolds_core.kernels.jit import compiled, kernel
 from facefolds_core.training.explicit.adam_kernel import activate_texel
 from facefolds_core.training.explicit.shading_kernel import tap_share
 
@@ -45,15 +44,6 @@ def _light(p: Any, codes: Any, texture: Any, chosen: Any, min_light: Any) -> Any
         if transmittance < min_light:
             break
     return np.float32(0.0)
-
-
-@inlined
-def _adam(values, index, moments, at, g, rate, correct, decay):  # type: ignore[no-untyped-def]
-    """One Adam step on values[index], its moments being moments[0][at] and moments[1][at]."""
-    first, second = moments
-    first[at] = decay[0] * first[at] + decay[1] * g
-    second[at] = decay[2] * second[at] + decay[3] * g * g
-    values[index] -= rate * (first[at] * correct[0]) / (math.sqrt(second[at] * correct[1]) + np.float32(EPSILON))
 
 
 @kernel(parallel=True)
@@ -108,7 +98,7 @@ def _follow(
         sum2 += gradient[n, k, 2]
         alpha = texture[k, n, 3]
         g = gradient[n, k, 3] * alpha * (1 - alpha)
-        _adam(frame_alpha, (k, n), alphas, (q, n), g, rates[1], correct, decay)
+        frame_alpha[k, n] -= adam(alphas[0], alphas[1], (q, n), g, rates[1], correct[0], correct[1], decay)
     for c in range(3):
         g = sum0 if c == 0 else (sum1 if c == 1 else sum2)
-        _adam(frame_colour, (k, c), colours, (q, c), g, rates[0], correct, decay)
+        frame_colour[k, c] -= adam(colours[0], colours[1], (q, c), g, rates[0], correct[0], correct[1], decay)

@@ -42,11 +42,19 @@ class GlossFit:
     Args:
         poses: of a head that turns, in the frames of the training: the reflection of a ray is another one in each.
         how: it is fitted.
+        photographed: cameras of which there are photos, the first ones; others show no gloss. None: all.
     """
 
     def __init__(
-        self, chart: Chart, window: Window, params: ReflectionParams, poses: Track | None, how: GlossParams = GLOSS
+        self,
+        chart: Chart,
+        window: Window,
+        params: ReflectionParams,
+        poses: Track | None,
+        how: GlossParams = GLOSS,
+        photographed: int | None = None,
     ) -> None:
+        self._photographed = photographed
         self.chart, self.window, self.params, self.poses, self.how = chart, window, params, poses, how
         self.on, self.smoother = params.enabled, 1.0
         self.maps: Maps | None = None
@@ -165,7 +173,10 @@ class GlossFit:
 
     def _used(self, seen: Seen) -> Seen:
         """The rays of a fit."""
-        opaque = np.flatnonzero(seen.opacity >= self.how.min_opacity)
+        counts = seen.opacity >= self.how.min_opacity
+        if self._photographed is not None:
+            counts &= seen.camera < self._photographed
+        opaque = np.flatnonzero(counts)
         return seen.part(opaque[:: self._step(len(opaque))])
 
     def _step(self, count: int) -> int:

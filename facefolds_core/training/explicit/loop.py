@@ -1,5 +1,5 @@
 """Training of the explicit model: geometry in rounds at coarse textures, then textures coarse to fine on stored
-crossings. A short take simply starts again where it was interrupted; the base of a long one has checkpoints."""
+crossings. What was interrupted starts again."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene, Split
+from facefolds_core.model.device import device_of
 from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in, subject_in
 from facefolds_core.training.checkpoints import fingerprint
-from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.cameras import choose_cameras
-from facefolds_core.training.explicit.checkpoints import Checkpoints
 from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import model_bytes
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import open_log
 from facefolds_core.training.patience import check_space, patiently
-from facefolds_core.training.report import TrainingReport, make_report
+from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.trained import Trained
 
 
@@ -72,25 +72,18 @@ class Surroundings:
 
 
 def fit_with_surroundings(
-    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None, kept: Path | None = None
+    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None
 ) -> tuple[Trained, Surroundings]:
-    """`fit_explicit`, and what else was found out.
-
-    Args:
-        kept: folder of this very training's checkpoint, which the caller deletes; None keeps none.
-    """
+    """`fit_explicit`, and what else was found out."""
     check_images(scene)
     with TemporaryDirectory() as folder:
         scene = found_in(scene, SubjectParams(seed=params.seed), Path(folder) / "subject")
-        return _fit(scene, params, log, place, kept)
+        return _fit(scene, params, log, place)
 
 
-def _fit(
-    scene: Scene, params: ExplicitParams, log: Path, place: Path | None, kept: Path | None
-) -> tuple[Trained, Surroundings]:
+def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) -> tuple[Trained, Surroundings]:
     """The same of a scene whose subject was found."""
-    device = choose(params.device)
-    checkpoints = None if kept is None else Checkpoints(kept, params.segments)
+    device = device_of(params)
     began = time.perf_counter()
     with open_log(log) as live:
         bar = progress(total=params.iterations, desc="train", unit="it")
@@ -104,26 +97,22 @@ def _fit(
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        trainer = Trainer(cameras, params, fit, device)
+        teacher = Teacher(cameras.scene, subject.splats, params.seed)
+        trainer = Trainer(cameras, params, fit, device, teacher)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
         levels = plan(fit, params, scene.num_frames, pixels)
         bar.total = bar.n + sum(level.iterations for level in levels)
-        begun = None
-        if checkpoints is not None:
-            begun = checkpoints.take_up(trainer, levels, live, bar)
-            checkpoints.follow(trainer)
-        for k in range(0 if begun is None else begun.level, len(levels)):
-            trainer.run(levels[k], k, live, bar, begun)
-            begun = None
+        for k, level in enumerate(levels):
+            trainer.run(level, k, live, bar)
         bar.close()
         patiently(live.make_summary)
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
-        time.perf_counter() - began + (0.0 if checkpoints is None else checkpoints.before),
+        time.perf_counter() - began,
         trainer.iteration,
-        device.name,
-        device.peak_memory(),
+        device_name(device),
+        peak_memory(device),
         params.preset,
         trainer.rays,
         trainer.psnr,

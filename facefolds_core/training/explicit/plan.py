@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,17 +54,16 @@ class Epochs:
     Args:
         frames: K.
         random: draws the orders.
-        left: of the order at hand, the next one last.
     """
 
-    def __init__(self, frames: int, random: np.random.Generator, left: Sequence[int] = ()) -> None:
+    def __init__(self, frames: int, random: np.random.Generator) -> None:
         self._frames, self._random = frames, random
-        self.left = list(left)
+        self._left: list[int] = []
 
     def next(self) -> int:
-        if not self.left:
-            self.left = self._random.permutation(self._frames).tolist()
-        return self.left.pop()
+        if not self._left:
+            self._left = self._random.permutation(self._frames).tolist()
+        return self._left.pop()
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Level]:

@@ -1,4 +1,4 @@
-"""Shading of stored crossings, forwards and backwards, compiled for CPUs; GPUs: `*_gpu.py`. Reference: `reference.py`.
+"""Shading of stored crossings, forwards and backwards, compiled. Reference: `reference.py`.
 
 For how threads share the work see `facefolds_core.kernels.scatter`."""
 

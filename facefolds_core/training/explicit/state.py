@@ -1,11 +1,11 @@
-"""Texture grids while they are trained: values and Adam's moments. Steps are compiled for CPUs.
-
-On a GPU: `state_gpu.py`."""
+"""Texture grids while they are trained: values and Adam's moments. Steps are compiled for CPUs; `state_torch.py` runs
+them elsewhere."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import torch
@@ -259,13 +259,13 @@ class TextureState:
         return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0]]
 
 
-def state_type(gpu: bool) -> type[TextureState]:
-    """The class whose steps run there."""
-    if not gpu:
+def state_on(device: torch.device) -> Callable[..., TextureState]:
+    """What makes a state whose steps run there; its arguments are those of `TextureState`."""
+    if device.type == "cpu":
         return TextureState
-    from facefolds_core.training.explicit.state_gpu import GpuTextureState
+    from facefolds_core.training.explicit.state_torch import TorchTextureState
 
-    return GpuTextureState
+    return partial(TorchTextureState, device)
 
 
 def _logits(opacity: NDArray[np.float32]) -> Tensor:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Images
 
 KEPT_BYTES = 2 << 30
@@ -48,16 +49,24 @@ class CutOuts:
         scene: with mattes of all training pictures.
         gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
         kept_bytes: of cut-outs that are kept in memory; the last frame's always are.
+        teacher: of virtual cameras, which come after the training cameras.
     """
 
-    def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None, kept_bytes: int = KEPT_BYTES) -> None:
-        self._kept_bytes = kept_bytes
+    def __init__(
+        self,
+        scene: Scene,
+        gains: NDArray[np.float64] | None = None,
+        kept_bytes: int = KEPT_BYTES,
+        teacher: Teacher | None = None,
+    ) -> None:
+        self._kept_bytes, self._teacher = kept_bytes, teacher
         self._photos = Images(scene, gains)
         mattes = scene.open_mattes()
         assert mattes is not None
         self._mattes: FrameStore = mattes
         self._kept: OrderedDict[int, NDArray[np.uint8]] = OrderedDict()
-        self.behind = np.full((len(self._photos.cameras), 3), 0.5, np.float32)
+        virtual = 0 if teacher is None else len(teacher.virtual.cameras)
+        self.behind = np.full((len(self._photos.cameras) + virtual, 3), 0.5, np.float32)
 
     def shuffle(self, random: np.random.Generator) -> None:
         self.behind = random.random(self.behind.shape, np.float32)
@@ -66,6 +75,9 @@ class CutOuts:
         found = self._kept.pop(index, None)
         if found is None:
             found = self._cut(index)
+            if self._teacher is not None:
+                first = found if index == self._teacher.first else self._cut(self._teacher.first)
+                found = np.concatenate([found, self._teacher.cut(index, found, first)])
         self._kept[index] = found
         while len(self._kept) > 1 and len(self._kept) * found.nbytes > self._kept_bytes:
             self._kept.popitem(last=False)

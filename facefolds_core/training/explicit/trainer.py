@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import shells, texel_uv
-from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
@@ -28,8 +26,9 @@ from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
 from facefolds_core.training.explicit.rates import falling, rates_of
-from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_type
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
 
@@ -41,17 +40,17 @@ class Trainer:
     """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings.
 
     Attributes:
-        logged: lines of the log: iteration, PSNR, rows of texels.
         usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
-        keep: called after each step; for checkpoints.
     """
 
     divergence = DivergenceParams()
 
-    def __init__(self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: Device) -> None:
+    def __init__(
+        self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: torch.device, teacher: Teacher
+    ) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
-        self.pictures = CutOuts(self.scene, cameras.gains)
+        self.pictures, self.virtual = CutOuts(self.scene, cameras.gains, teacher=teacher), teacher.virtual
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -62,26 +61,20 @@ class Trainer:
         self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
-        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses)
-        self.logged: list[tuple[int, float, int]] = []
+        real = len(self.scene.indices("train"))
+        self.gloss = GlossFit(fit.chart, fit.window, params.reflection, cameras.scene.poses, photographed=real)
         self.usual = np.zeros((0, 3), np.float32)
-        self.keep: Callable[[Trainer, Attempt], None] | None = None
 
     def manifolds(self) -> RadialManifolds:
         halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
-    def run(self, level: Level, number: int, live: Live, bar: tqdm, begun: Attempt | None = None) -> None:
-        """One level, again from its start at a lower learning rate if it diverges.
-
-        Args:
-            begun: how far it has come, if a checkpoint was taken up.
-        """
-        if begun is None:
-            self._prepare(level)
+    def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+        """One level, again from its start at a lower learning rate if it diverges."""
+        self._prepare(level)
         assert self.state is not None and self.views is not None
         lit = self.gloss.maps, self.state.shine
-        at = begun or Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
+        at = Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
         while at.tries < self.divergence.attempts:
             if self._attempt(level, at, live, bar):
                 self._judge_reflection(number, bar)
@@ -128,25 +121,16 @@ class Trainer:
         if new_rays:
             self.gloss.follow(self.state, self.views, self.pictures, self.middle)
 
-    def take_up(self, level: Level) -> TextureState:
-        """Rays and empty grids of a level that a checkpoint was written in, `middle` being its own."""
-        self._trace(level)
-        self.state = self._new_state(level.texels)
-        self._begin_with_subject(False, False)
-        assert self.views is not None
-        self.gloss.follow(self.state, self.views, self.pictures, self.middle)
-        return self.state
-
     def _trace(self, level: Level) -> None:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.device.gpu)
+        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.virtual)
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
         shape = (self.params.layers, self.scene.num_frames)
-        return state_type(self.device.gpu)(texels, *shape, start, self.params)
+        return state_on(self.device)(texels, *shape, start, self.params)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
         """Let the layers believe in the opacity of the subject's Gaussians, and begin with it; with their colours."""
@@ -207,17 +191,11 @@ class Trainer:
             self.rays += len(rays)
             self.psnr = -10 * float(np.log10(max(at.recent, 1e-12)))
             if i % 10 == 9:
-                self._log(live, self.iteration, self.psnr, level.texels[0])
+                log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
             at.step = i + 1
-            if self.keep is not None:
-                self.keep(self, at)
         return True
-
-    def _log(self, live: Live, iteration: int, psnr: float, rows: int) -> None:
-        self.logged.append((iteration, psnr, rows))
-        log_metrics(live, iteration, {"psnr": psnr, "texel_rows": rows})
 
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""

@@ -17,6 +17,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import texture_positions
 from facefolds_core.params import MovingParams
 from facefolds_core.spacing import spread
+from facefolds_core.training.explicit.teacher import Virtual
 
 Array = NDArray[np.float64]
 
@@ -95,31 +96,30 @@ FRAMES = 12
 
 
 class Tracer:
-    """Crosses pixels of training cameras with the layers.
+    """Crosses pixels of training cameras with the layers."""
 
-    Args:
-        gpu: whether on a GPU.
-    """
-
-    def __init__(self, scene: Scene, manifolds: RadialManifolds, gpu: bool = False) -> None:
-        self._scene, self._mattes = scene, scene.open_mattes()
+    def __init__(self, scene: Scene, manifolds: RadialManifolds, virtual: Virtual | None = None) -> None:
+        self._scene, self._mattes, self._virtual = scene, scene.open_mattes(), virtual
+        self._real = scene.indices("train")
+        self.count = len(self._real) + (0 if virtual is None else len(virtual.cameras))
         self._centre = manifolds.centre.cpu().numpy().astype(np.float64)
-        self._window, self._trace = np.array(manifolds.window), manifolds.tracer(gpu)
+        self._window, self._trace = np.array(manifolds.window), manifolds.tracer()
         self._belt = manifolds.chart.numbers
 
-    def views(self, position: int, index: int, pixels: NDArray[np.int64], frames: Sequence[int], fine: bool) -> Views:
-        """Those of the pixels (R,) whose rays meet a layer.
+    def views(self, position: int, first: int, stride: int, frames: Sequence[int], fine: bool) -> Views:
+        """Every `stride`-th pixel from number `first` on, if its rays meet a layer; of virtual cameras fewer.
 
         Args:
-            position: of the camera among the training cameras.
-            index: of the camera in the scene.
+            position: of the camera among the training cameras, then the virtual ones.
             frames: in which outlines count; the camera stands as in the first.
             fine: whether pixels at outlines have finer rays.
         """
-        camera = self._scene.camera_in_head(index, frames[0])
+        camera = self._camera(position, frames[0])
+        stride *= 1 if self._virtual is None or position < len(self._real) else self._virtual.apart
+        pixels = np.arange(first, camera.height * camera.width, stride)
         centres = np.stack([pixels % camera.width, pixels // camera.width], -1) + 0.5
         codes, directions = self._codes(camera, centres)
-        around = np.flatnonzero(self._outline(index, frames).ravel()[pixels]) if fine else np.zeros(0, np.int64)
+        around = np.flatnonzero(self._outline(position, frames).ravel()[pixels]) if fine else np.zeros(0, np.int64)
         finer = np.stack([self._codes(camera, centres[around] + offset)[0] for offset in FINER], 1)
         hit = np.asarray((codes[..., 0] > 0).any(1))
         hit[around] |= np.asarray((finer[..., 0] > 0).any((1, 2)))
@@ -136,28 +136,38 @@ class Tracer:
         distance = self._trace(offsets, directions)
         return texture_positions(offsets, directions, distance, self._window, self._belt), directions
 
-    def _outline(self, index: int, frames: Sequence[int]) -> NDArray[np.bool_]:
+    def _camera(self, position: int, frame: int) -> Camera:
+        if position < len(self._real):
+            return self._scene.camera_in_head(self._real[position], frame)
+        assert self._virtual is not None
+        return self._virtual.cameras[position - len(self._real)]
+
+    def _outline(self, position: int, frames: Sequence[int]) -> NDArray[np.bool_]:
         """(H, W) pixels around which a matte of one of the frames is not the same."""
         found, near = np.zeros((self._scene.height, self._scene.width), bool), np.ones((3, 3), np.uint8)
-        for frame in frames:
-            if self._mattes is not None and (index, frame) in self._mattes:
-                matte = self._mattes.image(index, frame)[..., 0]
-                found |= cv2.dilate(matte, near).astype(int) - cv2.erode(matte, near) > SOFT
+        for matte in self._known_mattes(position, frames):
+            found |= cv2.dilate(matte, near).astype(int) - cv2.erode(matte, near) > SOFT
         return found
 
+    def _known_mattes(self, position: int, frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
+        if position >= len(self._real):
+            assert self._virtual is not None
+            yield self._virtual.mattes[position - len(self._real)]
+        elif self._mattes is not None:
+            keys = [(self._real[position], frame) for frame in frames]
+            yield from (self._mattes.image(*key)[..., 0] for key in keys if key in self._mattes)
 
-def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, gpu: bool = False) -> Views:
-    """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers.
+
+def trace_views(scene: Scene, manifolds: RadialManifolds, stride: int, virtual: Virtual | None = None) -> Views:
+    """Cross every `stride`-th pixel of each training camera (a different set in each) with the layers, and fewer of the
+    virtual cameras.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
-    tracer, found = Tracer(scene, manifolds, gpu), []
-    frames = spread(range(scene.num_frames), FRAMES)
-    for position, index in enumerate(scene.indices("train")):
-        pixels = np.arange(first_pixel(position, stride), scene.height * scene.width, stride)
-        found.append(tracer.views(position, index, pixels, frames, stride == 1))
-    views = Views.together(found)
+    tracer, frames = Tracer(scene, manifolds, virtual), spread(range(scene.num_frames), FRAMES)
+    cameras = range(tracer.count)
+    views = Views.together([tracer.views(k, first_pixel(k, stride), stride, frames, stride == 1) for k in cameras])
     if len(views.pixel) == 0:
         raise _nothing_seen(scene)
     return views
@@ -257,7 +267,6 @@ class MovingRays:
         share: rays of a share: as many as a step at the finest resolution of these layers takes.
         params: how much is kept.
         first: number of the first share of frame 0.
-        gpu: whether they are traced on a GPU.
         sampling: how many shares a frame has in use.
     """
 
@@ -269,12 +278,11 @@ class MovingRays:
         share: float,
         params: MovingParams,
         first: int = 0,
-        gpu: bool = False,
         sampling: Sampling = SAMPLING,
+        virtual: Virtual | None = None,
     ) -> None:
-        self._first = first
-        self._scene, self._cameras, self._stride = scene, scene.indices("train"), stride
-        self._tracer = Tracer(scene, manifolds, gpu)
+        self._first, self._stride = first, stride
+        self._tracer = Tracer(scene, manifolds, virtual)
         self._kept: dict[tuple[int, int], Views] = {}
         self._room = params.cache_megabytes << 20
         frames = spread(range(scene.num_frames), sampling.frames)
@@ -306,12 +314,10 @@ class MovingRays:
 
     def _traced(self, frame: int, phase: int, parts: int) -> Views:
         """Every `parts`-th of the pixels that there are, from number `phase` on."""
-        size, stride = self._scene.height * self._scene.width, self._stride
-        chosen = [
-            np.arange(first_pixel(c, stride) + stride * phase, size, stride * parts) for c in range(len(self._cameras))
-        ]
-        cameras = enumerate(zip(self._cameras, chosen, strict=True))
-        return Views.together([self._tracer.views(k, index, own, [frame], stride == 1) for k, (index, own) in cameras])
+        stride, tracer = self._stride, self._tracer
+        firsts = [first_pixel(k, stride) + stride * phase for k in range(tracer.count)]
+        found = [tracer.views(k, own, stride * parts, [frame], stride == 1) for k, own in enumerate(firsts)]
+        return Views.together(found)
 
 
 def first_pixel(camera: int, stride: int) -> int:
@@ -320,16 +326,22 @@ def first_pixel(camera: int, stride: int) -> int:
 
 
 def rays_of(
-    scene: Scene, manifolds: RadialManifolds, stride: int, share: float, params: MovingParams, gpu: bool = False
+    scene: Scene,
+    manifolds: RadialManifolds,
+    stride: int,
+    share: float,
+    params: MovingParams,
+    virtual: Virtual | None = None,
 ) -> Rays:
-    """The rays of a scene's training cameras, traced on a GPU if asked for; for `share` see `MovingRays`.
+    """The rays of a scene's training cameras, and of virtual ones; for `share` see
+    `MovingRays`.
 
     Raises:
         UserError: if no ray of any camera crosses a layer.
     """
     if scene.poses is None:
-        return StillRays(trace_views(scene, manifolds, stride, gpu))
-    return MovingRays(scene, manifolds, stride, share, params, gpu=gpu)
+        return StillRays(trace_views(scene, manifolds, stride, virtual))
+    return MovingRays(scene, manifolds, stride, share, params, virtual=virtual)
 
 
 class Images:

@@ -27,14 +27,11 @@ from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.explicit.reflection_maps import Maps
-from facefolds_core.training.patience import is_full, patiently
+from facefolds_core.training.patience import patiently
 from facefolds_core.training.trained import Trained
 
 LOG = "log"
 """Folder in a base's: dvclive's files of its training."""
-
-BEGUN = "begun-"
-"""Before a base's name: its checkpoint while it is trained."""
 
 _REMEDY = "delete the folder: the base is then trained again"
 
@@ -133,22 +130,9 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
 
 
 def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
-    """Train the key frames at once, from the last checkpoint of a training that was killed, and write the base's
-    folder, whole or not at all; the checkpoint stays (`forget_begun`).
-    """
-    kept = folder.parent / f"{BEGUN}{folder.name}"
-    forget_begun(kept.parent, kept.name)
-    trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder, kept)
-
-    def write() -> None:
-        try:
-            _write_base(trained, found, folder, log)
-        except OSError as error:
-            if is_full(error):  # its own room may be what is lacking
-                shutil.rmtree(kept, ignore_errors=True)
-            raise
-
-    patiently(write)
+    """Train the key frames at once, and write the base's folder, whole or not at all."""
+    trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder)
+    patiently(lambda: _write_base(trained, found, folder, log))
 
 
 def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) -> None:
@@ -165,13 +149,6 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
         about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
         write_tensors(temporary / "surroundings.safetensors", tensors, about)
         shutil.copytree(log, temporary / LOG)
-
-
-def forget_begun(folder: Path, but: str = "") -> None:
-    """Delete the checkpoints of a take's bases in a folder, but for the one of this name."""
-    for other in folder.glob(f"{BEGUN}*"):
-        if other.name != but:
-            shutil.rmtree(other, ignore_errors=True)
 
 
 def read_base(folder: Path, fingerprint: str) -> Base:

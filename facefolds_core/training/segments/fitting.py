@@ -3,15 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from facefolds_core.captures.scene import Scene
+from facefolds_core.model.device import device_of
+from facefolds_core.params import ExplicitParams
+from facefolds_core.training.explicit.views import Views
+from facefolds_core.training.segments.base import read_base, with_its_cameras
 from facefolds_core.training.segments.cache import SegmentCache
 from facefolds_core.training.segments.frames import FrameFitter
 from facefolds_core.training.segments.plan import Segment
 
 
-def fit_segment(segment: Segment, fitter: FrameFitter, cache: SegmentCache, tell: Callable[[], None]) -> int:
+@dataclass(frozen=True)
+class Fitting:
+    """By what segments are fitted.
+
+    Attributes:
+        scene: as it was given to the training.
+        params: of the training.
+        base: its folder.
+        fingerprint: of the base.
+        folder: of the segments.
+    """
+
+    scene: Scene
+    params: ExplicitParams
+    base: Path
+    fingerprint: str
+    folder: Path
+
+    def fitter(self, views: Views | None = None, shine: NDArray[np.float32] | None = None) -> FrameFitter:
+        """Args: of a still head, if they are known, `views`: crossings of its rays, `shine`: see `FrameFitter`."""
+        base, device = read_base(self.base, self.fingerprint), device_of(self.params)
+        return FrameFitter(with_its_cameras(self.scene, base), base, self.params, device, views, shine)
+
+    def cache(self) -> SegmentCache:
+        return SegmentCache(self.folder)
+
+
+def fit_segment(
+    segment: Segment, fitter: FrameFitter, cache: SegmentCache, tell: Callable[[], object] = lambda: None
+) -> int:
     """Fit its frames but for those that are in the cache, and write its file.
 
     Args:

@@ -17,10 +17,9 @@ from facefolds_core.captures.part import part_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
-from facefolds_core.training.device import Device
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
 from facefolds_core.training.explicit.rates import falling, rates_of
-from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, state_type
+from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, state_on
 from facefolds_core.training.explicit.targets import CutOuts, OneFrame, Pictures
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
@@ -57,21 +56,21 @@ class FrameFitter:
         scene: Scene,
         base: Base,
         params: ExplicitParams,
-        device: Device,
+        device: torch.device,
         views: Views | None = None,
         shine: NDArray[np.float32] | None = None,
     ) -> None:
-        self.scene, self.base, self.params, self.gpu = scene, base, params, device.gpu
+        self.scene, self.base, self.params = scene, base, params
         self.pictures = CutOuts(scene, base.surroundings.gains, kept_bytes=0)
         h, w = base.spec.texels
         shape = (base.spec.num_layers, 1)
-        self.state = state_type(self.gpu)((h, w), *shape, torch.zeros(2, 2, 4), self.params)
+        self.state = state_on(device)((h, w), *shape, torch.zeros(2, 2, 4), self.params)
         with torch.no_grad():
             self.state.colour[0].copy_(base.textures.colour.view(h * w, 3))
             self.state.layers[0].copy_(base.textures.layers.view(h * w, -1, 4))
         self.still, self.maps = None, base.lit(params.reflection)
         if scene.poses is None:
-            views = views or trace_views(scene, base.manifolds, 1, self.gpu)
+            views = views or trace_views(scene, base.manifolds, 1)
             self.still = StillRays(views)
             self.state.shine = shine_of(base, params, views) if shine is None else shine
 
@@ -140,7 +139,7 @@ class FrameFitter:
         share = self.params.textures.rays_per_texel * h * w
         alone = part_of(self.scene, [frame])
         first = int(random.integers(1 << 30))
-        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first, self.gpu)
+        return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first)
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
         rates = rates_of(self.base.surroundings.rate * falling(progress))

@@ -19,6 +19,7 @@ from tqdm import tqdm
 from facefolds_core.captures.scene import Scene
 from facefolds_core.facts import fact
 from facefolds_core.files.writing import read_json
+from facefolds_core.model.device import device_of
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.segmented import SegmentedTextures
 from facefolds_core.model.storage import ExplicitSpec
@@ -26,19 +27,17 @@ from facefolds_core.params import ExplicitParams, SubjectParams
 from facefolds_core.progress import progress
 from facefolds_core.subject.find import found_in
 from facefolds_core.training.checkpoints import fingerprint
-from facefolds_core.training.device import choose
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.patience import patiently
-from facefolds_core.training.report import TrainingReport, make_report
-from facefolds_core.training.segments.base import LOG, Base, forget_begun, read_base, train_base
+from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
+from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
-from facefolds_core.training.segments.fitting import fit_segment
+from facefolds_core.training.segments.fitting import Fitting, fit_segment
 from facefolds_core.training.segments.forecast import Forecast, check_forecast, forecast, process_bytes, processes_for
-from facefolds_core.training.segments.handed import Fitting
 from facefolds_core.training.segments.plan import Segment, TakePlan, plan_take
-from facefolds_core.training.segments.workers import Used, Workers
+from facefolds_core.training.segments.workers import Used, fit_in_processes
 from facefolds_core.training.trained import Trained
 
 _REMEDY = "run the same command again: finished segments are kept"
@@ -78,7 +77,7 @@ class _Take:
     def __init__(self, scene: Scene, params: ExplicitParams, folder: Path, log: Path, told: Forecast) -> None:
         check_images(scene)
         self.scene, self.params, self.folder, self.log = scene, params, folder, log
-        self.device = choose(params.device)
+        self.device = device_of(params)
         self.began = time.perf_counter()
         self.plan = plan_take(scene, params, told.key_frames or 1)
         self.used = Used()
@@ -116,13 +115,18 @@ class _Take:
                 cache.read(cache.path(segment.names))
                 bar.set_postfix(segments=f"{log.there()} of {total}", refresh=False)
 
-            if processes > 1 and not self.device.gpu:
+            if processes > 1 and self.device.type == "cpu":
                 threads = max(1, numba.get_num_threads() // processes)
                 memory = processes * process_bytes(self.scene, self.params, h * w) / 1e9
                 tqdm.write(
                     f"train: {processes} processes fit segments, threads of each: {threads}; {memory:.1f} GB at most"
                 )
-                self.used = Workers(fitting, base, processes, threads, bar.update, done).fit(left)
+
+                def told(segment: Segment) -> None:
+                    bar.update(len(segment.frames))
+                    done(segment)
+
+                self.used = fit_in_processes(fitting, base, left, processes, threads, told)
             elif left:
                 fitter = fitting.fitter()
                 for segment in left:
@@ -147,13 +151,13 @@ class _Take:
             time.perf_counter() - self.began,
             int(read_json(base.folder / "training.json", _REMEDY)["iterations"])
             + self.params.segments.steps * self.scene.num_frames,
-            self.device.name,
-            self.device.peak_memory() + self.used.memory,
+            device_name(self.device),
+            peak_memory(self.device) + sum(self.used.memory.values()),
             self.params.preset,
             self.used.rays,
             psnr,
         )
-        report = replace(report, processor_seconds=round(report.processor_seconds + self.used.seconds, 2))
+        report = replace(report, processor_seconds=round(report.processor_seconds + sum(self.used.seconds.values()), 2))
         drawn = base.folder / "fit.png"
         picture = drawn.read_bytes() if drawn.exists() else None
         return Trained(
@@ -199,7 +203,6 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
                 "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
             )
         train_base(scene, list(plan.keys), params, place, log)
-    forget_begun(folder)  # here: a kill may have come after the base was written
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)

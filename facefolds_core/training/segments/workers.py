@@ -1,193 +1,167 @@
-"""Segments shared out among processes of this machine: each is handed one at a time; a lost one's is run again."""
+"""Segments shared out among processes of this machine (loky); those that a lost process had are fitted again."""
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-from collections import Counter, deque
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection, wait
+import resource
+import shutil
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
+import numpy as np
+from loky import ProcessPoolExecutor
+from loky.process_executor import BrokenProcessPool
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from facefolds_core.errors import UserError
-from facefolds_core.system.processes import with_threads
-from facefolds_core.training.segments.base import Base
-from facefolds_core.training.segments.handed import Fitting, handed
-from facefolds_core.training.segments.messages import Failed, FrameDone, SegmentDone
+from facefolds_core.system.processes import end_with_parent, with_threads
+from facefolds_core.training.explicit.views import Views, trace_views
+from facefolds_core.training.segments.base import Base, with_its_cameras
+from facefolds_core.training.segments.cache import SegmentCache
+from facefolds_core.training.segments.fitting import Fitting, fit_segment
+from facefolds_core.training.segments.frames import FrameFitter, shine_of
 from facefolds_core.training.segments.plan import Segment
 
-ROOT = Path(__file__).parents[3]
-"""Where this package is imported from."""
+RAYS = "rays-"
+"""Before the name of a folder, beside the segments, with what all processes map into memory."""
 
-GRACE = 5.0
-"""Seconds that a process is waited for after it was asked to end."""
+SHINE = "shine"
 
 
 @dataclass
 class Used:
-    """What workers used.
+    """What a training in processes used.
 
     Attributes:
         rays: shaded.
-        memory: bytes resident in all workers, each one's most.
-        seconds: of processor.
+        memory: process -> bytes resident in it at most.
+        seconds: process -> of processor.
     """
 
     rays: int = 0
-    memory: int = 0
-    seconds: float = 0.0
+    memory: dict[int, int] = field(default_factory=dict)
+    seconds: dict[int, float] = field(default_factory=dict)
 
 
-@dataclass
-class _Worker:
-    """Attributes:
-    segment: that it works on; None if it has nothing to do.
-    frames: of it that are done.
-    last: what it said of the segment before.
-    """
-
-    process: subprocess.Popen[bytes]
-    connection: Connection
-    segment: Segment | None = None
-    frames: int = 0
-    last: SegmentDone | None = None
-
-
-class Workers:
-    """Processes that fit segments.
+def fit_in_processes(
+    fitting: Fitting,
+    base: Base,
+    segments: Sequence[Segment],
+    count: int,
+    threads: int,
+    tell: Callable[[Segment], object],
+) -> Used:
+    """Fit segments in `count` processes. Where one is lost there are fewer: the memory may have been too small.
 
     Args:
-        fitting: by what.
-        base: of the take.
-        count: of processes.
-        threads: of each.
-        tell_frames: hears how many more frames are done: fewer, where a worker is lost.
-        tell_segment: hears of each segment that is done.
+        threads: of each process.
+        tell: hears of each segment that is done.
+
+    Raises:
+        UserError: if a frame diverges, or a process is lost again before another segment is done.
     """
-
-    def __init__(
-        self,
-        fitting: Fitting,
-        base: Base,
-        count: int,
-        threads: int,
-        tell_frames: Callable[[int], object],
-        tell_segment: Callable[[Segment], object],
-    ) -> None:
-        self.fitting, self.base, self.count, self.threads = fitting, base, count, threads
-        self.tell_frames, self.tell_segment = tell_frames, tell_segment
-        self.workers: list[_Worker] = []
-        self.lost: Counter[int] = Counter()
-        self.used = Used()
-
-    def fit(self, segments: Sequence[Segment]) -> Used:
-        """Fit them all.
-
-        Raises:
-            UserError: if a frame diverges, or two workers are lost on one segment.
-        """
-        waiting = deque(segments)
-        with handed(self.fitting, self.base) as handles:
+    left, used, lost = list(segments), Used(), False
+    with _handed(fitting, base) as rays:
+        while left:
             try:
-                while waiting or any(worker.segment for worker in self.workers):
-                    while waiting and len(self.workers) < self.count:
-                        self.workers.append(self._begin(handles))
-                        self._hand_out(self.workers[-1], waiting)
-                    for connection in wait([worker.connection for worker in self.workers]):
-                        worker = next(one for one in self.workers if one.connection is connection)
-                        self._hear(worker, waiting)
-            finally:
-                self._end_all()
-        return self.used
+                for segment in _fitted(fitting, rays, left, count, threads, used):
+                    left.remove(segment)
+                    tell(segment)
+                    lost = False
+            except BrokenProcessPool as error:
+                if lost:
+                    raise _lost(left, error) from None
+                lost, count = True, max(1, count - 1)
+                tqdm.write(f"train: a process was lost, {len(left)} segments are left; {count} at once from here on")
+    return used
 
-    def _begin(self, handles: Sequence[int]) -> _Worker:
-        """A process by a command of its own: multiprocessing's would import the user's script once more."""
-        ours, theirs = Pipe()
-        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-        environment = {**os.environ, **with_threads(self.threads), "PYTHONPATH": path}
-        numbers = [str(theirs.fileno()), str(handles[0])]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "facefolds_core.training.segments.worker", *numbers],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            pass_fds=[theirs.fileno(), *handles],
-        )
-        theirs.close()
-        return _Worker(process, ours)
 
-    def _hand_out(self, worker: _Worker, waiting: deque[Segment]) -> None:
-        worker.segment, worker.frames = (waiting.popleft() if waiting else None), 0
-        with suppress(OSError):  # it has ended, which is seen when it is listened to
-            worker.connection.send(worker.segment)
+def _fitted(
+    fitting: Fitting, rays: Path | None, segments: Sequence[Segment], count: int, threads: int, used: Used
+) -> Iterator[Segment]:
+    """Segments as they are done; whatever ends this ends the processes."""
+    pool = ProcessPoolExecutor(min(count, len(segments)), initializer=_begin, env=with_threads(threads))
+    try:
+        todo = {pool.submit(_fit, fitting, rays, segment): segment for segment in segments}
+        for future in as_completed(todo):
+            number, shaded, memory, seconds = future.result()
+            used.rays += shaded
+            used.memory[number], used.seconds[number] = memory, seconds
+            yield todo[future]
+    finally:
+        pool.shutdown(kill_workers=True)
 
-    def _hear(self, worker: _Worker, waiting: deque[Segment]) -> None:
-        try:
-            said = worker.connection.recv()
-        except (EOFError, OSError):
-            self._bury(worker, waiting)
-            return
-        if isinstance(said, Failed):
-            raise said.error
-        if isinstance(said, FrameDone):
-            worker.frames += 1
-            self.tell_frames(1)
-        elif isinstance(said, SegmentDone):
-            assert worker.segment is not None
-            worker.last = said
-            self.used.rays += said.rays
-            self.tell_segment(worker.segment)
-            self._hand_out(worker, waiting)
 
-    def _bury(self, worker: _Worker, waiting: deque[Segment]) -> None:
-        """A worker has ended: in peace, or its segment is to be run again. There are fewer workers then, since the
-        memory may have been too small for so many; one is always left."""
-        code = worker.process.wait()
-        self.workers.remove(worker)
-        self._count(worker)
-        segment = worker.segment
-        if segment is None:
-            return
-        self.tell_frames(-worker.frames)
-        self.lost[segment.number] += 1
-        how = f"signal {-code}" if code < 0 else f"status {code}"
-        if self.lost[segment.number] > 1:
-            raise UserError(
-                "a worker process was lost, and the one that took its segment, too",
-                place=f"segment {segment.number + 1}",
-                found=f"the last one ended with {how}" + ("; was memory used up?" if code == -9 else ""),
-                remedy="run the same command again, which goes on from here; with `train.segments.processes: 1` "
-                "segments are fitted in the training's own process",
-            )
-        self.count = max(1, self.count - 1)
-        tqdm.write(
-            f"train: worker process {worker.process.pid} was lost ({how}) in segment {segment.number + 1}: that is "
-            f"run again; {self.count} at once from here on"
-        )
-        waiting.appendleft(segment)
+def _begin() -> None:
+    """In each process, first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the parent, too, which ends us
+    end_with_parent()
 
-    def _count(self, worker: _Worker) -> None:
-        worker.connection.close()
-        if worker.last is not None:
-            self.used.memory += worker.last.memory
-            self.used.seconds += worker.last.seconds
-            worker.last = None
 
-    def _end_all(self) -> None:
-        """End what is left, whatever it does."""
-        for worker in self.workers:
-            self._count(worker)
-            if worker.segment is not None:
-                worker.process.terminate()
-        for worker in self.workers:
-            try:
-                worker.process.wait(GRACE)
-            except subprocess.TimeoutExpired:
-                worker.process.kill()
-                worker.process.wait()
-        self.workers.clear()
+def _fit(fitting: Fitting, rays: Path | None, segment: Segment) -> tuple[int, int, int, float]:
+    """In a process: which one it is, rays shaded for the segment; bytes and seconds of the process until now."""
+    shaded = fit_segment(segment, *_means(fitting, rays))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return os.getpid(), shaded, memory, time.process_time()
+
+
+_made: dict[Path, tuple[FrameFitter, SegmentCache]] = {}
+
+
+def _means(fitting: Fitting, rays: Path | None) -> tuple[FrameFitter, SegmentCache]:
+    """What fits a take's segments in this process, made once."""
+    if fitting.base not in _made:
+        _made[fitting.base] = fitting.fitter(*_taken(rays)), fitting.cache()
+    return _made[fitting.base]
+
+
+@contextmanager
+def _handed(fitting: Fitting, base: Base) -> Iterator[Path | None]:
+    """A folder with the crossings of a still head's rays, which all processes map; None of a head that turns."""
+    for old in fitting.folder.glob(f"{RAYS}*"):  # of a training that was killed
+        shutil.rmtree(old, ignore_errors=True)
+    if fitting.scene.poses is not None:
+        yield None
+        return
+    with TemporaryDirectory(prefix=RAYS, dir=fitting.folder) as folder:
+        views = trace_views(with_its_cameras(fitting.scene, base), base.manifolds, 1)
+        np.save(Path(folder) / f"{SHINE}.npy", shine_of(base, fitting.params, views))
+        for name, array in vars(views).items():
+            np.save(Path(folder) / f"{name}.npy", array)
+        del views, array
+        yield Path(folder)
+
+
+def _taken(folder: Path | None) -> tuple[Views | None, NDArray[np.float32] | None]:
+    """In a process: what was handed to it, arrays mapped."""
+    if folder is None:
+        return None, None
+    arrays: dict[str, Any] = {path.stem: _mapped(path) for path in folder.glob("*.npy")}
+    shine = arrays.pop(SHINE)
+    return Views(**arrays), shine
+
+
+def _mapped(path: Path) -> Any:
+    try:
+        # "c": kernels are compiled for arrays that can be written to.
+        return np.load(path, mmap_mode="c").view(np.ndarray)
+    except ValueError:  # an array without elements cannot be mapped
+        return np.load(path)
+
+
+def _lost(left: Sequence[Segment], error: BrokenProcessPool) -> UserError:
+    return UserError(
+        "a worker process was lost, and the one that took its work, too",
+        place=f"one of the segments {', '.join(str(segment.number + 1) for segment in left)}",
+        found=str(error).splitlines()[0],
+        remedy="run the same command again, which goes on from here; with `train.segments.processes: 1` segments are "
+        "fitted in the training's own process",
+    )

@@ -205,8 +205,3 @@ def test_videos_of_other_lengths_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="different lengths") as caught:
         read(tmp_path)
     assert "A001" in str(caught.value)
-
-
-def test_it_is_recognised_by_its_two_files(filmed: Path) -> None:
-    assert easymocap.recognise(filmed) is not None
-    assert easymocap.recognise(filmed / "images") is None

@@ -219,9 +219,3 @@ def test_a_folder_without_calibration(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="file not found") as caught:
         read(tmp_path)
     assert "participant's folder" in str(caught.value.remedy)
-
-
-def test_it_is_recognised(version_2: Path, tmp_path: Path) -> None:
-    found = nersemble.recognise(version_2)
-    assert found is not None and (found.path, found.keys) == (version_2, {})
-    assert nersemble.recognise(tmp_path) is None

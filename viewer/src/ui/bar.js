@@ -34,7 +34,8 @@ export function connectBar(element) {
     record: () => saveTurn(element, root.querySelector('[data-do="record"]')),
     embed: () => element.openEmbed(),
     dismiss: () => dismiss(element),
-    vr: () => toggleVr(element, find('[data-do="vr"]')),
+    vr: () => immerse(element, "vr"),
+    ar: () => immerse(element, "ar"),
   };
   element.actions = actions;
   root.querySelector(".stage").addEventListener("click", (event) => {
@@ -82,7 +83,10 @@ export function connectBar(element) {
   for (const name of ["share", "embed"]) root.querySelector(`[data-do="${name}"]`).hidden = !element.shareable;
   player.addEventListener("ready", () => {
     if (navigator.xr)
-      import("../xr.js").then(async ({ offersVr }) => (find('[data-do="vr"]').hidden = !(await offersVr())));
+      import("../xr.js").then(({ offers }) => {
+        for (const kind of ["vr", "ar"])
+          offers(kind).then((offered) => (find(`[data-do="${kind}"]`).hidden = !offered));
+      });
     compare.hidden = player.manifest.photos.length === 0;
     showFrame();
   });
@@ -90,17 +94,20 @@ export function connectBar(element) {
   showState();
 }
 
-async function toggleVr(element, button) {
+/** Into the headset or the room, or out again. @param {import("../xr.js").Kind} kind */
+async function immerse(element, kind) {
   const { player } = element;
+  const button = element.shadowRoot.querySelector(`[data-do="${kind}"]`);
   if (player.immersed) return player.immersion.end();
   if (!element.ready) return;
   const { Immersion } = await import("../xr.js");
-  player.immersion = new Immersion(player, () => button.setAttribute("aria-pressed", "false"));
+  player.immersion = new Immersion(player, kind, () => button.setAttribute("aria-pressed", "false"));
   try {
     await player.immersion.start();
     button.setAttribute("aria-pressed", "true");
   } catch (error) {
-    element.overlays.say(`The headset cannot be used: ${error.message}`, 8000);
+    const device = kind === "vr" ? "headset" : "camera";
+    element.overlays.say(`The ${device} cannot be used: ${error.message}`, 8000);
   }
 }
 

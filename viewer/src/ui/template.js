@@ -23,6 +23,7 @@ export const ICONS = {
   picture: icon("M9 4h6l1.500 2H20a1.500 1.500 0 0 1 1.500 1.500v10A1.500 1.500 0 0 1 20 19H4a1.500 1.500 0 0 1-1.500-1.500v-10A1.500 1.500 0 0 1 4 6h3.500zm3 4.500a4 4 0 1 0 0 8 4 4 0 0 0 0-8zm0 2a2 2 0 1 1 0 4 2 2 0 0 1 0-4z"),
   record: icon("M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18zm0 2a7 7 0 1 1 0 14 7 7 0 0 1 0-14zm0 3.500a3.500 3.500 0 1 0 0 7 3.500 3.500 0 0 0 0-7z"),
   vr: icon("M4 7h16a2 2 0 0 1 2 2v6a2 2 0 0 1-2 2h-4.200l-2-2.700a2.200 2.200 0 0 0-3.600 0l-2 2.700H4a2 2 0 0 1-2-2V9a2 2 0 0 1 2-2zm3.500 2.500a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z"),
+  ar: icon("M3 3h6v2H5v4H3zm12 0h6v6h-2V5h-4zM3 15h2v4h4v2H3zm16 0h2v6h-6v-2h4zM12 6.200l5 2.900v5.800l-5 2.900-5-2.900V9.100zm0 2.300-2.300 1.300 2.300 1.400 2.300-1.400zm-3 3v2.300l2 1.200v-2.400zm6 0-2 1.100v2.400l2-1.200z"),
   embed: icon("M8.300 6.700 9.700 8.100 5.800 12l3.900 3.900-1.400 1.400L3 12zm7.400 0L21 12l-5.300 5.300-1.400-1.400L18.200 12l-3.900-3.900z"),
   reset: icon("M12 5V1.500L6.500 6 12 10.500V7a5.500 5.500 0 1 1-5.300 7H4.600A7.500 7.500 0 1 0 12 5z"),
 }; // prettier-ignore
@@ -89,7 +90,7 @@ export const TEMPLATE = `<div class="stage">
     <div class="buttons">
       ${button("loop", "Loop", "L", 'aria-pressed="true"')}${button("sound", "Sound", "M", 'aria-pressed="false" hidden')}
       ${button("compare", "Compare with a photo", "C", "hidden")}${button("settings", "Settings", "", 'aria-expanded="false"')}
-      ${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
+      ${button("ar", "Show it in your room", "", "hidden")}${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
     </div>
   </div>
   <div class="message" part="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>

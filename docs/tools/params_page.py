@@ -1,6 +1,6 @@
 """docs/reference/params.md: all keys of params.yaml: types, bounds, defaults, descriptions, from the sections.
 
-python -m facefolds_core.config.params_page    # writes it; a test compares
+python -m docs.tools.params_page    # writes it; a test compares
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ FIRST = {
 HEAD = """\
 # Parameters
 
-All keys of params.yaml, made from facefolds_core/params by `python -m facefolds_core.config.params_page`.
+All keys of params.yaml, made from facefolds_core/params by `python -m docs.tools.params_page`.
 Every section of a stage can be overridden for one subject, key by key ([subjects](../guide/subjects.md)).
 Unknown keys, wrong types and numbers out of bounds are refused.
 Lengths are in units of the scene: cameras are about 1 away from the subject.

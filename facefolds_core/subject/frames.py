@@ -1,0 +1,68 @@
+"""The subject's Gaussians in other frames: those change where the pictures do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.drawing import differentiate, draw
+from facefolds_core.subject.fit import State, Target, improve, target_of
+from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.splats import COLOUR, Splats
+
+Array = NDArray[np.float32]
+
+STEPS = 64
+"""Of a frame, on one picture each."""
+RATE_COLOUR = 0.015
+"""Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
+CHANGED = 0.02
+"""A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
+
+
+def mean_errors(splats: Splats, targets: Sequence[Target]) -> Array:
+    """(N,) mean of |C - I| + |opacity's error| over the pixels that show a Gaussian, weighted as they show it; 0 of
+    those that none shows."""
+    sums, weights = np.zeros(len(splats)), np.zeros(len(splats))
+    for target in targets:
+        drawing = draw(splats.values, target.view)
+        assert target.opacity is not None
+        error = np.abs(drawing.rgb - target.picture).mean(0) + np.abs(1 - drawing.light - target.opacity)
+        wish = np.stack([error, np.ones_like(error), np.zeros_like(error)])
+        gradient, _ = differentiate(splats.values, drawing, wish, np.zeros_like(error))
+        sums += gradient[:, COLOUR][:, 0]
+        weights += gradient[:, COLOUR][:, 1]
+    return np.where(weights > 0, sums / np.maximum(weights, 1e-6), 0).astype(np.float32)
+
+
+def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[Target]:
+    """Of cut-outs (C, H W, 4), RGBA with colours times opacity."""
+    found = []
+    for camera, flat in zip(cameras, cut, strict=True):
+        picture = flat.reshape(camera.height, camera.width, 4).astype(np.float32) / np.float32(255)
+        found.append(target_of(camera, picture[..., :3], picture[..., 3], 1.0))
+    return found
+
+
+def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:
+    """The Gaussians as one frame's pictures show them; those that the pictures do not contradict stay as they are.
+
+    Args:
+        splats: of the frame of the start.
+        usual: (N,) their `mean_errors` there.
+        targets: cut-outs of this frame.
+    """
+    chosen = mean_errors(splats, targets) - usual > CHANGED
+    if not chosen.any():
+        return splats
+    params = replace(GaussianParams(), rate_colour=RATE_COLOUR)
+    random, state = np.random.default_rng(seed), State.of(splats.values.copy())
+    order = np.concatenate([random.permutation(len(targets)) for _ in range(-(-STEPS // len(targets)))])
+    for step, which in enumerate(order[:STEPS]):
+        behind = random.random(3, np.float32)
+        improve(state, targets[which], behind, params, step / STEPS, step, random, chosen)
+    return Splats(state.values, splats.background)

@@ -1,0 +1,89 @@
+"""Views that nobody filmed: the subject's Gaussians, seen from between the cameras and beside them.
+
+Few photos do not say what layers look like from between them: each camera can be shown a picture of its own. Gaussians
+have no such freedom, and what they show from there is nearer to the truth (docs/research/few-cameras.md). So their
+pictures are targets beside the photos, in each frame.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facefolds_core.captures.scene import Scene
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.subject.drawing import draw, view_of
+from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.frames import changed_to, mean_errors, targets_of
+from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.virtual import virtual_cameras
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Virtual:
+    """Cameras that nobody filmed with.
+
+    Attributes:
+        cameras: V of them, in the head's own frame.
+        mattes: (V, H, W) of the subject in the frame of the start.
+        apart: one of so many of their pixels is looked at, so that they count no more than the photos.
+    """
+
+    cameras: tuple[Camera, ...]
+    mattes: Image
+    apart: int
+
+
+class Teacher:
+    """Pictures of the virtual cameras in any frame.
+
+    Args:
+        scene: with training cameras.
+        splats: its subject, in the frame of the start.
+        seed: of the draws of the other frames' Gaussians.
+    """
+
+    def __init__(self, scene: Scene, splats: Splats, seed: int) -> None:
+        self._scene, self._splats, self._seed = scene, splats, seed
+        self._first, self._usual = reference_frame(scene), np.zeros(0, np.float32)
+        real = self._real(self._first)
+        cameras = virtual_cameras(real, splats, (scene.width, scene.height))
+        self._views = [view_of(camera) for camera in cameras]
+        mattes = self._drawn(splats)[..., 3].reshape(len(cameras), scene.height, scene.width)
+        self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))
+
+    def cut(self, frame: int, photos: Image, first: Image) -> Image:
+        """(V, H W, 4) RGBA of a frame, colours times opacity.
+
+        Args:
+            photos: (C, H W, 4) cut-outs of the training cameras in it.
+            first: the same in the frame of the start.
+        """
+        splats = self._splats
+        if frame != self._first and len(self._views):
+            if not len(self._usual):
+                self._usual = mean_errors(splats, targets_of(self._real(self._first), first))
+            targets = targets_of(self._real(frame), photos)
+            splats = changed_to(splats, self._usual, targets, self._seed + frame)
+        return self._drawn(splats)
+
+    @property
+    def first(self) -> int:
+        """The frame of the start."""
+        return self._first
+
+    def _real(self, frame: int) -> list[Camera]:
+        return [self._scene.camera_in_head(i, frame) for i in self._scene.indices("train")]
+
+    def _drawn(self, splats: Splats) -> Image:
+        found = np.zeros((len(self._views), self._scene.height * self._scene.width, 4), np.uint8)
+        for view, own in zip(self._views, found, strict=True):
+            rgb, light = draw(splats.values, view).picture()
+            rgba = np.concatenate([rgb, 1 - light[..., None]], -1)
+            own[:] = np.rint(255 * rgba.clip(0, 1)).reshape(-1, 4)
+        return found
