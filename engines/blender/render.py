@@ -23,7 +23,8 @@ import bpy
 from mathutils import Matrix, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))  # Blender runs the script without its folder
-from reflection import Gloss, read_gloss, reflected
+from layered_volumetric_video import blend_as_stored
+from reflection import read_gloss, reflected
 
 ASSET_TO_BLENDER = Matrix(((0, 1, 0), (-1, 0, 0), (0, 0, 1)))
 """Of the asset's points (x forward, y to the subject's left, z up), after the GLB's root node and the importer."""
@@ -35,28 +36,36 @@ CROSSINGS = 8
 """Of one layer by one ray at most, for the number of transparent bounces."""
 
 
-def prepare(file: Path, background: tuple[float, float, float], samples: int, asset: Path | None = None) -> None:
+def prepare(
+    file: Path, background: tuple[float, float, float], samples: int, asset: Path | None = None, frame: int = 0
+) -> None:
     """An empty scene with the asset's layers as they are to be blended.
 
     Args:
-        file: what `facefolds export glb` or `usd` wrote; of USD, the first frame is shown.
+        file: what `facefolds export gltf`, `glb` or `usd` wrote; of USD, the first frame is shown.
         background: stored (sRGB) values in [0, 1]; behind the layers.
         samples: x samples a pixel; with 1, a pixel is what the ray through its centre sees.
         asset: the folder of the asset that a GLB was made of, for its reflection; None leaves it out.
+        frame: of a GLB with a video.
     """
+    import addon_utils  # is there once bpy is
+
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    addon_utils.enable("layered_volumetric_video", default_set=True)
     if file.suffix.startswith(".usd"):
         bpy.ops.wm.usd_import(filepath=str(file.resolve()))
     else:
         bpy.ops.import_scene.gltf(filepath=str(file))
     meshes = [thing for thing in bpy.data.objects if thing.type == "MESH"]
     gloss = None if asset is None else read_gloss(asset)
+    shine = None if gloss is None else lambda tree, colour: reflected(tree, colour, gloss)
     for mesh in meshes:
         drop_core(mesh.data)
-        for slot in mesh.material_slots:
-            blend_as_stored(slot.material, gloss)
+        for slot in () if "video" in mesh else mesh.material_slots:
+            blend_as_stored(slot.material, sorted(images_of(slot.material.node_tree)), shine)
     layers = sum(mesh.get("layers", 1) for mesh in meshes)  # a GLB has them in one mesh
     scene = bpy.context.scene
+    scene.frame_set(frame)
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
     scene.cycles.samples = samples * samples
@@ -91,40 +100,6 @@ def drop_core(mesh: Any) -> None:
     parts.free()
 
 
-def blend_as_stored(material: Any, gloss: Gloss | None) -> None:
-    """Unlit: emission of the texture's stored colour, mixed with transparency by its alpha.
-
-    Of each layer only the nearest crossing counts, which a material cannot know. Back sides are left out instead: where
-    a ray comes out through a fold of the sheet, they are what would count twice.
-
-    Args:
-        gloss: what is reflected besides; None for nothing.
-    """
-    tree = material.node_tree
-    images = sorted(images_of(tree))
-    tree.nodes.clear()
-    nodes = [texture_node(tree, *one) for one in images]
-    colour = nodes[0].outputs["Color"]
-    if gloss is not None:
-        colour = reflected(tree, colour, gloss)
-    alpha = nodes[0].outputs["Alpha"] if len(nodes) == 1 else nodes[1].outputs["Color"]  # grey
-    emission, clear = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeBsdfTransparent")
-    mix, out = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(colour, emission.inputs["Color"])
-    geometry, front = tree.nodes.new("ShaderNodeNewGeometry"), tree.nodes.new("ShaderNodeMath")
-    front.operation = "SUBTRACT"
-    front.use_clamp = True
-    tree.links.new(alpha, front.inputs[0])
-    tree.links.new(geometry.outputs["Backfacing"], front.inputs[1])
-    tree.links.new(front.outputs[0], mix.inputs[0])
-    tree.links.new(clear.outputs[0], mix.inputs[1])
-    tree.links.new(emission.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], out.inputs["Surface"])
-    material.cycles.emission_sampling = "NONE"  # nothing else is lit
-    material.use_backface_culling = False
-    material.surface_render_method = "BLENDED"
-
-
 def images_of(tree: Any) -> list[tuple[str, str]]:
     """The UV map and the image of each texture: one with alpha of its own in a GLB; in USD "st" and "st_alpha"."""
     found = []
@@ -132,20 +107,6 @@ def images_of(tree: Any) -> list[tuple[str, str]]:
         places = [link.from_node for link in tree.links if link.to_node == node]
         found.append((next((one.uv_map for one in places if one.type == "UVMAP"), ""), node.image.name))
     return found
-
-
-def texture_node(tree: Any, uv_map: str, name: str) -> Any:
-    """A look-up of stored values."""
-    image = bpy.data.images[name]
-    image.colorspace_settings.name = "Non-Color"
-    image.alpha_mode = "CHANNEL_PACKED"  # colour and alpha are interpolated each by itself
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image, texture.extension, texture.interpolation = image, "EXTEND", "Linear"
-    if uv_map:
-        place = tree.nodes.new("ShaderNodeUVMap")
-        place.uv_map = uv_map
-        tree.links.new(place.outputs["UV"], texture.inputs["Vector"])
-    return texture
 
 
 def render(view: dict[str, Any]) -> None:
@@ -205,6 +166,7 @@ def main(arguments: list[str]) -> None:
     parser.add_argument("--background", type=float, nargs=3, default=(0.086, 0.094, 0.114), help="RGB in 0..1")
     parser.add_argument("--samples", type=int, default=2, help="anti-aliasing: samples x samples a pixel")
     parser.add_argument("--reflection", type=Path, metavar="ASSET", help="folder of the asset that a GLB was made of")
+    parser.add_argument("--frame", type=int, default=0, help="of a .glb with a video (`facefolds export gltf`)")
     parser.add_argument("--views", type=Path, help="JSON list of cameras with their files, instead of --out")
     given = parser.parse_args(arguments)
     if not given.file.is_file():
@@ -219,7 +181,7 @@ def main(arguments: list[str]) -> None:
         views = [view | {"file": str(given.out.resolve())}]
     if given.reflection and (given.file.suffix != ".glb" or not (given.reflection / "manifest.json").is_file()):
         parser.error("--reflection goes with a .glb, and names the folder with manifest.json")
-    prepare(given.file, tuple(given.background), given.samples, given.reflection)
+    prepare(given.file, tuple(given.background), given.samples, given.reflection, given.frame)
     for view in views:
         render(view)
 

@@ -39,7 +39,7 @@ def find_blender() -> tuple[str, ...] | None:
 
 
 def pictures(
-    file: Path, cameras: Sequence[Camera], background: float, reflection: Path | None = None
+    file: Path, cameras: Sequence[Camera], background: float, reflection: Path | None = None, frame: int = 0
 ) -> dict[str, NDArray[np.float64]]:
     """What Blender renders, a sample a pixel: by camera's name, (H, W, 3) in [0, 1]."""
     start = find_blender()
@@ -51,7 +51,8 @@ def pictures(
             for c in cameras
         ]
         (Path(place) / "views.json").write_text(json.dumps(views))
-        words = ["--views", f"{place}/views.json", "--background", *[str(background)] * 3, "--samples", "1"]
+        words = ["--views", f"{place}/views.json", "--samples", "1", "--frame", str(frame)]
+        words += ["--background", *[str(background)] * 3]
         words += ["--reflection", str(reflection)] if reflection else []
         done = subprocess.run([*start, str(file), *words], capture_output=True, text=True, timeout=240, check=False)
         assert done.returncode == 0, done.stdout + done.stderr

@@ -8,6 +8,7 @@ import pytest
 
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
+from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.engines.usd import STAGE, write_usd
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reference import room_from
@@ -60,3 +61,19 @@ def test_the_reflection_of_a_head_that_turned_agrees_with_the_reference(tmp_path
         added = reflected_colours(hits, seen_by, level.windows, maps, room_from(level, 1))
         expected, _ = composite(hits, level.frame(1), (GREY_VALUE,) * 3, added)
         assert psnr(found[camera.name], expected) >= AGREE, camera.name
+
+
+def test_the_add_on_plays_the_extensions_video(tmp_path: Path) -> None:
+    """The importer with the add-on: layers in the place of the still, a frame of the movie, the head's motion."""
+    if find_blender() is None:
+        pytest.skip(f"no Blender: {REMEDY}")
+    make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96)
+    level = with_track(read_asset(tmp_path / "asset").full)
+    write_layered(tmp_path / "face.glb", level, "caps")
+    cameras = five_cameras(SIZE)
+    found = pictures(tmp_path / "face.glb", cameras, GREY_VALUE, frame=FRAME)
+    caster, textures, scores = AssetCaster(level), level.frame(FRAME), {}
+    for camera in cameras:
+        expected = composite(caster.cast(level.camera_in_head(camera, FRAME)), textures, (GREY_VALUE,) * 3)[0]
+        scores[camera.name] = psnr(found[camera.name], expected)
+    assert min(scores.values()) >= AGREE, scores
