@@ -99,7 +99,7 @@ export class FacefoldsPlayer extends HTMLElement {
   currentTime: number;
   /** A head that turns is held still. */
   still: boolean;
-  /** Any colour of CSS. */
+  /** Any colour of CSS, or "studio", "daylight", "clay". */
   background: string;
   /** How far the layers are pulled apart, 0 to 1. */
   spread: number;

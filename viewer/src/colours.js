@@ -3,8 +3,27 @@
 /** Pages may change their colours with it. */
 export const prefersDark = matchMedia("(prefers-color-scheme: dark)");
 
+/** Grounds of the player's own: colours at the middle and at the corners; the head throws a shadow on them. */
+export const BACKDROPS = {
+  studio: ["#4a505e", "#0e1014"],
+  daylight: ["#ffffff", "#bcc6d2"],
+  clay: ["#f0dfcd", "#b08a6c"],
+};
+
+/** Where the middle of a backdrop is, as a share of the picture, from above. */
+export const MIDDLE = [0.5, 0.45];
+
+/** @param {string} name @returns {string} image of CSS */
+export const backdropImage = (name) => {
+  const [x, y] = MIDDLE.map((share) => `${100 * share}%`);
+  return `radial-gradient(circle farthest-corner at ${x} ${y}, ${BACKDROPS[name].join(", ")})`;
+};
+
+/** @param {string} name @returns {boolean} whether a background can be called so */
+export const isBackground = (name) => isColour(name) || Object.hasOwn(BACKDROPS, name);
+
 /** @param {string} colour @returns {boolean} */
-export const isColour = (colour) => typeof colour === "string" && CSS.supports("background-color", colour);
+const isColour = (colour) => typeof colour === "string" && CSS.supports("background-color", colour);
 
 /**
  * What a colour means where `place` stands: variables, `currentcolor` and system colours included.
@@ -16,7 +35,7 @@ export function painted(colour, place) {
   return numbersOf(getComputedStyle(place).backgroundColor);
 }
 
-function numbersOf(colour) {
+export function numbersOf(colour) {
   const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
   context.fillStyle = colour;
   context.fillRect(0, 0, 1, 1);

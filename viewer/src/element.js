@@ -1,6 +1,6 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
 import { fieldOfView, orbitOf } from "./attributes.js";
-import { isColour, isLight, painted, prefersDark } from "./colours.js";
+import { backdropImage, BACKDROPS, isBackground, isLight, numbersOf, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
@@ -16,12 +16,16 @@ import { isOrbit } from "./viewstate.js";
 import { watchSight, whenNear } from "./watch.js";
 
 const BACKGROUND = "#16181d";
+const SHADOW = 0.55; // on a backdrop
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
 const OF_THE_VIEW = ["camera-orbit", "field-of-view", "auto-rotate", "disable-zoom"];
 
 export class FacefoldsPlayer extends HTMLElement {
-  static observedAttributes = ["src", "background", "loop", "speed", "level", "still", "alt", "muted", ...OF_THE_VIEW];
+  static observedAttributes = [
+    ...["src", "background", "shadow-intensity", "loop", "speed", "level", "still", "alt", "muted"],
+    ...OF_THE_VIEW,
+  ];
 
   #player = null;
   #given = null; // files that came without an address
@@ -62,7 +66,8 @@ export class FacefoldsPlayer extends HTMLElement {
       this.#given = null;
       this.#begin();
     }
-    if (name === "background") this.#paint(isColour(now) ? now : BACKGROUND);
+    if (name === "background") this.#paint(isBackground(now) ? now : BACKGROUND);
+    if (name === "shadow-intensity") this.#paint(this.background);
     if (name === "loop") this.loop = now !== "false";
     if (name === "still") this.still = now !== null;
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
@@ -149,7 +154,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#turn();
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
-    this.#paint(isColour(asked) ? asked : BACKGROUND);
+    this.#paint(isBackground(asked) ? asked : BACKGROUND);
     const repaint = () => this.#paint(this.background);
     prefersDark.addEventListener("change", repaint);
     this.#ends.push(() => prefersDark.removeEventListener("change", repaint));
@@ -288,9 +293,10 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#settings.background;
   }
 
-  /** @param {string} colour any that CSS knows, `transparent` included */
+  /** @param {string} colour any that CSS knows, `transparent` included, or a backdrop's name */
   set background(colour) {
-    if (!isColour(colour)) throw new TypeError(`a background is a colour of CSS, not "${colour}"`);
+    const names = Object.keys(BACKDROPS).join(", ");
+    if (!isBackground(colour)) throw new TypeError(`a background is a colour of CSS or ${names}, not "${colour}"`);
     this.#paint(colour);
   }
 
@@ -298,9 +304,14 @@ export class FacefoldsPlayer extends HTMLElement {
     const stage = this.shadowRoot.querySelector(".stage");
     this.#settings.background = colour;
     if (!stage) return;
-    this.paint = painted(colour, stage);
+    const colours = BACKDROPS[colour];
+    this.paint = painted(colours?.[0] ?? colour, stage);
+    stage.style.backgroundImage = colours ? backdropImage(colour) : "";
     stage.classList.toggle("light", isLight(this.paint, this));
     this.#player?.set("background", this.paint);
+    this.#player?.set("backdrop", colours?.map(numbersOf) ?? null);
+    const asked = parseFloat(this.getAttribute("shadow-intensity"));
+    this.#player?.set("shadow", Math.max(0, Math.min(1, asked >= 0 ? asked : colours ? SHADOW : 0)));
   }
 
   get spread() {
@@ -397,7 +408,7 @@ export class FacefoldsPlayer extends HTMLElement {
   /** All settings and the view as they were at first; goes on playing or resting. */
   reset() {
     const asked = this.getAttribute("background");
-    this.#paint(isColour(asked) ? asked : BACKGROUND);
+    this.#paint(isBackground(asked) ? asked : BACKGROUND);
     Object.assign(this, PLAIN);
     this.layers = this.layers.map(() => true);
     this.loop = this.getAttribute("loop") !== "false";
@@ -488,7 +499,7 @@ export class FacefoldsPlayer extends HTMLElement {
       this.#state = { ...this.#state, ...state, ...(view && { view: { ...this.#state.view, ...view } }) };
       return;
     }
-    if (isColour(background)) this.#paint(background);
+    if (isBackground(background)) this.#paint(background);
     for (const key of [...Object.keys(PLAIN), "speed", "loop"]) if (state[key] !== undefined) this[key] = state[key];
     if (hidden) this.#player.hide(hidden);
     if (view) this.#player.view.set(view);

@@ -25,6 +25,8 @@ const SETTERS = {
   wireframe: "setWireframe",
   effects: "setEffects",
   background: "setBackground",
+  backdrop: "setBackdrop",
+  shadow: "setShadow",
   mode: "setKind",
 };
 
@@ -191,7 +193,7 @@ export class Player extends EventTarget {
     this.renderer.setVisible(this.visible);
   }
 
-  /** @param {"wireframe" | "effects" | "background" | "mode"} name */
+  /** @param {keyof typeof SETTERS} name */
   set(name, value) {
     this.renderer[SETTERS[name]](value);
     this.#changed();

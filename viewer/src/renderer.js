@@ -9,6 +9,7 @@
 import { Graphics, SIDE } from "./gl/graphics.js";
 import { Target } from "./gl/target.js";
 import { Upload } from "./gl/upload.js";
+import { drawBackdrop, drawShadow, fillBackdrop } from "./ground.js";
 import { eyeOf, IDENTITY, multiplied, transformed } from "./matrices.js";
 import { COLOUR_FRAGMENT, DEPTH_FRAGMENT, KINDS, VERTEX, WIRE_FRAGMENT } from "./shaders.js";
 
@@ -32,6 +33,8 @@ export class LayerRenderer {
     this.kind = "colour";
     this.range = null; // distances from the eye that are shown bright and dark, for depth; null: of all there is
     this.background = [0, 0, 0, 1];
+    this.backdrop = null; // colours at its middle and corners, before the background
+    this.shadow = 0;
     this.side = 1; // rays along each side of a pixel of the last picture
   }
 
@@ -42,6 +45,16 @@ export class LayerRenderer {
   /** @param {number[]} rgba in [0, 1], straight; alpha 0 lets the page shine through */
   setBackground(rgba) {
     this.background = rgba;
+  }
+
+  /** @param {number[][] | null} colours RGBA at the middle and at the corners */
+  setBackdrop(colours) {
+    this.backdrop = colours;
+  }
+
+  /** @param {number} intensity of the shadow on the floor, 0 to 1 */
+  setShadow(intensity) {
+    this.shadow = intensity;
   }
 
   /** Shows another level from the next picture on. @param {import("./levels.js").LoadedLevel} level */
@@ -122,6 +135,7 @@ export class LayerRenderer {
     if (strength < 1) {
       context.fillStyle = cssOf(this.#ground());
       context.fillRect(0, 0, width, height);
+      if (this.#stands()) fillBackdrop(context, width, height, this.backdrop);
       context.globalCompositeOperation = "source-over";
       context.globalAlpha = strength;
     }
@@ -141,12 +155,10 @@ export class LayerRenderer {
   /** Distances from the eye of what is seen, but for the nearest and the farthest hundredth. @returns {number[] | null} */
   #visibleRange(projection, view) {
     const { gl } = this.graphics;
-    const { background } = this;
     const data = new Uint8Array(4 * LOOK * LOOK);
     const target = new Target(gl, LOOK, LOOK);
-    [this.background, this.range] = [[0, 0, 0, 0], null];
-    this.render(projection, view, [0, 0, LOOK, LOOK], target.framebuffer);
-    this.background = background;
+    this.range = null;
+    this.render(projection, view, [0, 0, LOOK, LOOK], target.framebuffer, [0, 0, 0, 0]);
     gl.readPixels(0, 0, LOOK, LOOK, gl.RGBA, gl.UNSIGNED_BYTE, data);
     target.dispose();
     const seen = [];
@@ -165,6 +177,11 @@ export class LayerRenderer {
     return [away - radius, away + radius];
   }
 
+  /** Whether a backdrop is behind the picture. */
+  #stands() {
+    return this.backdrop !== null && this.kind === "colour";
+  }
+
   /** Opacity is shown white on black. */
   #ground() {
     return this.kind === "alpha" ? [0, 0, 0, 1] : this.background;
@@ -173,21 +190,22 @@ export class LayerRenderer {
   /**
    * Draws into a part of a framebuffer. @param {number[]} rect x, y, width, height
    * @param {WebGLFramebuffer | null} target null: the graphics' own canvas
-   * @param {number[]} [ground] RGBA behind the layers
+   * @param {number[] | null} [ground] RGBA behind the layers and nothing else; null: what was set, with its shadow
    */
-  render(projection, view, rect, target, ground = this.#ground()) {
+  render(projection, view, rect, target, ground = null) {
     const { gl } = this.graphics;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.viewport(...rect);
     gl.scissor(...rect);
     gl.enable(gl.SCISSOR_TEST);
-    const [r, g, b, a] = ground;
+    const [r, g, b, a] = ground ?? this.#ground();
     gl.clearColor(a * r, a * g, a * b, a);
     gl.colorMask(true, true, true, true);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.CULL_FACE);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    if (!ground) this.#drawGround(projection, view, rect);
     const passes = this.#passes(projection, this.pose ? multiplied(view, this.pose) : view);
     const count = this.level.geometries.length;
     for (let index = count - 1; index >= 0; --index) {
@@ -197,6 +215,13 @@ export class LayerRenderer {
     }
     gl.depthRange(0, 1);
     gl.bindVertexArray(null);
+  }
+
+  /** Backdrop and shadow; the shadow goes where the layers are pulled apart. */
+  #drawGround(projection, view, rect) {
+    if (this.#stands()) drawBackdrop(this.graphics, rect, this.backdrop);
+    const intensity = this.kind === "colour" ? this.shadow * (1 - this.spread) : 0;
+    if (intensity > 0) drawShadow(this.graphics, projection, view, this.bounds(), intensity);
   }
 
   /** What is done for each layer: the uniforms that all share are set. */

@@ -82,6 +82,44 @@ void main() {
   result = vec4(colour, alpha);
 }`;
 
+/** A backdrop: from its middle to the farthest corner, with noise of less than a step against bands. */
+export const BACKDROP_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec4 rect; // of the picture: x, y, width, height, pixels
+uniform vec2 middle; // share of the picture, from below
+uniform vec3 inner, outer;
+out vec4 result;
+void main() {
+  vec2 at = gl_FragCoord.xy - rect.xy;
+  vec2 centre = middle * rect.zw;
+  float part = distance(at, centre) / length(max(centre, rect.zw - centre));
+  float noise = fract(52.9829189 * fract(dot(at, vec2(0.06711056, 0.00583715)))) - 0.5;
+  result = vec4(mix(inner, outer, part) + noise / 255.0, 1.0);
+}`;
+
+/** A square on the floor, its corners from the vertices' numbers. */
+export const SHADOW_VERTEX = `#version 300 es
+precision highp float;
+uniform mat4 projection;
+uniform mat4 view;
+uniform vec3 centre;
+uniform vec2 reach;
+out vec2 place;
+void main() {
+  place = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  gl_Position = projection * (view * vec4(centre + vec3(place * reach, 0.0), 1.0));
+}`;
+
+export const SHADOW_FRAGMENT = `#version 300 es
+precision highp float;
+uniform float intensity;
+in vec2 place;
+out vec4 result;
+void main() {
+  float away = dot(place, place);
+  result = vec4(0.0, 0.0, 0.0, intensity * exp(-3.5 * away) * smoothstep(1.0, 0.6, away));
+}`;
+
 /** One triangle over the whole picture. */
 export const MEANS_VERTEX = `#version 300 es
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`;

@@ -72,7 +72,7 @@ export class Immersion {
     for (const eye of pose.views) {
       const { x, y, width, height } = layer.getViewport(eye);
       const view = multiplied(eye.transform.inverse.matrix, this.place);
-      const ground = kind === "ar" ? [0, 0, 0, 0] : undefined; // the room is behind
+      const ground = kind === "ar" ? [0, 0, 0, 0] : null; // the room is behind
       player.renderer.render(eye.projectionMatrix, view, [x, y, width, height], layer.framebuffer, ground);
     }
     player.say("immersed");

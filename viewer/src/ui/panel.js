@@ -1,5 +1,5 @@
 /** The settings: detail, what is shown, background, layers, pull apart, wireframe, reflection, statistics. */
-import { hexOf } from "../colours.js";
+import { backdropImage, BACKDROPS, hexOf } from "../colours.js";
 
 /** @param {import("../element.js").FacefoldsPlayer} element */
 export function connectPanel(element) {
@@ -7,7 +7,8 @@ export function connectPanel(element) {
   const { player } = element;
   const input = (name) => panel.querySelector(`[name="${name}"]`);
 
-  for (const swatch of panel.querySelectorAll("[data-colour]")) swatch.style.setProperty("--c", swatch.dataset.colour);
+  for (const { style, dataset } of panel.querySelectorAll("[data-colour]"))
+    style.setProperty("--c", BACKDROPS[dataset.colour] ? backdropImage(dataset.colour) : dataset.colour);
   for (const name of ["level", "mode"])
     input(name).addEventListener("change", (event) => (element[name] = event.target.value));
   input("spread").addEventListener("input", (event) => (element.spread = event.target.value));

@@ -38,7 +38,16 @@ const toggle = (name, label, checked = false) =>
   `<label class="row"><span>${label}</span><input type="checkbox" role="switch" name="${name}" ${checked ? "checked" : ""}></label>`;
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 1.5, 2];
-const SWATCHES = { "#16181d": "Dark", "#000000": "Black", "#7f7f7f": "Grey", "#ffffff": "White", "#2f5d46": "Green" };
+const SWATCHES = {
+  studio: "Studio",
+  daylight: "Daylight",
+  clay: "Clay",
+  "#16181d": "Dark",
+  "#000000": "Black",
+  "#7f7f7f": "Grey",
+  "#ffffff": "White",
+  "#2f5d46": "Green",
+};
 
 const MODES = { colour: "Picture", alpha: "Opacity", depth: "Depth", uv: "Texture coordinates" };
 
