@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from facefolds_core.subject.splats import Splats
-from facefolds_core.subject.virtual import GAP, VIEWS, virtual_cameras
+from facefolds_core.subject.virtual import FEW, GAP, VIEWS, virtual_cameras
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
 
@@ -35,7 +37,7 @@ def test_wide_gaps_are_filled_and_nothing_beyond_the_cameras() -> None:
 
 
 def test_where_there_are_many_cameras_or_no_gaps_there_is_none() -> None:
-    many = [look_at_origin(f"c{a}", a, 0, 48) for a in np.linspace(-60, 60, VIEWS)]
+    many = [look_at_origin(f"c{a}", a, 20 * math.sin(a), 48) for a in np.linspace(-60, 60, FEW + 1)]
     assert not virtual_cameras(many, SUBJECT, (48, 48))
     close = [look_at_origin(f"c{a}{e}", a, e, 48) for a in (-10, 0, 10) for e in (-10, 0, 10)]
     assert not virtual_cameras(close, SUBJECT, (48, 48))
