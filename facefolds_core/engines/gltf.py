@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.asset.gltf.writing import write_layered
-from facefolds_core.asset.reader import AssetLevel
+from facefolds_core.asset.reader import AssetLevel, read_asset
 
 
 def export(out: Path, level: AssetLevel, subject: str) -> str:
-    """See `write_layered`; the still is the first frame."""
-    size = write_layered(out, level, subject)
+    """See `write_layered`; the still is the first frame, of the asset's coarsest level."""
+    size = write_layered(out, level, subject, fallback=read_asset(level.folder).levels[0])
     return f"{level.num_layers} layers, {level.num_frames} frames, {size / 1e6:.2f} MB"

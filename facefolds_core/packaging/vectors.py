@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.cropping import crop_layers
+from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import Asset, read_asset
 from facefolds_core.asset.streams import make_streams
@@ -38,6 +39,8 @@ from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset
 
 ASSETS = ("short", "stream")
+EXAMPLE = "short.glb"
+"""The full level of `short` with the glTF extension EXT_layered_volumetric_video: its views are those of "full"."""
 VIEWS = "views.json"
 REFERENCE, POINTS = "reference", "reference_points"
 """Folders of what must be shown: means over pixels; and what one ray through each pixel's centre sees."""
@@ -119,6 +122,7 @@ def write_vectors(folder: Path) -> int:
         raise UserError("the folder is not empty, and holds no vectors", file=folder, remedy="name another folder")
     with atomic_folder(folder) as out:
         _write_short(out / "short")
+        write_layered(out / EXAMPLE, read_asset(out / "short").full, "vectors")
         _write_stream(out / "stream")
         for filtered in RENDERERS:
             (out / filtered).mkdir()

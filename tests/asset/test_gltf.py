@@ -22,7 +22,7 @@ from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import SOURCE, make_asset
 from tests.geometry.test_track import SHIFTS, TURNS
 from tests.gltf_files import complaints, opened, part, validator_report
-from tests.viewer.fixtures import add_reflection
+from tests.viewer.fixtures import add_reflection, rich_asset
 
 HOME = Path(__file__).parents[2] / "docs" / "reference" / NAME
 FRAMES = 3
@@ -138,3 +138,15 @@ def test_the_command_writes_it(folder: Path, tmp_path: Path) -> None:
     words = export("gltf", folder, tmp_path / "face.glb", None)
     assert words.startswith("3 layers, 3 frames, 0.0")
     assert said(opened(tmp_path / "face.glb")[0])["stillFrame"] == 0
+
+
+def test_the_still_is_of_the_coarsest_level(tmp_path: Path) -> None:
+    rich = rich_asset(tmp_path / "asset")
+    export("gltf", rich, tmp_path / "face.glb", None)
+    document, _ = opened(tmp_path / "face.glb")
+    coarse, full = read_asset(rich).levels
+    still, layers = document["meshes"]
+    corners = document["accessors"][still["primitives"][0]["attributes"]["POSITION"]]["count"]
+    assert corners <= sum(len(mesh.vertices) for mesh in coarse.layers)
+    assert len(layers["primitives"]) == full.num_layers == coarse.num_layers + 1
+    assert complaints(validator_report(tmp_path / "face.glb")) == []

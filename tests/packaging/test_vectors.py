@@ -12,6 +12,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from facefolds_core.asset import read_asset
+from facefolds_core.asset.gltf.checking import check_glb
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.cli import app
 from facefolds_core.packaging.vectors import ASSETS, BACKGROUND, compare, write_vectors
@@ -29,6 +30,7 @@ def vectors(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_assets_are_sound(vectors: Path) -> None:
     assert [validate_asset(vectors / name) for name in ASSETS] == [[], []]
     assert read_asset(vectors / "stream").manifest.stream is not None
+    assert check_glb(vectors / "short.glb") == []
 
 
 def test_sheets_fold_before_the_eye(vectors: Path) -> None:

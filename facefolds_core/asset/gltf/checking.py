@@ -5,6 +5,7 @@ What core glTF asks for beyond it is Khronos' validator's to say.
 
 from __future__ import annotations
 
+import io
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -273,12 +274,11 @@ def _picture_problems(data: bytes, said: LayeredVideo) -> Iterator[str]:
     try:
         with tempfile.NamedTemporaryFile() as file:
             file.write(data)
-            file.seek(0)  # which writes what is buffered
-            facts = probe_video(Path(file.name), file, said.rate, said.frames)
+            file.flush()
+            facts = probe_video(Path(file.name), io.BytesIO(data), said.rate, said.frames)
             if facts.pixel_format != "yuv420p" or facts.tags != BT709_LIMITED:
                 yield f"{facts.pixel_format}, matrix and range {facts.tags}: 4:2:0, BT.709, limited range are needed"
-            file.seek(0)
-            for _ in decode_video(Path(file.name), size, float(said.rate), part=file):
+            for _ in decode_video(Path(file.name), size, float(said.rate), part=io.BytesIO(data)):
                 count += 1
     except UserError as error:
         yield str(error.found or error.message)

@@ -1,6 +1,7 @@
 """An asset's level as one GLB with the extension: layers and video as the asset has them, a still for other viewers.
 
-The still is plain, so that every viewer opens it: nothing is required. The layers, which only readers of the extension
+The still is plain, so that every viewer opens it: nothing is required. It may be of a coarser level, since in the full
+one it has several times the bytes of all else. The layers, which only readers of the extension
 decode, are the asset's own Draco meshes: bytes compared in docs/research/engines.md.
 """
 
@@ -49,21 +50,23 @@ STILL_IMAGE, VIDEO, MAPS = 0, 1, 2
 """Indices of the textures."""
 
 
-def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0) -> int:
+def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0, fallback: AssetLevel | None = None) -> int:
     """Write a level; returns the bytes of the file.
 
     Args:
         name: of the root node.
         still: the frame that viewers without the extension show.
+        fallback: the level of the same asset that they show; by default that of the layers.
 
     Raises:
         IndexError: if there is no such frame.
         UserError: if the asset is damaged.
     """
-    textures = opaque_where_covered(level.frame(still), level.windows)
+    shown = level if fallback is None else fallback
+    textures = opaque_where_covered(shown.frame(still), shown.windows)
     builder = Builder()
-    meshes = [_still(builder, triangles_of(level, textures)), _layers(builder, level)]
-    images = [_image(builder, "still", png(picture_of(level, textures)))]
+    meshes = [_still(builder, triangles_of(shown, textures)), _layers(builder, level)]
+    images = [_image(builder, "still", png(picture_of(shown, textures)))]
     document_textures: list[dict[str, Any]] = [
         {"source": 0, "sampler": 0},
         {"sampler": 0, "extensions": {TEXTURE_VIDEO: {"source": 0, "autoplay": True, "loop": True}}},
