@@ -7,7 +7,7 @@
 # make lint    ruff, mypy and the layer check; prettier and eslint for the player
 # make wheel   dist/*.whl: the library, the command facefolds and the web player, for use outside a checkout
 # make hero    set up, then film the embedded actor at full size, run the pipeline and pack the asset: dist/hero (hours; it can be interrupted)
-# make docs    set up, then make the documents a site: site/index.html (with the player on the first page after `make hero`)
+# make docs    set up, then make the documents a site: site/index.html (with the player on the first page after `make hero`, or after `make repro` and `make view`)
 # make package dist/facefolds-player-*.tgz: the web player as an npm package, with types (nothing is published)
 # make gate    set up, then run every capture that is there and hold its scores against those that are kept (hours; ONLY="actor; mugsy" for some)
 # make bench   set up, then measure speed against accuracy of the trainers and draw it (hours; it can be interrupted)

@@ -1,8 +1,9 @@
 """The documents as a site (`make docs`): what MkDocs cannot do by itself, as its hooks. mkdocs.yml names this file.
 
-The first page is README.md, with the player in place of its moving picture where `make hero` has made one. Pages that
-lie outside of docs/ join it; links between all of them lead to where they then are. The page of the library is made
-from the names that `facefolds_core` offers and their docstrings.
+The first page is README.md, with the player in place of its moving picture where there is something to play: what
+`make hero` has made, or the actor's asset of `make repro` where the player is built. Pages that lie outside of docs/
+join it; links between all of them lead to where they then are. The page of the library is made from the names that
+`facefolds_core` offers and their docstrings.
 """
 
 from __future__ import annotations
@@ -13,7 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import facefolds_core
+from facefolds_core.asset import read_asset
 from facefolds_core.errors import UserError
+from facefolds_core.reporting.face import face
+from facefolds_core.serving.player import PLACES
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 HERO = "dist/hero/hero.html"
+ACTOR = "data/actor/asset"
 MOVED = {
     "README.md": "index.md",
     "docs/README.md": "documents.md",
@@ -33,7 +38,10 @@ MOVED = {
 API = "reference/api.md"
 NOTES = "Research notes"
 """Their heading in mkdocs.yml."""
-FRAME = '<iframe src="hero.html" title="The embedded actor, in the player" loading="lazy" allow="fullscreen"></iframe>'
+FRAME = (
+    '<iframe src="hero.html#background=studio" title="The embedded actor, in the player" loading="lazy" '
+    'allow="fullscreen"></iframe>'
+)
 
 
 def place_of(path: str) -> str:
@@ -71,6 +79,19 @@ def relinked(text: str, source: str, root: Path = ROOT) -> tuple[str, set[str]]:
     parts = re.split(r"(```.*?```)", text, flags=re.DOTALL)
     changed = [part if part.startswith("```") else re.sub(r"\]\(([^)\s]+)\)", lead, part) for part in parts]
     return "".join(changed), wanted
+
+
+def playing_page(root: Path = ROOT, places: tuple[Path, ...] = PLACES) -> str | None:
+    """HTML that plays the hero, or else the actor; None where neither is there, or no player is built.
+
+    Args:
+        places: where the built player may lie.
+    """
+    if (root / HERO).exists():
+        return (root / HERO).read_text(encoding="utf-8")
+    built = next((place for place in places if (place / "index.html").is_file()), None)
+    found = face(read_asset(root / ACTOR), built) if (root / ACTOR).is_dir() else None
+    return str(found["page"]) if found else None
 
 
 def first_page(text: str, player: bool) -> str:
@@ -125,10 +146,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
     documents = {f"docs/{file.src_uri}" for file in files.documentation_pages()} | set(MOVED)
     wanted: set[str] = set()
-    player = (ROOT / HERO).exists()
+    playing = playing_page()
     for source in sorted(documents):
         text = (ROOT / source).read_text(encoding="utf-8")
-        text, more = relinked(with_steps(first_page(text, player)) if source == "README.md" else text, source)
+        text, more = relinked(
+            with_steps(first_page(text, playing is not None)) if source == "README.md" else text, source
+        )
         wanted |= more
         place = place_of(source)
         if (old := files.get_file_from_path(source.removeprefix("docs/"))) is not None:
@@ -137,8 +160,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.append(File.generated(config, API, content=api_page()))
     for path in sorted(wanted):
         files.append(File.generated(config, place_of(path), abs_src_path=str(ROOT / path)))
-    if player:
-        files.append(File.generated(config, "hero.html", abs_src_path=str(ROOT / HERO)))
+    if playing is not None:
+        files.append(File.generated(config, "hero.html", content=playing))
     return files
 
 

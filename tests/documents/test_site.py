@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import facefolds_core
-from docs.tools.site import FRAME, api_page, first_page, relinked
+from docs.tools.site import ACTOR, FRAME, HERO, api_page, first_page, playing_page, relinked
 from facefolds_core.errors import UserError
+from tests.assets import make_asset
 
 
 @pytest.mark.parametrize(
@@ -49,6 +50,21 @@ def test_the_player_takes_the_place_of_the_readmes_picture(project_root: Path) -
     assert FRAME in shown and "face.webp" not in shown
     assert len(shown.splitlines()) == len(text.splitlines())
     assert first_page(text, player=False) == text
+
+
+def test_the_first_page_plays_the_hero_or_else_the_actor(tmp_path: Path) -> None:
+    player = tmp_path / "player"
+    assert playing_page(tmp_path, (player,)) is None
+    make_asset(tmp_path / ACTOR, frames=1)
+    assert playing_page(tmp_path, (player,)) is None  # nothing to play it with
+    player.mkdir()
+    for name in ("index.html", "single.js"):
+        (player / name).write_text("// the player")
+    page = playing_page(tmp_path, (player,))
+    assert page is not None and 'data-file="manifest.json"' in page
+    (tmp_path / HERO).parent.mkdir(parents=True)
+    (tmp_path / HERO).write_text("the hero")
+    assert playing_page(tmp_path, (player,)) == "the hero"
 
 
 def test_the_librarys_page_has_every_name() -> None:

@@ -131,6 +131,13 @@ def test_events(new_player: NewPlayer, rich: Path, script: str) -> None:
     assert player.run("return seen['camera-change'].length") == 1
 
 
+def test_a_page_may_open_with_the_photo(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich, 'photo="1" controls="none"')
+    player.wait("!e.shadowRoot.querySelector('.compare').hidden")
+    assert player.run("return [e.state.photo, e.player.view.exact?.camera]") == [1, "photo1"]
+    assert player.page.get_by_role("slider", name="Border between asset and photo").is_visible()
+
+
 def test_a_picture_of_what_is_seen(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich)
     code = """const blob = await e.toBlob(v); const bytes = new Uint8Array(await blob.arrayBuffer());

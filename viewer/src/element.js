@@ -172,7 +172,8 @@ export class FacefoldsPlayer extends HTMLElement {
 
   /** The first picture is there: what was asked for beforehand is set. */
   #ready() {
-    const state = this.#state;
+    const photo = parseInt(this.getAttribute("photo"), 10);
+    const state = { ...(photo >= 0 && { photo }), ...this.#state };
     this.#state = {};
     this.#paint(this.background);
     for (const name of Object.keys(PLAIN)) this[name] = this.#settings[name];
