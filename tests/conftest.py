@@ -20,7 +20,9 @@ BROWSER = (
 )
 RUN_ONCE = ("tests/pipeline/test_end_to_end.py", "tests/pipeline/test_commands.py")
 """Tests of one project that DVC has run."""
-LONGEST = (*RUN_ONCE, *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
+COMPILED = ("tests/captures/test_actor_pictures.py",)
+"""The actor's renderer: in a fresh clone it is compiled for 40 s, which one worker should do before others need it."""
+LONGEST = (*COMPILED, *RUN_ONCE, *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
 """What several workers begin with."""
 
 

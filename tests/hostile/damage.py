@@ -6,11 +6,12 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from facefolds_core.errors import UserError
+from tests.hostile.watch import within
 
 Mutation = Callable[[bytes, np.random.Generator], bytes]
 
@@ -132,3 +133,15 @@ class Counts:
             self.refused += 1
         else:
             self.accepted += 1
+
+
+def attempt(counts: Counts, what: str, seconds: float, call: Callable[[], Any]) -> tuple[Outcome, list[Any]]:
+    """Call, within a time; count what became of it, and return that, and what was returned if anything was."""
+    found: list[Any] = []
+    result = outcome(within(seconds, lambda: found.append(call())))
+    if "TimeoutError" in result.text:
+        counts.tried += 1
+        counts.hung.append(what)
+    else:
+        counts.add(what, result)
+    return result, found

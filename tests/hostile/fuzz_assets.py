@@ -13,9 +13,8 @@ import hashlib
 import json
 import os
 import shutil
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.hostile.damage import MUTATIONS, Counts, Outcome, fingerprint, outcome
+from tests.hostile.watch import within
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import rich_asset
 
@@ -59,24 +59,6 @@ Damage = tuple[str, bool]
 """(what was done, whether it must be refused)."""
 
 
-class Hung(BaseException):
-    """No `Exception`: nothing may catch it."""
-
-
-@contextmanager
-def time_limit(seconds: int) -> Iterator[None]:
-    def stop(*_: object) -> None:
-        raise Hung
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(seconds)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
-
-
 def rendering(level: AssetLevel) -> np.ndarray:
     """(64, 64, 3) codes of the first frame, seen from the front."""
     camera = look_at_origin("front", 10, 5, 64)
@@ -101,9 +83,8 @@ def run(count: int, seed: int, folder: Path) -> Counts:
         what, must_refuse = kind(place, random)
         what = f"assets {seed} {index}: {what}"
         try:
-            with time_limit(PATIENCE):
-                examine(counts, what, must_refuse, place, truth)
-        except Hung:
+            within(PATIENCE, partial(examine, counts, what, must_refuse, place, truth))()
+        except TimeoutError:
             counts.hung.append(what)
         if fingerprint(folder / "outside") != outside:
             counts.harmed.append(what)

@@ -19,9 +19,8 @@ from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.captures.visibility import in_picture
 from facefolds_core.params import NormalizeParams, Subject
 from tests.captures.fixtures import write_multiface, write_transforms
-from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
+from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
 from tests.hostile.structured import damage_lines, damage_path, damage_values
-from tests.hostile.watch import within
 
 SECONDS = 10
 """Of one run; a sound one takes a tenth of a second."""
@@ -121,14 +120,8 @@ def remove(path: Path) -> None:
 
 def try_one(counts: Counts, what: str, source: str, root: Path, out: Path, sound: Images) -> None:
     """Normalise one damaged capture, and count what became of it."""
-    scenes: list[Scene] = []
     with redirect_stderr(io.StringIO()):  # bars of progress
-        result = outcome(within(SECONDS, lambda: scenes.append(normalise(source, root, out))))
-    if "TimeoutError" in result.text:
-        counts.tried += 1
-        counts.hung.append(what)
-        return
-    counts.add(what, result)
+        result, scenes = attempt(counts, what, SECONDS, lambda: normalise(source, root, out))
     if scenes and (words := wrong(scenes[0], sound, ".png" in what)):
         counts.kept_wrong.append(f"{what}: {words}")
     if result.kind == "refused" and out.exists():

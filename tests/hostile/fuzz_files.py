@@ -50,9 +50,8 @@ from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.splats import COLUMNS, Splats
 from facefolds_core.subject.storage import FoundSubject, read_found, write_found
 from tests.ellipsoids import Ellipsoids
-from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
+from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
 from tests.hostile.structured import damage_path, damage_values
-from tests.hostile.watch import within
 
 SECONDS = 10
 SPEC = ModelSpec(
@@ -236,13 +235,7 @@ def run(count: int, seed: int, folder: Path) -> Counts:
 
 def try_one(counts: Counts, what: str, kind: Kind, root: Path, sound: Any) -> None:
     """Read one damaged file, and count what became of it."""
-    found: list[Any] = []
-    result = outcome(within(SECONDS, lambda: found.append(kind.read(root))))
-    if "TimeoutError" in result.text:
-        counts.tried += 1
-        counts.hung.append(what)
-        return
-    counts.add(what, result)
+    result, found = attempt(counts, what, SECONDS, lambda: kind.read(root))
     if found and found[0] is not None and not same(found[0], sound):
         counts.kept_wrong.append(f"{what}: not what was written")
     if result.kind == "refused" and "remedy:" not in result.text:

@@ -95,8 +95,7 @@ def test_a_killed_run_keeps_nobody_out(folder: Path, project_root: Path) -> None
     assert sorted(p.name for p in (folder / "data" / "x").iterdir()) == ["locks", "model"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("shell", ["", "true; "])
+@pytest.mark.parametrize(("number", "shell"), [(signal.SIGTERM, ""), (signal.SIGKILL, "true; ")])
 def test_a_stage_ends_with_its_dvc(number: signal.Signals, shell: str, folder: Path, project_root: Path) -> None:
     """With `true;` the shell that DVC starts stays between DVC and the stage."""
     (folder / ".dvc").mkdir()

@@ -11,9 +11,6 @@ from facefolds_core.params import STAGE_SECTIONS
 from tests.hostile.damage import fingerprint
 from tests.pipeline.tiny import TinyProject
 
-SHELL = ["a;touch X;echo", "$(touch X)", "`touch X`", "'; touch X; '", '"; touch X; "', "a\ntouch X\n", "a b", "-x"]
-PATHS = ["../precious", "../../outside", "..", ".", "a/b", "/etc", "a/../../precious"]
-
 
 @pytest.fixture(scope="module")
 def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> TinyProject:
@@ -40,29 +37,26 @@ def kept(project: TinyProject) -> dict[str, str]:
     return {n: d for n, d in found.items() if not n.startswith(skip) and "__pycache__" not in n}
 
 
-@pytest.mark.parametrize("command", [["repro"], ["repro", "capture@{}"]])
-@pytest.mark.parametrize("name", [*SHELL[:2], PATHS[0], PATHS[1]])
-def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, command: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("name", "targets"),
+    [
+        ("a;touch X;echo", []),
+        ("$(touch X)", ["capture@$(touch X)"]),
+        ("../precious", ["capture@../precious"]),
+        ("../../outside", []),
+    ],
+)
+def test_dvc_runs_and_touches_nothing(project: TinyProject, name: str, targets: list[str]) -> None:
+    """Of some names; tests/core/test_names.py refuses more, without DVC."""
     with_subject(project, name)
     before = kept(project)
-    status, output = project.run("dvc", *(part.format(name) for part in command))
+    status, output = project.repro(*targets)
     assert status != 0
     assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
     assert kept(project) == before
 
 
-@pytest.mark.nightly  # tests/core/test_names.py refuses the same names, without DVC
-@pytest.mark.parametrize("name", [*SHELL[2:], *PATHS[2:]])
-def test_no_other_name_does(project: TinyProject, name: str) -> None:
-    with_subject(project, name)
-    before = kept(project)
-    status, output = project.repro()
-    assert status != 0
-    assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
-    assert kept(project) == before
-
-
-@pytest.mark.parametrize("name", ["../precious", "a/b", "..", "../../outside", "a/../../../outside"])
+@pytest.mark.parametrize("name", ["../precious", "a/../../../outside"])
 def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str) -> None:
     """DVC deletes the outputs of a stage before it runs it: .dvcignore keeps them from being outputs."""
     with_subject(project, name)
@@ -72,23 +66,19 @@ def test_not_even_where_errors_are_to_be_ignored(project: TinyProject, name: str
     assert kept(project) == before
 
 
-@pytest.mark.parametrize("name", ["../../../farther", "a/../../../../../x/../farther"])
-def test_nor_far_outside(project: TinyProject, name: str) -> None:
+def test_nor_far_outside(project: TinyProject) -> None:
     """Past the project's folder .dvcignore says nothing: there an output is a dependency, too, which DVC refuses."""
     path = project.root.parents[1] / "farther" / "capture" / "kept.txt"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("precious")
-    with_subject(project, name)
+    with_subject(project, "a/../../../../../x/../farther")
     status, output = project.repro("--ignore-errors")
     assert status != 0
     assert "as both a dependency and an output" in output
     assert path.read_text() == "precious"
 
 
-@pytest.mark.parametrize(
-    "change", ["+subjects={../../outside:{source:actor,path:x}}", "+subjects={a$\\(touch\\ X\\):{source:actor,path:x}}"]
-)
-def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str) -> None:
+def test_nor_does_an_experiment(project_root: Path, tmp_path: Path) -> None:
     for folder in ("outside/capture", "project"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "outside" / "capture" / "kept.txt").write_text("precious")
@@ -99,14 +89,14 @@ def test_nor_does_an_experiment(project_root: Path, tmp_path: Path, change: str)
     for command in (("git", "init", "--quiet"), ("git", "add", "--all"), commit):
         assert tiny.run(*command)[0] == 0
     before = kept(tiny)
-    status, output = tiny.run("dvc", "exp", "run", "-S", change)
+    status, output = tiny.run("dvc", "exp", "run", "-S", "+subjects={../../outside:{source:actor,path:x}}")
     assert status != 0
     assert "not a name for a subject" in output or "is ignored by .dvcignore" in output
     after = {name: digest for name, digest in kept(tiny).items() if ".git/" not in name}
     assert after == {name: digest for name, digest in before.items() if ".git/" not in name}
 
 
-@pytest.mark.parametrize("path", ["https://example.invalid/capture", "-rf", "~/capture", "a\x01b", "data/good"])
+@pytest.mark.parametrize("path", ["-rf", "data/good"])
 def test_paths_that_are_none(project: TinyProject, path: str) -> None:
     with_subject(project, "good", path)
     status, output = project.repro()

@@ -56,13 +56,14 @@ def constant(rgba: list[tuple[int, int, int, int]]) -> np.ndarray:
     return np.broadcast_to(np.array(rgba, np.uint8)[:, None, None], (len(rgba), 2, 2, 4)).copy()
 
 
-def test_a_quad_that_fills_the_image_reproduces_its_texture() -> None:
-    textures = random_textures(1)
+def test_a_quad_that_fills_the_image_reproduces_its_texture_of_the_frame() -> None:
+    textures = random_textures(1, frames=3)
     textures[..., 3] = 255
-    rgb, alpha = render_asset(FakeAsset((quad(),), textures), CAMERA, 0)
-    # Worst error seen 2e-7: float32 vertices and (s, t).
-    np.testing.assert_allclose(rgb, textures[0, 0, ..., :3] / 255, atol=2e-6)
-    np.testing.assert_allclose(alpha, 1, atol=1e-6)
+    for frame in (0, 2):
+        rgb, alpha = render_asset(FakeAsset((quad(),), textures), CAMERA, frame)
+        # Worst error seen 2e-7: float32 vertices and (s, t).
+        np.testing.assert_allclose(rgb, textures[frame, 0, ..., :3] / 255, atol=2e-6)
+        np.testing.assert_allclose(alpha, 1, atol=1e-6)
 
 
 def test_a_constant_opaque_layer_has_its_colour_inside_and_nothing_outside() -> None:
@@ -76,13 +77,6 @@ def test_a_constant_opaque_layer_has_its_colour_inside_and_nothing_outside() -> 
     np.testing.assert_array_equal(alpha[inside], 1)
     assert (rgb[~inside] == 0).all()
     assert (alpha[~inside] == 0).all()
-
-
-def test_the_frame_asked_for_is_shown() -> None:
-    textures = random_textures(1, frames=3)
-    textures[..., 3] = 255
-    rgb, _ = render_asset(FakeAsset((quad(),), textures), CAMERA, 2)
-    np.testing.assert_allclose(rgb, textures[2, 0, ..., :3] / 255, atol=2e-6)
 
 
 def test_the_nearest_of_several_sheets_of_one_layer_counts() -> None:
@@ -103,30 +97,26 @@ def test_layers_are_composited_in_their_order_not_by_distance() -> None:
     np.testing.assert_array_equal(rgb, np.broadcast_to(np.float32([1, 0, 0]), rgb.shape))
 
 
-def test_two_half_transparent_layers_and_a_background() -> None:
-    textures = constant([(255, 0, 0, 51), (0, 255, 0, 153)])
-    rgb, alpha = composite(full(2), textures, (0, 0, 1))
-    np.testing.assert_allclose(rgb[0, 0], [0.2, 0.8 * 0.6, 0.8 * 0.4], atol=1e-6)
-    np.testing.assert_allclose(alpha[0, 0], 1 - 0.8 * 0.4, atol=1e-6)
-
-
-@pytest.mark.parametrize("layers", [1, 12, 64])
-def test_transparent_layers_leave_the_background(layers: int) -> None:
-    rgb, alpha = composite(full(layers), constant([(255, 255, 255, 0)] * layers), (0.25, 0.5, 0.75))
-    np.testing.assert_array_equal(rgb[0, 0], np.float32([0.25, 0.5, 0.75]))
-    assert alpha[0, 0] == 0
-
-
-def test_an_opaque_layer_hides_all_behind_it() -> None:
-    rgb, alpha = composite(full(3), constant([(51, 102, 153, 255), (255, 255, 255, 255), (9, 9, 9, 100)]), (1, 1, 1))
-    np.testing.assert_allclose(rgb[0, 0], [0.2, 0.4, 0.6], atol=1e-6)
-    assert alpha[0, 0] == 1
-
-
-def test_many_thin_layers_follow_the_power_law() -> None:
-    layers = 64
-    _, alpha = composite(full(layers), constant([(0, 0, 0, 5)] * layers))
-    np.testing.assert_allclose(alpha[0, 0], 1 - (1 - 5 / 255) ** layers, atol=1e-6)
+@pytest.mark.parametrize(
+    ("layers", "background", "colour", "opacity"),
+    [
+        ([(255, 0, 0, 51), (0, 255, 0, 153)], (0, 0, 1), (0.2, 0.8 * 0.6, 0.8 * 0.4), 1 - 0.8 * 0.4),
+        *(([(255, 255, 255, 0)] * count, (0.25, 0.5, 0.75), (0.25, 0.5, 0.75), 0) for count in (1, 12, 64)),
+        ([(51, 102, 153, 255), (255, 255, 255, 255), (9, 9, 9, 100)], (1, 1, 1), (0.2, 0.4, 0.6), 1),
+        ([(0, 0, 0, 5)] * 64, (0, 0, 0), (0, 0, 0), 1 - (1 - 5 / 255) ** 64),
+    ],
+    ids=["half transparent", "clear", "12 clear", "64 clear", "opaque", "64 thin"],
+)
+def test_layers_over_a_background(
+    layers: list[tuple[int, int, int, int]],
+    background: tuple[float, float, float],
+    colour: tuple[float, float, float],
+    opacity: float,
+) -> None:
+    rgb, alpha = composite(full(len(layers)), constant(layers), background)
+    np.testing.assert_allclose(rgb[0, 0], colour, atol=1e-6)
+    np.testing.assert_allclose(alpha[0, 0], opacity, atol=1e-6)
+    assert opacity not in (0, 1) or alpha[0, 0] == opacity
 
 
 def test_missed_layers_count_for_nothing() -> None:
