@@ -165,7 +165,8 @@ def make_scene(
     if mattes:
         write_frames(folder / "mattes.arrow", (size, size, 1), opacities("train"))
         cameras_alike = CameraFit.alike(len(scene.indices("train")))
-        write_found(folder / GAUSSIANS, FoundSubject(gaussians(layers), 40.0, cameras_alike))
+        found = FoundSubject(gaussians(layers), 20.0, cameras_alike)  # of one colour: they explain little
+        write_found(folder / GAUSSIANS, found)
     if surface_radius is not None:
         vertices, faces = _sphere_mesh(surface_radius)
         stacked = np.repeat(vertices[None], frames, 0).astype(np.float32)

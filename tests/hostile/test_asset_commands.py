@@ -49,7 +49,7 @@ def test_folders_that_are_none(tmp_path: Path, command: str, name: str) -> None:
 
 
 def test_an_exporter_that_is_none(asset: Path, tmp_path: Path) -> None:
-    assert "glb, godot" in refused("export", "unreal", asset, tmp_path / "out")
+    assert "glb, gltf, godot" in refused("export", "unreal", asset, tmp_path / "out")
 
 
 def test_a_file_in_place_of_the_folder_to_write(asset: Path, tmp_path: Path) -> None:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
-from facefolds_core.subject.splats import Splats
 from facefolds_core.training.explicit.targets import CutOuts, OneFrame
 from facefolds_core.training.explicit.teacher import Teacher
+from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 from tests.scenes import make_scene
-from tests.subject.splats import some_splats
+from tests.subject.splats import found
 
 SIZE = 24
 
@@ -92,7 +92,7 @@ def test_without_plates_half_covered_pixels_get_the_colours_of_the_subject(scene
 
 
 def test_virtual_cameras_come_after_the_photos_and_show_the_gaussians_of_the_frame(scene: Scene) -> None:
-    teacher = Teacher(scene, Splats(some_splats(200), np.zeros(3, np.float32)), seed=0)
+    teacher = Teacher(scene, found(scene, 30.0), seed=0)
     real, virtual = len(scene.indices("train")), len(teacher.virtual.cameras)
     pictures = CutOuts(scene, teacher=teacher)
     assert virtual > 0 and pictures.behind.shape == (real + virtual, 3)
@@ -102,3 +102,8 @@ def test_virtual_cameras_come_after_the_photos_and_show_the_gaussians_of_the_fra
     shown = pictures.cut(teacher.first)[real:].reshape(virtual, SIZE, SIZE, 4)
     np.testing.assert_array_equal(shown[..., 3], teacher.virtual.mattes)
     assert shown[..., 3].max() > 200
+
+
+def test_gaussians_that_explain_little_teach_nothing(scene: Scene) -> None:
+    assert not Teacher(scene, found(scene, MIN_START_PSNR - 0.1), seed=0).virtual.cameras
+    assert Teacher(scene, found(scene, MIN_START_PSNR), seed=0).virtual.cameras

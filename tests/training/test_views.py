@@ -11,11 +11,10 @@ import torch
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.model.radial import RadialManifolds
-from facefolds_core.subject.splats import Splats
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Views, trace_views
 from tests.scenes import CENTRE, make_scene
-from tests.subject.splats import some_splats
+from tests.subject.splats import found
 
 
 @pytest.fixture
@@ -67,7 +66,7 @@ def test_parts_and_what_is_put_together_keep_their_rays(scene: Scene) -> None:
 
 
 def test_virtual_cameras_have_fewer_pixels_and_finer_rays_at_their_outlines(scene: Scene) -> None:
-    teacher = Teacher(scene, Splats(some_splats(200), np.zeros(3, np.float32)), seed=0).virtual
+    teacher = Teacher(scene, found(scene, 30.0), seed=0).virtual
     middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
     layers = RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
     plain, views = trace_views(scene, layers, 1), trace_views(scene, layers, 1, teacher)

@@ -113,4 +113,4 @@ def test_without_a_headset_nothing_is_offered(new_player: NewPlayer, rich: Path)
     player = new_player({"asset": rich})
     player.open("asset")
     assert player.run("return e.canActivateAR") is False
-    assert not player.page.get_by_role("button", name="Show it in your room").is_visible()
+    assert not player.page.get_by_role("button", name="Place it in your room").is_visible()

@@ -97,7 +97,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) ->
             bar.write(f"train: {note}")
         if place is not None:
             check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
-        teacher = Teacher(cameras.scene, subject.splats, params.seed)
+        teacher = Teacher(cameras.scene, subject, params.seed)
         trainer = Trainer(cameras, params, fit, device, teacher)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height

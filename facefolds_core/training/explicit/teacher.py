@@ -19,7 +19,9 @@ from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.find import reference_frame
 from facefolds_core.subject.frames import changed_to, mean_errors, targets_of
 from facefolds_core.subject.splats import Splats
+from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import virtual_cameras
+from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 
 Image = NDArray[np.uint8]
 
@@ -44,15 +46,18 @@ class Teacher:
 
     Args:
         scene: with training cameras.
-        splats: its subject, in the frame of the start.
+        found: its subject, in the frame of the start. Gaussians that explain the photos with less than
+            `MIN_START_PSNR` teach nothing: there are no virtual cameras then.
         seed: of the draws of the other frames' Gaussians.
     """
 
-    def __init__(self, scene: Scene, splats: Splats, seed: int) -> None:
+    def __init__(self, scene: Scene, found: FoundSubject, seed: int) -> None:
+        splats = found.splats
         self._scene, self._splats, self._seed = scene, splats, seed
         self._first, self._usual = reference_frame(scene), np.zeros(0, np.float32)
         real = self._real(self._first)
-        cameras = virtual_cameras(real, splats, (scene.width, scene.height))
+        believed = found.psnr >= MIN_START_PSNR
+        cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if believed else ()
         self._views = [view_of(camera) for camera in cameras]
         mattes = self._drawn(splats)[..., 3].reshape(len(cameras), scene.height, scene.width)
         self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))

@@ -99,7 +99,7 @@ export const TEMPLATE = `<div class="stage">
     <div class="buttons">
       ${button("loop", "Loop", "L", 'aria-pressed="true"')}${button("sound", "Sound", "M", 'aria-pressed="false" hidden')}
       ${button("compare", "Compare with a photo", "C", "hidden")}${button("settings", "Settings", "", 'aria-expanded="false"')}
-      ${button("ar", "Show it in your room", "", "hidden")}${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
+      ${button("ar", "Place it in your room", "", "hidden")}${button("vr", "Enter VR", "", "hidden")}${button("share", "Copy a link to this view")}${button("full", "Full screen", "F")}
     </div>
   </div>
   <div class="message" part="message" role="alert" hidden><div><h2></h2><p></p><p class="file"></p><button type="button" data-do="again">Try again</button></div></div>
