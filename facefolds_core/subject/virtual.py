@@ -51,6 +51,8 @@ def virtual_cameras(real: Sequence[Camera], splats: Splats, size: tuple[int, int
 
 def _places(real: Array) -> list[Array]:
     """Unit directions of the virtual cameras, given those of the real ones (C, 3)."""
+    if not 3 <= len(real) <= FEW:
+        return []
     tried = _sphere(DIRECTIONS)
     wanted = tried[_between(tried, real)]
     nearest = (wanted @ real.T).max(1, initial=-1)
@@ -70,8 +72,6 @@ def _between(tried: Array, real: Array) -> NDArray[np.bool_]:
     mean = real.mean(0) / max(float(np.linalg.norm(real.mean(0))), 1e-9)
     across = np.linalg.svd(mean[None])[2][1:]
     before, ahead = real @ mean, tried @ mean
-    if not 3 <= len(real) <= FEW:
-        return np.zeros(len(tried), bool)
     if before.min() < SLOPE:  # all around
         return np.asarray(ahead >= SLOPE)
     hull = Delaunay((real @ across.T) / before[:, None], qhull_options="QJ")

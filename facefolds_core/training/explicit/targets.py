@@ -76,8 +76,9 @@ class CutOuts:
         if found is None:
             found = self._cut(index)
             if self._teacher is not None:
-                first = found if index == self._teacher.first else self._cut(self._teacher.first)
-                found = np.concatenate([found, self._teacher.cut(index, found, first)])
+                photos = found
+                virtual = self._teacher.cut(index, lambda frame: photos if frame == index else self._cut(frame))
+                found = np.concatenate([photos, virtual])
         self._kept[index] = found
         while len(self._kept) > 1 and len(self._kept) * found.nbytes > self._kept_bytes:
             self._kept.popitem(last=False)

@@ -1,4 +1,4 @@
-"""Views that nobody filmed: the subject's Gaussians, seen from between the cameras and beside them.
+"""Views that nobody filmed: the subject's Gaussians, seen from between the cameras.
 
 Few photos do not say what layers look like from between them: each camera can be shown a picture of its own. Gaussians
 have no such freedom, and what they show from there is nearer to the truth (docs/research/few-cameras.md). So their
@@ -8,6 +8,7 @@ pictures are targets beside the photos, in each frame.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +55,9 @@ class Teacher:
     def __init__(self, scene: Scene, found: FoundSubject, seed: int) -> None:
         splats = found.splats
         self._scene, self._splats, self._seed = scene, splats, seed
-        self._first, self._usual = reference_frame(scene), np.zeros(0, np.float32)
+        self._first = reference_frame(scene)
+        self._usual: NDArray[np.float32] | None = None
+        self._known = {self._first: splats}
         real = self._real(self._first)
         believed = found.psnr >= MIN_START_PSNR
         cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if believed else ()
@@ -62,25 +65,22 @@ class Teacher:
         mattes = self._drawn(splats)[..., 3].reshape(len(cameras), scene.height, scene.width)
         self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))
 
-    def cut(self, frame: int, photos: Image, first: Image) -> Image:
+    def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
 
         Args:
-            photos: (C, H W, 4) cut-outs of the training cameras in it.
-            first: the same in the frame of the start.
+            photos: frame -> (C, H W, 4) cut-outs of the training cameras.
         """
-        splats = self._splats
-        if frame != self._first and len(self._views):
-            if not len(self._usual):
-                self._usual = mean_errors(splats, targets_of(self._real(self._first), first))
-            targets = targets_of(self._real(frame), photos)
-            splats = changed_to(splats, self._usual, targets, self._seed + frame)
-        return self._drawn(splats)
+        return self._drawn(self._at(frame, photos) if self._views else self._splats)
 
-    @property
-    def first(self) -> int:
-        """The frame of the start."""
-        return self._first
+    def _at(self, frame: int, photos: Callable[[int], Image]) -> Splats:
+        """The Gaussians of a frame; they are kept, since pictures may be asked for again."""
+        if frame not in self._known:
+            if self._usual is None:
+                self._usual = mean_errors(self._splats, targets_of(self._real(self._first), photos(self._first)))
+            targets = targets_of(self._real(frame), photos(frame))
+            self._known[frame] = changed_to(self._splats, self._usual, targets, self._seed + frame)
+        return self._known[frame]
 
     def _real(self, frame: int) -> list[Camera]:
         return [self._scene.camera_in_head(i, frame) for i in self._scene.indices("train")]
