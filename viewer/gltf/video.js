@@ -57,8 +57,8 @@ export function released(video) {
 export function follow(video, rate, frames, tell) {
   const at = (time) => tell(Math.min(frames - 1, Math.max(0, Math.floor(time * rate + 0.01))));
   const presented = (_, { mediaTime }) => {
-    at(mediaTime);
     video.requestVideoFrameCallback(presented);
+    at(mediaTime);
   };
   if ("requestVideoFrameCallback" in video) video.requestVideoFrameCallback(presented);
   else video.addEventListener("timeupdate", () => at(video.currentTime));
