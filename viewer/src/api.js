@@ -1,7 +1,7 @@
 /** What a page may ask of <facefolds-player> once it has a player: time, layers, levels, pictures, films, the room. */
 import { PlayerError } from "./errors.js";
 import { asFile, linkTo } from "./sharing.js";
-import { surfaceUnder } from "./surface.js";
+import { clipOf, surfaceUnder } from "./surface.js";
 
 export class PlayerApi extends HTMLElement {
   /** The engine behind the element, for programs that need more than the element offers; null before it is connected. */
@@ -156,8 +156,7 @@ export class PlayerApi extends HTMLElement {
    */
   surfaceFromPoint(x, y) {
     if (!this.ready) return null;
-    const { left, top, width, height } = this.player.canvas.getBoundingClientRect();
-    const found = surfaceUnder(this.player, [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height]);
+    const found = surfaceUnder(this.player, clipOf(this.player.canvas, x, y));
     if (!found) return null;
     const deep = found.layer / Math.max(1, this.layers.length - 1);
     return [...found.place, deep].map((number) => number.toFixed(4)).join(" ");

@@ -1,6 +1,6 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
 import { PlayerApi } from "./api.js";
-import { fieldOfView, orbitOf } from "./attributes.js";
+import { applyToView, exposureOf, OF_THE_VIEW, reflect } from "./attributes.js";
 import { backdropImage, BACKDROPS, isBackground, isLight, numbersOf, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
@@ -18,17 +18,19 @@ const BACKGROUND = "#16181d";
 const SHADOW = 0.55; // on a backdrop
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
-const OF_THE_VIEW = ["camera-orbit", "field-of-view", "auto-rotate", "disable-zoom"];
 
 export class FacefoldsPlayer extends PlayerApi {
   static observedAttributes = [
     ...["src", "background", "shadow-intensity", "loop", "speed", "level", "still", "alt", "muted"],
+    ...["exposure", "reveal"],
     ...OF_THE_VIEW,
   ];
 
   #player = null;
   #given = null; // files that came without an address
   #state = {}; // what is to be applied when the first picture is there
+  #waits = false; // for `dismissPoster`
+  #dismissed = false;
   #resume = false; // it played when it was taken out of the document
   #settings = { background: BACKGROUND, ...PLAIN };
   #ends = []; // what is to be called when the player goes
@@ -62,7 +64,7 @@ export class FacefoldsPlayer extends PlayerApi {
   attributeChangedCallback(name, before, now) {
     if (!this.isConnected || before === now) return;
     if (name === "src") {
-      this.#given = null;
+      [this.#given, this.#dismissed] = [null, false];
       this.#begin();
     }
     if (name === "background") this.#paint(isBackground(now) ? now : BACKGROUND);
@@ -72,7 +74,9 @@ export class FacefoldsPlayer extends PlayerApi {
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
     if (name === "alt") this.#describe();
     if (name === "muted") this.muted = now !== "false";
-    if (OF_THE_VIEW.includes(name)) this.#turn(name);
+    if (name === "exposure") this.#player?.set("exposure", exposureOf(this));
+    if (name === "reveal" && this.#waits && now !== "manual") this.#begin();
+    if (OF_THE_VIEW.includes(name) && this.#player) applyToView(this, this.#player, name);
     if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
   }
 
@@ -83,29 +87,35 @@ export class FacefoldsPlayer extends PlayerApi {
     if (canvas) canvas.ariaDescription = alt === null ? null : PICTURE;
   }
 
-  /** What attributes say of the view. @param {string} [changed] one of them; all otherwise */
-  #turn(changed) {
-    const { view } = this.#player ?? {};
-    if (!view) return;
-    const concerns = (...names) => !changed || names.includes(changed);
-    view.zooms = !this.hasAttribute("disable-zoom");
-    if (concerns("auto-rotate")) view.setRotation(this.hasAttribute("auto-rotate"));
-    if (concerns("camera-orbit", "field-of-view"))
-      this.#player.setFirst(
-        orbitOf(this.getAttribute("camera-orbit")),
-        fieldOfView(this.getAttribute("field-of-view")),
-      );
-  }
-
-  /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen. */
+  /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen, or (`reveal="manual"`) when told. */
   #begin() {
     this.#stop();
-    if (this.getAttribute("loading") !== "lazy") return this.#start();
+    if (this.getAttribute("loading") !== "lazy") return this.#arrive();
+    this.#waitBare();
+    this.#ends.push(whenNear(this, () => this.#arrive()));
+  }
+
+  #arrive() {
+    if (this.getAttribute("reveal") !== "manual" || this.#dismissed) return this.#start();
+    this.#waitBare();
+    this.#waits = true;
+    const own = this.hasAttribute("poster") || this.querySelector('[slot="poster"]');
+    if (!own && this.hasAttribute("src")) new Overlays(this).standIn(this.#files());
+  }
+
+  /** Nothing is loaded: there is a poster at most. */
+  #waitBare() {
     this.shadowRoot.innerHTML = TEMPLATE;
+    this.shadowRoot.querySelector(".stage").classList.add("waits");
     showOwnPoster(this);
     this.#describe();
     this.#paint(this.getAttribute("background") ?? BACKGROUND);
-    this.#ends.push(whenNear(this, () => this.#start()));
+  }
+
+  /** With `reveal="manual"`: loads the asset, and shows it in the poster's place. */
+  dismissPoster() {
+    this.#dismissed = true;
+    if (this.#waits) this.#begin();
   }
 
   /** Loads the asset (again). */
@@ -150,7 +160,8 @@ export class FacefoldsPlayer extends PlayerApi {
     player.still = this.hasAttribute("still");
     player.mute(this.getAttribute("muted") !== "false");
     this.#describe();
-    this.#turn();
+    applyToView(this, player);
+    player.set("exposure", exposureOf(this));
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isBackground(asked) ? asked : BACKGROUND);
@@ -192,6 +203,7 @@ export class FacefoldsPlayer extends PlayerApi {
   }
 
   #stop() {
+    this.#waits = false;
     for (const end of this.#ends.splice(0)) end();
     this.#recovery.stop();
     this.#player?.close();
@@ -327,3 +339,5 @@ export class FacefoldsPlayer extends PlayerApi {
     }
   }
 }
+
+reflect(FacefoldsPlayer.prototype);

@@ -30,6 +30,20 @@ export function bounded(range) {
   };
 }
 
+/**
+ * What of a range a page allows. @param {Range} range
+ * @param {import("./view.js").Allowed} allowed least and most; from above is the least
+ * @returns {Range} as it was in a direction that the page leaves nothing of
+ */
+export function narrowed(range, [least, most]) {
+  const both = ([low, high], from = -Infinity, to = Infinity) =>
+    Math.max(low, from) <= Math.min(high, to) ? [Math.max(low, from), Math.min(high, to)] : [low, high];
+  return {
+    azimuth: both(range.azimuth, least.azimuth, most.azimuth),
+    elevation: both(range.elevation, most.elevation, least.elevation),
+  };
+}
+
 /** Of a range of directions; the front, where the first view is from, stays if it was filmed. */
 function kept([low, high]) {
   const [middle, half] = [(low + high) / 2, Math.max(NEAR, (KEPT * (high - low)) / 2)];

@@ -27,6 +27,7 @@ const SETTERS = {
   background: "setBackground",
   backdrop: "setBackdrop",
   shadow: "setShadow",
+  exposure: "setExposure",
   mode: "setKind",
 };
 
@@ -102,9 +103,9 @@ export class Player extends EventTarget {
     this.say("change");
   }
 
-  /** Where the first view is from. @param {object} orbit @param {number} field see `View.setFirst` */
-  setFirst(orbit, field) {
-    this.view.setFirst(orbit, field);
+  /** Where the first view is from. @param {object} first @param {number} field see `View.setFirst` */
+  setFirst(first, field) {
+    this.view.setFirst(first, field);
     if (this.home) this.view.setHome(this.home);
   }
 
