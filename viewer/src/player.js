@@ -246,6 +246,7 @@ export class Player extends EventTarget {
     if (!this.level) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
     const [width, height] = camera ? [camera.width, camera.height] : this.size;
     const { projection, view } = this.view.matrices(width, height, this.renderer.bounds(), camera);
+    this.renderer.setHems(camera ? null : this.view.hems);
     return this.renderer.capture(projection, view, width, height);
   }
 
@@ -319,6 +320,7 @@ export class Player extends EventTarget {
   /** While a headset asks for the pictures, the page's own rest. */
   setImmersed(on) {
     this.immersed = on;
+    this.renderer.setHems(null);
     cancelAnimationFrame(this.request);
     this.request = 0;
     if (!on) this.invalidate();
@@ -373,6 +375,7 @@ export class Player extends EventTarget {
   draw(moves = this.playing) {
     if (this.lost || !this.size[0]) return;
     const { projection, view } = this.view.matrices(...this.size, this.renderer.bounds());
+    this.renderer.setHems(this.view.hems);
     this.renderer.draw(projection, view, this.view.strength, this.late && moves);
     this.stale = false;
     this.drawn.push(performance.now());

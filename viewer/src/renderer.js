@@ -36,6 +36,7 @@ export class LayerRenderer {
     this.backdrop = null; // colours at its middle and corners, before the background
     this.shadow = 0;
     this.exposure = 1;
+    this.hems = null;
     this.side = 1; // rays along each side of a pixel of the last picture
   }
 
@@ -61,6 +62,11 @@ export class LayerRenderer {
   /** @param {number} factor of the layers' light */
   setExposure(factor) {
     this.exposure = factor;
+  }
+
+  /** What fades where the view is beyond what was filmed. @param {import("./limits.js").Hems | null} hems null: nothing */
+  setHems(hems) {
+    this.hems = hems;
   }
 
   /** Shows another level from the next picture on. @param {import("./levels.js").LoadedLevel} level */
@@ -290,6 +296,10 @@ export class LayerRenderer {
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
     gl.uniform1f(at.exposure, this.exposure);
+    const { side, from } = this.hems ?? { side: 1, from: Math.PI };
+    gl.uniform2f(at.axis, ...this.bounds().centre.slice(0, 2));
+    gl.uniform1f(at.side, side);
+    gl.uniform1f(at.hems, from);
     gl.uniform1i(at.kind, KINDS.indexOf(this.kind));
     gl.uniform2f(at.range, ...(this.range ?? this.#wholeRange(eye)));
     if (upload.reflection) {

@@ -2,7 +2,7 @@
 import { FIELD_OF_VIEW } from "./attributes.js";
 import { axesOf, framing, orbitView, projectionOf, viewOf } from "./camera.js";
 import { connectGestures } from "./gestures.js";
-import { bounded, clamp, narrowed, resisted, strength, unwound } from "./limits.js";
+import { bounded, clamp, hemsFrom, narrowed, resisted, strength, unwound } from "./limits.js";
 import { transformed } from "./matrices.js";
 import { roundAndRound, toAndFro } from "./sway.js";
 
@@ -306,6 +306,11 @@ export class View {
   /** How strong the picture is: less where nothing was filmed. */
   get strength() {
     return this.exact ? 1 : strength({ ...this.now, azimuth: this.now.azimuth + this.#sway() }, this.range);
+  }
+
+  /** What fades of what lies far round; nothing from an exact camera. */
+  get hems() {
+    return this.exact || this.free ? null : hemsFrom(this.now.azimuth + this.#sway(), this.filmed, this.range);
   }
 
   /**
