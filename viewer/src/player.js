@@ -399,7 +399,9 @@ export class Player extends EventTarget {
 
   set still(on) {
     this.held = on;
-    if (this.manifest) this.#place();
+    if (!this.manifest) return;
+    this.#place();
+    this.wake();
   }
 
   /** A setting is another. */
