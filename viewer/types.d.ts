@@ -101,6 +101,21 @@ export class FacefoldsPlayer extends HTMLElement {
   still: boolean;
   /** Any colour of CSS, or "studio", "daylight", "clay". */
   background: string;
+  /** The attributes of the same names, in their words; "" where there is none. */
+  cameraOrbit: string;
+  cameraTarget: string;
+  fieldOfView: string;
+  minCameraOrbit: string;
+  maxCameraOrbit: string;
+  autoRotate: boolean;
+  disableZoom: boolean;
+  disablePan: boolean;
+  disableTap: boolean;
+  /** A factor of the light; 1 by default. */
+  exposure: number;
+  /** "manual": only the poster is fetched, until `dismissPoster()`. */
+  reveal: "auto" | "manual";
+  dismissPoster(): void;
   /** How far the layers are pulled apart, 0 to 1. */
   spread: number;
   wireframe: boolean;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -40,6 +41,74 @@ def test_camera_orbit_is_the_first_view(new_player: NewPlayer, rich: Path) -> No
     assert numbers(player, VIEW) == pytest.approx([-15, 0, 1.5])
     player.run("e.removeAttribute('camera-orbit')")
     assert numbers(player, VIEW) == pytest.approx([0, 0, away])
+
+
+def test_camera_target_is_what_the_first_view_looks_at(new_player: NewPlayer, rich: Path) -> None:
+    """glTF's axes: to the subject's left, up, before it."""
+    player = opened(new_player, rich, 'camera-target="0.1m auto -2cm"')
+    middle = numbers(player, "e.player.home.centre")
+    assert numbers(player, "e.state.view.target") == pytest.approx([-0.02, 0.1, middle[2]])
+    player.run("e.state = {view: {target: [0, 0, 0]}}; e.resetView()")
+    assert numbers(player, "e.state.view.target")[1] == pytest.approx(0.1)
+    player.run("e.cameraTarget = 'auto'")
+    assert numbers(player, "e.state.view.target") == pytest.approx(middle)
+
+
+def test_a_page_bounds_the_view(new_player: NewPlayer, rich: Path) -> None:
+    least, most = "-10deg 75deg 80%", "20deg 95deg 1.5m"
+    player = opened(new_player, rich, f'min-camera-orbit="{least}" max-camera-orbit="{most}"')
+    away = numbers(player, VIEW)[2]
+    for asked, found in (((90, 60, 0.01), (20, 15, 0.8 * away)), ((-90, -60, 9), (-10, -5, 1.5))):
+        view = dict(zip(("azimuth", "elevation", "distance"), asked, strict=True))
+        player.run("e.state = {view: v}", view)
+        assert numbers(player, VIEW) == pytest.approx(found)
+    drag(player, -300, -200)
+    assert numbers(player, "[e.player.view.goal.azimuth, e.player.view.goal.elevation]") == [20, -5]
+    drag(player, 20, 0)  # at once: what was beyond the end is forgotten
+    assert numbers(player, "[e.player.view.goal.azimuth]")[0] < 10
+    player.run("e.minCameraOrbit = 'auto'; e.maxCameraOrbit = '30deg auto auto'; e.state = {view: {azimuth: 90}}")
+    assert numbers(player, VIEW)[0] == pytest.approx(30)
+
+
+def drag(player: Player, dx: float, dy: float, button: Literal["left", "right"] = "left") -> None:
+    player.page.mouse.move(200, 120)
+    player.page.mouse.down(button=button)
+    player.page.mouse.move(200 + dx, 120 + dy, steps=5)
+    player.page.mouse.up(button=button)
+
+
+def test_panning_and_double_clicks_move_what_is_looked_at(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player, rich)
+    goal, home = "e.player.view.goal.target", numbers(player, "e.player.view.home.target")
+    drag(player, 30, 0, "right")
+    assert numbers(player, goal) != home
+    player.run("e.resetView()")
+    surface = "e.surfaceFromPoint(v[0], v[1])?.split(' ').map(Number)"
+    place = player.run(f"return {surface}", [230, 110])
+    player.page.mouse.dblclick(230, 110)
+    player.wait(f"{goal}.every((v, i) => Math.abs(v - e.player.view.now.target[i]) < 1e-3)")
+    middle = player.run("return [200, 150 - e.player.view.inset / 2]")
+    assert place is not None and player.run(f"return {surface}", middle) == pytest.approx(place, abs=0.01)
+    player.page.mouse.dblclick(3, 3)  # beside the head: the first view
+    assert numbers(player, goal) == pytest.approx(home)
+    player.run("e.disablePan = e.disableTap = true; e.resetView()")
+    player.page.mouse.dblclick(230, 110)
+    drag(player, 30, 0, "right")
+    assert numbers(player, goal) == home
+    assert numbers(player, "[e.player.view.goal.azimuth]")[0] < -5  # it turns instead
+
+
+def test_a_page_says_when_it_is_revealed(new_player: NewPlayer, rich: Path) -> None:
+    """Until then there is the asset's poster, and nothing else is fetched."""
+    player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})
+    page_of_yours(player, '<facefolds-player src="asset/" reveal="manual" autoplay></facefolds-player>')
+    player.wait("e.shadowRoot?.querySelector('.poster').naturalWidth > 0")
+    assert player.page.locator(".poster").is_visible() and not player.page.locator(".bar").is_visible()
+    fetched = {address.split("/asset/")[1] for address in player.requests if "/asset/" in address}
+    assert fetched == {"manifest.json", "poster.png"}
+    player.run("e.dismissPoster()")
+    player.wait("e.ready && e.playing")
+    assert player.page.locator(".bar").is_visible()
 
 
 def test_a_narrower_field_of_view_shows_the_same_from_further_away(new_player: NewPlayer, rich: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.assets import PLAIN, SOURCE, cap_mesh, cap_texture, write_asset, write_store
 from tests.viewer.conftest import NewPlayer, Player
 from tests.viewer.fixtures import change_manifest
 
@@ -54,6 +55,34 @@ def test_what_was_measured_bounds_the_view(new_player: NewPlayer, rich_copy: Pat
     view = player.run("e.state = { view: { azimuth: -80, elevation: 60 } }; return e.player.view.get()")
     assert isinstance(view, dict)
     assert [view["azimuth"], view["elevation"]] == pytest.approx([-29, 12])
+
+
+def opaque_half_round(folder: Path) -> Path:
+    """One opaque layer that goes 126 degrees to each side, past the middle of a head."""
+    window = (-0.5, 0.5, -0.7, 0.7)
+    texture = cap_texture(0, 0, 32)
+    texture[..., 3] = 255
+    store = write_store(folder.with_name("textures"), texture[None, None])
+    write_asset(folder, [cap_mesh(0.4, 40, window)], [window], store, SOURCE, PLAIN)
+    change_manifest(folder, lambda value: value.update(view={**FILMED, "good": FILMED}))
+    return folder
+
+
+def test_hems_fade_beyond_what_is_good_and_nothing_does_within(new_player: NewPlayer, tmp_path: Path) -> None:
+    """Beside pictures of the same view without any limit: the far side (right) dissolves, the near one stays."""
+    asset = opaque_half_round(tmp_path / "asset")
+    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300})
+    player.open("asset")
+    player.run("e.background = 'transparent'")
+    gone = []
+    for azimuth in (-30, 40, 44.5):
+        player.run("const { view } = e.player; view.now.azimuth = view.goal.azimuth = v", azimuth)
+        limited = player.capture()[..., 3]
+        player.run("e.player.view.setFilmed(null)")
+        gone.append(player.capture()[..., 3] - limited)
+        player.run("e.player.view.setFilmed(v)", {**FILMED, "good": FILMED})
+    assert np.abs(gone[:2]).max() == 0
+    assert gone[2].min() == 0 and gone[2][:, 200:].max() > 0.5 and gone[2][:, :200].max() == 0
 
 
 def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) -> None:

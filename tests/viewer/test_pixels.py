@@ -125,6 +125,31 @@ def test_reflections_follow_the_format(new_player: NewPlayer, caps: Asset, tmp_p
     assert psnr(plain, expected) < 25  # the reflection is strong enough to be seen in this test
 
 
+def test_exposure_is_a_factor_of_the_light(new_player: NewPlayer, caps: Asset) -> None:
+    """Of each layer's, not of the background; stored values are sRGB's."""
+    player = new_player({"asset": caps.folder})
+    player.open("asset")
+    player.run("e.background = v; e.exposure = 1.5", GREY)
+    camera = five_cameras(SIZE)[1]
+    view = AreaView.of_hits(camera, lambda part: (cast_layers(part, caps.layers), None))
+    brighter = [exposed(np.asarray(texture), 1.5) for texture in caps.frame(0)]
+    expected, _ = view.composite(brighter, (GREY_VALUE,) * 3)
+    plain, _ = view.composite(caps.frame(0), (GREY_VALUE,) * 3)
+    assert psnr(player.capture(camera)[..., :3], expected) >= AGREE
+    assert psnr(plain, expected) < 30  # it is strong enough to be seen in this test
+    player.run("e.removeAttribute('exposure')")
+    assert psnr(player.capture(camera)[..., :3], plain) >= AGREE
+
+
+def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
+    """An RGBA texture with so many times the light."""
+    values = np.asarray(rgba, np.float32) / (255 if rgba.dtype == np.uint8 else 1)
+    stored = values[..., :3]
+    light = factor * np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    back = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.concatenate([np.minimum(back, 1), values[..., 3:]], -1).astype(np.float32)
+
+
 def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
     asset = read_asset(tmp_path / "asset")

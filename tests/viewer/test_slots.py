@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
 from facefolds_core.geometry.sphere_uv import uv_to_st
+from tests.asset.test_track import TRACK
+from tests.assets import SOURCE, make_asset
 from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
 PLACE = (0.12, -0.1)
@@ -40,20 +43,42 @@ def point_of(asset: Path) -> np.ndarray:
     return np.asarray((weights[:, None] * mesh.vertices[near]).sum(0) / weights.sum())
 
 
+def place_of(player: Player, point: np.ndarray) -> object:
+    """Where the element shows a point of the room, CSS pixels."""
+    return player.run(
+        """const { view, projection } = e.player.view.matrices(...e.player.size, e.player.renderer.bounds());
+        const times = (m, p) => [0, 1, 2, 3].map((i) => p.reduce((sum, x, k) => sum + m[4 * k + i] * x, 0));
+        const [x, y, , w] = times(projection, times(view, v));
+        return [(0.5 + x / w / 2) * e.clientWidth, (0.5 - y / w / 2) * e.clientHeight];""",
+        [*map(float, point), 1.0],
+    )
+
+
 def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, rich: Path) -> None:
     player = opened(new_player, rich, HOTSPOT)
-    point = [*map(float, point_of(rich)), 1.0]
+    point = point_of(rich)
     for azimuth in (0, 25, -30):
         player.run("e.state = {view: {azimuth: v}}; await new Promise((r) => setTimeout(r, 200))", azimuth)
-        seen = player.run(
-            """const { view, projection } = e.player.view.matrices(...e.player.size, e.player.renderer.bounds());
-            const times = (m, p) => [0, 1, 2, 3].map((i) => p.reduce((sum, x, k) => sum + m[4 * k + i] * x, 0));
-            const [x, y, , w] = times(projection, times(view, v));
-            return [(0.5 + x / w / 2) * e.clientWidth, (0.5 - y / w / 2) * e.clientHeight];""",
-            point,
-        )
-        assert player.run(SPOT) == pytest.approx(seen, abs=3), azimuth
+        assert player.run(SPOT) == pytest.approx(place_of(player, point), abs=3), azimuth
         assert player.run("return document.querySelector('#spot').hasAttribute('data-visible')")
+
+
+def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Path) -> None:
+    """From frame to frame, as it plays, and back to rest where the head is held still."""
+    asset = tmp_path / "asset"
+    make_asset(asset, layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    player = opened(new_player, asset, HOTSPOT, 'loop="false"')
+    point = point_of(asset)
+    places = [place_of(player, TRACK.at(frame).apply(point)) for frame in range(3)]
+    for frame in (0, 2, 1):
+        assert player.run("return await e.seek(v)", frame)
+        assert player.run(SPOT) == pytest.approx(places[frame], abs=3), frame
+    player.run("e.play()")
+    player.wait("e.frame === 2 && !e.playing")
+    assert player.run(SPOT) == pytest.approx(places[2], abs=3)
+    player.run("e.still = true; await new Promise(requestAnimationFrame); await new Promise(requestAnimationFrame)")
+    assert player.run(SPOT) == pytest.approx(place_of(player, point), abs=3)
+    assert np.abs(np.subtract(places[2], places[0])).max() > 10  # the motion is large enough to be seen in this test
 
 
 def test_a_place_that_is_turned_away_says_so(new_player: NewPlayer, rich: Path) -> None:

@@ -60,3 +60,33 @@ export function orbitView(orbit) {
   const { right, up, back } = axesOf(orbit);
   return viewFrom(right, up, back, positionOf(orbit));
 }
+
+/**
+ * From where a box fills a picture in a direction, and no more.
+ * @param {{low: number[], high: number[]}} box @param {{azimuth: number, elevation: number}} direction
+ * @param {[number, number]} slopes of what the picture shows to each side and up, a unit away
+ * @returns {{distance: number, target: number[]}}
+ */
+export function framing({ low, high }, direction, [across, tall]) {
+  const { right, up, back } = axesOf(direction);
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => ((k >> i) & 1 ? high[i] : low[i])));
+  const along = (axis) => corners.map((corner) => corner.reduce((sum, v, i) => sum + v * axis[i], 0));
+  const towards = along(back);
+  const middle = (Math.min(...towards) + Math.max(...towards)) / 2;
+  // A corner at r along the picture and b towards the eye is inside where |r - t| <= slope * (distance - b).
+  const distanceOf = (axis, slope) => {
+    const end = (sign) => Math.max(...along(axis).map((r, i) => sign * r + slope * (towards[i] - middle)));
+    return (end(1) + end(-1)) / 2 / slope;
+  };
+  const distance = Math.max(distanceOf(right, across), distanceOf(up, tall));
+  const centred = (axis) => {
+    let t = 0;
+    for (let k = 0; k < 8; ++k) {
+      const seen = along(axis).map((r, i) => (r - t) / (distance + middle - towards[i]));
+      t += ((Math.min(...seen) + Math.max(...seen)) / 2) * distance;
+    }
+    return t;
+  };
+  const [x, y] = [centred(right), centred(up)];
+  return { distance, target: back.map((v, i) => middle * v + x * right[i] + y * up[i]) };
+}

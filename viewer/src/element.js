@@ -1,13 +1,12 @@
 /** <facefolds-player src="folder/">: the player with its controls, in a shadow root. docs/guide/viewer.md is its manual. */
-import { fieldOfView, orbitOf } from "./attributes.js";
+import { PlayerApi } from "./api.js";
+import { applyToView, exposureOf, OF_THE_VIEW, reflect } from "./attributes.js";
 import { backdropImage, BACKDROPS, isBackground, isLight, numbersOf, painted, prefersDark } from "./colours.js";
 import { PlayerError } from "./errors.js";
 import { Files, MemoryFiles } from "./files.js";
 import { Player } from "./player.js";
 import { Recovery } from "./recovery.js";
 import { KINDS } from "./shaders.js";
-import { asFile, linkTo } from "./sharing.js";
-import { surfaceUnder } from "./surface.js";
 import { connectControls } from "./ui/controls.js";
 import { Hotspots } from "./ui/hotspots.js";
 import { Overlays, showOwnPoster } from "./ui/overlays.js";
@@ -19,17 +18,19 @@ const BACKGROUND = "#16181d";
 const SHADOW = 0.55; // on a backdrop
 const PLAIN = { spread: 0, wireframe: false, effects: true, mode: "colour" };
 const FORWARDED = ["ready", "level", "frame", "play", "pause", "ended", "change", "camera-change", "error"];
-const OF_THE_VIEW = ["camera-orbit", "field-of-view", "auto-rotate", "disable-zoom"];
 
-export class FacefoldsPlayer extends HTMLElement {
+export class FacefoldsPlayer extends PlayerApi {
   static observedAttributes = [
     ...["src", "background", "shadow-intensity", "loop", "speed", "level", "still", "alt", "muted"],
+    ...["exposure", "reveal"],
     ...OF_THE_VIEW,
   ];
 
   #player = null;
   #given = null; // files that came without an address
   #state = {}; // what is to be applied when the first picture is there
+  #waits = false; // for `dismissPoster`
+  #dismissed = false;
   #resume = false; // it played when it was taken out of the document
   #settings = { background: BACKGROUND, ...PLAIN };
   #ends = []; // what is to be called when the player goes
@@ -63,7 +64,7 @@ export class FacefoldsPlayer extends HTMLElement {
   attributeChangedCallback(name, before, now) {
     if (!this.isConnected || before === now) return;
     if (name === "src") {
-      this.#given = null;
+      [this.#given, this.#dismissed] = [null, false];
       this.#begin();
     }
     if (name === "background") this.#paint(isBackground(now) ? now : BACKGROUND);
@@ -73,7 +74,9 @@ export class FacefoldsPlayer extends HTMLElement {
     if (name === "speed" && Number(now) > 0) this.speed = Number(now);
     if (name === "alt") this.#describe();
     if (name === "muted") this.muted = now !== "false";
-    if (OF_THE_VIEW.includes(name)) this.#turn(name);
+    if (name === "exposure") this.#player?.set("exposure", exposureOf(this));
+    if (name === "reveal" && this.#waits && now !== "manual") this.#begin();
+    if (OF_THE_VIEW.includes(name) && this.#player) applyToView(this, this.#player, name);
     if (name === "level" && this.ready) this.level = this.levels.includes(now) ? now : "auto";
   }
 
@@ -84,29 +87,35 @@ export class FacefoldsPlayer extends HTMLElement {
     if (canvas) canvas.ariaDescription = alt === null ? null : PICTURE;
   }
 
-  /** What attributes say of the view. @param {string} [changed] one of them; all otherwise */
-  #turn(changed) {
-    const { view } = this.#player ?? {};
-    if (!view) return;
-    const concerns = (...names) => !changed || names.includes(changed);
-    view.zooms = !this.hasAttribute("disable-zoom");
-    if (concerns("auto-rotate")) view.setRotation(this.hasAttribute("auto-rotate"));
-    if (concerns("camera-orbit", "field-of-view"))
-      this.#player.setFirst(
-        orbitOf(this.getAttribute("camera-orbit")),
-        fieldOfView(this.getAttribute("field-of-view")),
-      );
-  }
-
-  /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen. */
+  /** Loads, at once or (`loading="lazy"`) when it comes near to what is on the screen, or (`reveal="manual"`) when told. */
   #begin() {
     this.#stop();
-    if (this.getAttribute("loading") !== "lazy") return this.#start();
+    if (this.getAttribute("loading") !== "lazy") return this.#arrive();
+    this.#waitBare();
+    this.#ends.push(whenNear(this, () => this.#arrive()));
+  }
+
+  #arrive() {
+    if (this.getAttribute("reveal") !== "manual" || this.#dismissed) return this.#start();
+    this.#waitBare();
+    this.#waits = true;
+    const own = this.hasAttribute("poster") || this.querySelector('[slot="poster"]');
+    if (!own && this.hasAttribute("src")) new Overlays(this).standIn(this.#files());
+  }
+
+  /** Nothing is loaded: there is a poster at most. */
+  #waitBare() {
     this.shadowRoot.innerHTML = TEMPLATE;
+    this.shadowRoot.querySelector(".stage").classList.add("waits");
     showOwnPoster(this);
     this.#describe();
     this.#paint(this.getAttribute("background") ?? BACKGROUND);
-    this.#ends.push(whenNear(this, () => this.#start()));
+  }
+
+  /** With `reveal="manual"`: loads the asset, and shows it in the poster's place. */
+  dismissPoster() {
+    this.#dismissed = true;
+    if (this.#waits) this.#begin();
   }
 
   /** Loads the asset (again). */
@@ -151,7 +160,8 @@ export class FacefoldsPlayer extends HTMLElement {
     player.still = this.hasAttribute("still");
     player.mute(this.getAttribute("muted") !== "false");
     this.#describe();
-    this.#turn();
+    applyToView(this, player);
+    player.set("exposure", exposureOf(this));
     player.playback.speed = Number(this.getAttribute("speed")) || 1;
     const asked = this.getAttribute("background");
     this.#paint(isBackground(asked) ? asked : BACKGROUND);
@@ -193,6 +203,7 @@ export class FacefoldsPlayer extends HTMLElement {
   }
 
   #stop() {
+    this.#waits = false;
     for (const end of this.#ends.splice(0)) end();
     this.#recovery.stop();
     this.#player?.close();
@@ -211,83 +222,8 @@ export class FacefoldsPlayer extends HTMLElement {
     return this.#given === null;
   }
 
-  /** The engine behind the element, for programs that need more than the element offers; null before it is connected. */
   get player() {
     return this.#player;
-  }
-
-  get ready() {
-    return this.#player?.level != null;
-  }
-
-  get frame() {
-    return this.#player?.shown ?? -1;
-  }
-
-  get frames() {
-    return this.#player?.playback.frames ?? 0;
-  }
-
-  get fps() {
-    return this.#player?.playback.fps ?? 0;
-  }
-
-  get playing() {
-    return this.#player?.playing ?? false;
-  }
-
-  get loop() {
-    return this.#player?.playback.loop ?? true;
-  }
-
-  set loop(on) {
-    this.#playback("loop", Boolean(on));
-  }
-
-  /** Whether a head that moves is held still. */
-  get still() {
-    return this.#player?.still ?? this.hasAttribute("still");
-  }
-
-  set still(on) {
-    if (this.#player) this.#player.still = Boolean(on);
-  }
-
-  /** Whether the asset's sound is off; it is until somebody asks for it. */
-  get muted() {
-    return this.#player?.muted ?? this.getAttribute("muted") !== "false";
-  }
-
-  set muted(on) {
-    this.#player?.mute(Boolean(on));
-  }
-
-  /** Seconds of the sequence, at its own speed. */
-  get duration() {
-    return this.fps && this.frames / this.fps;
-  }
-
-  /** Seconds from the beginning to the frame shown; to set: shows the frame that is due then. */
-  get currentTime() {
-    return this.fps && Math.max(0, this.frame) / this.fps;
-  }
-
-  set currentTime(seconds) {
-    this.seek(Math.floor(seconds * this.fps + 1e-6));
-  }
-
-  get speed() {
-    return this.#player?.playback.speed ?? 1;
-  }
-
-  set speed(factor) {
-    if (factor > 0) this.#playback("speed", factor);
-  }
-
-  #playback(name, value) {
-    if (!this.#player) return;
-    this.#player.playback[name] = value;
-    this.#player.dispatchEvent(new Event("change"));
   }
 
   get background() {
@@ -309,6 +245,7 @@ export class FacefoldsPlayer extends HTMLElement {
     this.paint = painted(colours?.[0] ?? colour, stage);
     stage.style.backgroundImage = colours ? backdropImage(colour) : "";
     stage.classList.toggle("light", isLight(this.paint, this));
+    stage.classList.toggle("clear", this.paint[3] < 1);
     this.#player?.set("background", this.paint);
     this.#player?.set("backdrop", colours?.map(numbersOf) ?? null);
     const asked = parseFloat(this.getAttribute("shadow-intensity"));
@@ -356,56 +293,6 @@ export class FacefoldsPlayer extends HTMLElement {
     this.#player?.set(name, value);
   }
 
-  /** Which layers are drawn, outermost first. */
-  get layers() {
-    return this.#player?.visible.slice() ?? [];
-  }
-
-  set layers(visible) {
-    this.#player?.hide(visible.flatMap((on, i) => (on ? [] : [i])));
-  }
-
-  /** Name of the level that is shown; set to "auto", it follows what the machine can do. */
-  get level() {
-    return this.#player?.level?.info.name ?? "";
-  }
-
-  set level(name) {
-    this.#player?.detail.choose(name).catch((error) => this.#failed(error));
-  }
-
-  /** Names of the levels that this machine can show, coarsest first. */
-  get levels() {
-    return this.#player?.choices ?? [];
-  }
-
-  get statistics() {
-    return this.#player?.statistics;
-  }
-
-  play() {
-    this.#player?.play();
-  }
-
-  pause() {
-    this.#player?.pause();
-  }
-
-  /** @returns {Promise<boolean>} true when frame `k` has been drawn; false if another one was asked for meanwhile */
-  async seek(k) {
-    return (await this.#player?.seek(k)) ?? false;
-  }
-
-  /** Pauses, and moves by whole frames. */
-  async step(by = 1) {
-    return (await this.#player?.step(by)) ?? false;
-  }
-
-  resetView() {
-    this.comparison?.close();
-    this.#player?.view.reset();
-  }
-
   /** All settings and the view as they were at first; goes on playing or resting. */
   reset() {
     const asked = this.getAttribute("background");
@@ -416,65 +303,6 @@ export class FacefoldsPlayer extends HTMLElement {
     this.speed = Number(this.getAttribute("speed")) || 1;
     this.level = this.levels.includes(this.getAttribute("level")) ? this.getAttribute("level") : "auto";
     this.resetView();
-  }
-
-  /** @param {{K: number[][], w2c: number[][], width: number, height: number} | null} camera docs/reference/conventions.md; null: back to the orbit */
-  setCamera(camera) {
-    this.#player?.view.setExact(camera);
-  }
-
-  /** @param {object} [camera] as for `setCamera` @returns {ImageData} the frame shown, as drawn */
-  capture(camera) {
-    if (!this.#player) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
-    return this.#player.capture(camera);
-  }
-
-  /** @param {object} [camera] as for `setCamera` @returns {Promise<Blob>} the same as a PNG */
-  async screenshot(camera) {
-    return asFile(this.capture(camera));
-  }
-
-  /**
-   * What lies at a place of the window, for `data-surface` of a hotspot. @param {number} x @param {number} y CSS pixels, as
-   * `clientX` and `clientY` of an event @returns {string | null} u, v and depth; null: nothing is there
-   */
-  surfaceFromPoint(x, y) {
-    if (!this.ready) return null;
-    const { left, top, width, height } = this.#player.canvas.getBoundingClientRect();
-    const found = surfaceUnder(this.#player, [(2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height]);
-    if (!found) return null;
-    const deep = found.layer / Math.max(1, this.layers.length - 1);
-    return [...found.place, deep].map((number) => number.toFixed(4)).join(" ");
-  }
-
-  /** What is seen, as a file. @param {{mimeType?: string, qualityArgument?: number}} [options] by default a PNG */
-  async toBlob({ mimeType: type, qualityArgument: quality } = {}) {
-    return asFile(this.capture(), { type, quality });
-  }
-
-  /**
-   * Makes a film of one turn from side to side. @param {import("./recording.js").Wanted} [options]
-   * @returns {Promise<Blob>} MP4 or WebM
-   */
-  async record(options) {
-    if (!this.ready) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
-    const { recordTurn } = await import("./recording.js");
-    return recordTurn(this.#player, options);
-  }
-
-  /** Shows held-out photo `index` beside the asset, from the photo's camera and frame; null: closes. */
-  compare(index) {
-    return index === null ? this.comparison?.close() : this.comparison?.open(index);
-  }
-
-  /** Whether the device can show the head in the room around (WebXR); known some time after `ready`. */
-  get canActivateAR() {
-    return this.ready && !this.shadowRoot.querySelector('[data-do="ar"]').hidden;
-  }
-
-  /** Shows the head in the room, or ends that; after a click only, as browsers ask. */
-  async activateAR() {
-    await this.actions?.ar();
   }
 
   /** To set, parts are enough, also of the view. @returns {import("./viewstate.js").ViewState} */
@@ -511,9 +339,6 @@ export class FacefoldsPlayer extends HTMLElement {
       this.seek(frame);
     }
   }
-
-  /** @returns {string} address of the full-page player with this asset and this view */
-  get link() {
-    return linkTo(this);
-  }
 }
+
+reflect(FacefoldsPlayer.prototype);

@@ -48,7 +48,7 @@ export function connectGestures(surface, view) {
     const [dx, dy] = [event.clientX - held.x, event.clientY - held.y];
     Object.assign(held, spot(event));
     if (pointers.size === 1) {
-      if (held.pans) view.pan(dx, dy);
+      if (held.pans && view.pans) view.pan(dx, dy);
       else view.turn(dx / surface.clientHeight, dy / surface.clientHeight);
     } else if (pointers.size === 2) {
       const after = [...pointers.values()];

@@ -10,6 +10,7 @@ const KEPT = 0.8; // of the range that was filmed
 const NEAR = 4; // degrees: so far from a camera, or from where all of them stood, a picture is as good
 const SOFT = 22; // degrees that a movement can be pushed beyond at most
 const FAINTEST = 0.06;
+const HEMS = { over: 4, from: 26, back: 100 }; // degrees: of the view until they have gone; beyond the outermost camera; at least
 const ROUND = 300; // degrees: cameras that go round so far have filmed from everywhere
 
 /**
@@ -27,6 +28,20 @@ export function bounded(range) {
   return {
     azimuth: round ? all : range.good ? azimuth : kept(azimuth),
     elevation: [Math.max(-89, low), Math.min(89, high)],
+  };
+}
+
+/**
+ * What of a range a page allows. @param {Range} range
+ * @param {import("./view.js").Allowed} allowed least and most; from above is the least
+ * @returns {Range} as it was in a direction that the page leaves nothing of
+ */
+export function narrowed(range, [least, most]) {
+  const both = ([low, high], from = -Infinity, to = Infinity) =>
+    Math.max(low, from) <= Math.min(high, to) ? [Math.max(low, from), Math.min(high, to)] : [low, high];
+  return {
+    azimuth: both(range.azimuth, least.azimuth, most.azimuth),
+    elevation: both(range.elevation, most.elevation, least.elevation),
   };
 }
 
@@ -54,6 +69,26 @@ export function strength({ azimuth, elevation }, range) {
   );
   const t = Math.min(1, beyond / SOFT);
   return 1 - (1 - FAINTEST) * t * t * (3 - 2 * t);
+}
+
+/**
+ * What fades where the view is further round than it is good, or than any camera stood: there the back of the head comes into
+ * sight, which the cameras saw aslant at best, and which ends in a hard edge.
+ * @typedef {{side: number, from: number}} Hems to the subject's left (1) or right (-1); radians about the upright axis
+ * @param {number} azimuth of the view @param {Filmed | null} filmed @param {Range} range its good part
+ * @returns {Hems | null} null: nothing does
+ */
+export function hemsFrom(azimuth, filmed, range) {
+  if (!filmed || !Number.isFinite(range.azimuth[0])) return null;
+  const seen = unwound(azimuth, range.azimuth);
+  const [right, left] = [-1, 1].map((side, i) => {
+    const [filmedSo, goodSo] = [side * filmed.azimuth[i], side * range.azimuth[i]];
+    const t = clamp((side * seen - Math.min(filmedSo, goodSo)) / HEMS.over, [0, 1]);
+    const from = Math.min(180, Math.max(HEMS.back, filmedSo + HEMS.from));
+    return { side, t, from: ((180 + t * t * (3 - 2 * t) * (from - 180)) * Math.PI) / 180 };
+  });
+  const { t, ...hems } = right.t > left.t ? right : left;
+  return t > 0 ? hems : null;
 }
 
 /** The same direction, as near to the middle of the range as whole turns allow. */

@@ -5,21 +5,21 @@
  * "camera-change", "error".
  */
 import { Adaptation } from "./adapt.js";
-import { startDecoder, weight } from "./draco/decoder.js";
+import { Apart } from "./apart.js";
+import { watchContext } from "./context.js";
+import { startDecoder } from "./draco/decoder.js";
 import { PlayerError } from "./errors.js";
 import { LevelChoice } from "./levelchoice.js";
-import { gpuBytes } from "./levels.js";
 import { parseManifest } from "./manifest.js";
 import { Playback } from "./playback.js";
 import { LayerRenderer } from "./renderer.js";
 import { Sound } from "./sound.js";
+import { statisticsOf } from "./statistics.js";
 import { matrixOf, readPoses } from "./track.js";
 import { View } from "./view.js";
 
 const LONGEST_STEP = 0.25; // s: after a pause of the page (hidden tab), time does not jump
 const SMOOTH = 1 / 30; // s that a picture may take while anything moves
-const ASIDE = { azimuth: 42, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
-const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
 const RATE_OVER = 1000; // ms that the frames a second are counted over
 const SETTERS = {
   wireframe: "setWireframe",
@@ -27,6 +27,7 @@ const SETTERS = {
   background: "setBackground",
   backdrop: "setBackdrop",
   shadow: "setShadow",
+  exposure: "setExposure",
   mode: "setKind",
 };
 
@@ -53,14 +54,14 @@ export class Player extends EventTarget {
     this.hidden = new Set(); // indices of layers that are not drawn; kept from level to level
     this.visible = [];
     this.drawn = []; // times of the last pictures
-    this.together = null; // the view before the layers were pulled apart
+    this.apart = new Apart(this);
     this.size = [0, 0];
     this.haste = new Adaptation();
     this.late = false; // pictures came late: what moves is drawn with one ray a pixel
     this.drew = false; // in the last animation frame
     this.busy = 0; // s that the last picture took of the page's thread
     this.request = 0; // of an animation frame; 0: none, nothing moves
-    this.#watchContext();
+    this.listening = watchContext(this);
   }
 
   /**
@@ -102,9 +103,9 @@ export class Player extends EventTarget {
     this.say("change");
   }
 
-  /** Where the first view is from. @param {object} orbit @param {number} field see `View.setFirst` */
-  setFirst(orbit, field) {
-    this.view.setFirst(orbit, field);
+  /** Where the first view is from. @param {object} first @param {number} field see `View.setFirst` */
+  setFirst(first, field) {
+    this.view.setFirst(first, field);
     if (this.home) this.view.setHome(this.home);
   }
 
@@ -185,7 +186,7 @@ export class Player extends EventTarget {
   hide(indices) {
     this.hidden = new Set(indices);
     this.#showLayers();
-    this.#changed();
+    this.changed();
   }
 
   #showLayers() {
@@ -196,23 +197,12 @@ export class Player extends EventTarget {
   /** @param {keyof typeof SETTERS} name */
   set(name, value) {
     this.renderer[SETTERS[name]](value);
-    this.#changed();
+    this.changed();
   }
 
-  /** Pulls the layers apart, and turns aside so that all are seen and fill the canvas; at 0 goes back. */
+  /** Pulls the layers apart, 0 to 1. */
   pullApart(amount) {
-    if (!this.level) return;
-    const { view, renderer } = this;
-    if (amount && !this.together) this.together = { orbit: view.get(), atHome: view.atHome };
-    renderer.setSpread(amount);
-    if (view.free !== amount > 0) view.setFree(amount > 0);
-    if (amount) view.frame(renderer.bounds(), this.size[0] > this.size[1] ? ASIDE : ACROSS);
-    else if (this.together) {
-      view.glide(this.together.orbit);
-      view.atHome = this.together.atHome;
-      this.together = null;
-    }
-    this.#changed();
+    if (this.level) this.apart.pull(amount);
   }
 
   /** @param {number} inset CSS pixels at the lower edge that controls cover */
@@ -256,28 +246,12 @@ export class Player extends EventTarget {
     if (!this.level) throw new PlayerError("Nothing has been loaded yet", { kind: "missing" });
     const [width, height] = camera ? [camera.width, camera.height] : this.size;
     const { projection, view } = this.view.matrices(width, height, this.renderer.bounds(), camera);
+    this.renderer.setHems(camera ? null : this.view.hems);
     return this.renderer.capture(projection, view, width, height);
   }
 
   get statistics() {
-    const info = this.level?.info;
-    const [width, height] = this.size;
-    const { side, graphics } = this.renderer;
-    const { width: across, height: tall } = graphics.finer || { width: 0, height: 0 };
-    return {
-      fps: this.drawn.length > 1 ? ((this.drawn.length - 1) * 1000) / (this.drawn.at(-1) - this.drawn[0]) : 0,
-      layers: info?.layers.length ?? 0,
-      triangles: info?.layers.reduce((sum, layer, i) => sum + (this.visible[i] ? layer.triangles : 0), 0) ?? 0,
-      bytesLoaded: (this.files?.loaded ?? 0) + weight.loaded,
-      // Canvases: two of colour, one of depth. The finer picture, which all players share, has colour and depth.
-      gpuBytes: this.level ? gpuBytes(this.level) + 12 * width * height + 8 * across * tall : 0,
-      level: info?.name ?? "",
-      texture: info ? [info.texture.width, info.texture.height] : [0, 0],
-      canvas: [width, height],
-      rays: side * side,
-      video: this.level?.video.codec ?? "",
-      decoder: this.level?.source.kind ?? "",
-    };
+    return statisticsOf(this);
   }
 
   close() {
@@ -346,6 +320,7 @@ export class Player extends EventTarget {
   /** While a headset asks for the pictures, the page's own rest. */
   setImmersed(on) {
     this.immersed = on;
+    this.renderer.setHems(null);
     cancelAnimationFrame(this.request);
     this.request = 0;
     if (!on) this.invalidate();
@@ -400,6 +375,7 @@ export class Player extends EventTarget {
   draw(moves = this.playing) {
     if (this.lost || !this.size[0]) return;
     const { projection, view } = this.view.matrices(...this.size, this.renderer.bounds());
+    this.renderer.setHems(this.view.hems);
     this.renderer.draw(projection, view, this.view.strength, this.late && moves);
     this.stale = false;
     this.drawn.push(performance.now());
@@ -423,35 +399,13 @@ export class Player extends EventTarget {
 
   set still(on) {
     this.held = on;
-    if (this.manifest) this.#place();
+    if (!this.manifest) return;
+    this.#place();
+    this.wake();
   }
 
-  #watchContext() {
-    this.listening = new AbortController();
-    const { signal } = this.listening;
-    const { graphics } = this.renderer;
-    this.lost = graphics.lost;
-    const lost = () => {
-      this.lost = true;
-      this.fail(
-        new PlayerError("The graphics context was lost", {
-          kind: "lost",
-          remedy: "The player goes on by itself when the machine gives it back. If it does not, load the page again.",
-        }),
-      );
-    };
-    const restored = async () => {
-      this.lost = false;
-      this.renderer.restore();
-      if (this.level && !(await this.seek(this.playback.frame))) return;
-      this.say("restored");
-      this.wake();
-    };
-    graphics.addEventListener("lost", lost, { signal });
-    graphics.addEventListener("restored", restored, { signal });
-  }
-
-  #changed() {
+  /** A setting is another. */
+  changed() {
     this.invalidate();
     this.say("change");
   }

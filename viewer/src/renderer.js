@@ -35,6 +35,8 @@ export class LayerRenderer {
     this.background = [0, 0, 0, 1];
     this.backdrop = null; // colours at its middle and corners, before the background
     this.shadow = 0;
+    this.exposure = 1;
+    this.hems = null;
     this.side = 1; // rays along each side of a pixel of the last picture
   }
 
@@ -55,6 +57,16 @@ export class LayerRenderer {
   /** @param {number} intensity of the shadow on the floor, 0 to 1 */
   setShadow(intensity) {
     this.shadow = intensity;
+  }
+
+  /** @param {number} factor of the layers' light */
+  setExposure(factor) {
+    this.exposure = factor;
+  }
+
+  /** What fades where the view is beyond what was filmed. @param {import("./limits.js").Hems | null} hems null: nothing */
+  setHems(hems) {
+    this.hems = hems;
   }
 
   /** Shows another level from the next picture on. @param {import("./levels.js").LoadedLevel} level */
@@ -283,6 +295,11 @@ export class LayerRenderer {
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
+    gl.uniform1f(at.exposure, this.exposure);
+    const { side, from } = this.hems ?? { side: 1, from: Math.PI };
+    gl.uniform2f(at.axis, ...this.bounds().centre.slice(0, 2));
+    gl.uniform1f(at.side, side);
+    gl.uniform1f(at.hems, from);
     gl.uniform1i(at.kind, KINDS.indexOf(this.kind));
     gl.uniform2f(at.range, ...(this.range ?? this.#wholeRange(eye)));
     if (upload.reflection) {

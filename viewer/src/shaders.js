@@ -33,6 +33,10 @@ uniform vec4 colourRect; // x, y, w, h of this layer's colour in the picture, pi
 uniform vec2 alphaOffset; // from its colour to its alpha
 uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 uniform int kind; // of KINDS
+uniform float exposure; // factor of the light
+uniform vec2 axis; // x, y of the upright line about which hems are told by their direction
+uniform float hems; // from how far round layers fade, radians
+uniform float side; // on the subject's left (1) or right (-1)
 uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
 #ifdef REFLECTION
 uniform sampler2D reflection;
@@ -70,12 +74,23 @@ vec3 reflected() {
 }
 #endif
 
+// Stored values are sRGB's: to light and back.
+vec3 exposed(vec3 stored) {
+  vec3 light = exposure * mix(stored / 12.92, pow((stored + 0.055) / 1.055, vec3(2.4)), step(0.04045, stored));
+  return min(mix(12.92 * light, 1.055 * pow(light, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, light)), 1.0);
+}
+
 void main() {
   vec3 colour = look(picture, colourRect, vec2(0.0)).rgb;
   float alpha = look(picture, colourRect, alphaOffset).r;
 #ifdef REFLECTION
   colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif
+  if (exposure != 1.0) colour = exposed(colour);
+  if (hems < 3.14) {
+    vec2 off = point.xy - axis;
+    alpha *= smoothstep(hems + 0.5, hems, side * atan(off.y, off.x));
+  }
   if (kind == 1) colour = vec3(1.0);
   if (kind == 2) colour = vec3(1.0 - clamp((distance(eye, point) - range.x) / (range.y - range.x), 0.0, 1.0));
   if (kind == 3) colour = vec3(st, 0.35);

@@ -55,13 +55,13 @@ export function projected(m, [x, y, z]) {
   return [a / w, b / w, w];
 }
 
-/** The place of a layer that is nearest where it is drawn at (x, y) of clip space. @returns {number[] | null} u, v */
-function placeUnder(geometry, [u0, u1, v0, v1], matrix, at) {
+/** What of a layer is nearest where it is drawn at (x, y) of clip space. @returns {{place: number[], point: number[]} | null} */
+function nearestUnder(geometry, [u0, u1, v0, v1], matrix, at) {
   const { position, uv } = geometry;
   const seen = Array.from({ length: position.length / 3 }, (_, k) =>
     projected(matrix, position.subarray(3 * k, 3 * k + 3)),
   );
-  let [nearest, place] = [Infinity, null];
+  let [nearest, hit] = [Infinity, null];
   eachTriangle(
     geometry,
     (k) => seen[k],
@@ -71,18 +71,26 @@ function placeUnder(geometry, [u0, u1, v0, v1], matrix, at) {
       const away = 1 / inverse.reduce((sum, one) => sum + one);
       if (away < 0 || away > nearest) return;
       nearest = away;
-      const st = corners.map((k) => [uv[2 * k], uv[2 * k + 1]]);
-      const [s, t] = mixed(inverse.map((one) => one * away), st); // prettier-ignore
-      place = [u1 - t * (u1 - u0), v0 + s * (v1 - v0)];
+      const parts = inverse.map((one) => one * away);
+      const [s, t] = mixed(parts, corners.map((k) => [uv[2 * k], uv[2 * k + 1]])); // prettier-ignore
+      const point = mixed(parts, corners.map((k) => [...position.subarray(3 * k, 3 * k + 3)])); // prettier-ignore
+      hit = { place: [u1 - t * (u1 - u0), v0 + s * (v1 - v0)], point };
     },
   );
-  return place;
+  return hit;
+}
+
+/** Of the window, to clip space. @param {HTMLElement} canvas @returns {number[]} */
+export function clipOf(canvas, clientX, clientY) {
+  const { left, top, width, height } = canvas.getBoundingClientRect();
+  return [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
 }
 
 /**
  * What lies under a pixel: the layer at which half of the light from behind is stopped, and the place on it.
  * @param {import("./player.js").Player} player @param {number[]} at x, y of clip space
- * @returns {{place: number[], layer: number} | null} null: nothing is there that hides more than half
+ * @returns {{place: number[], point: number[], layer: number} | null} u, v, and in space, in the meshes' own axes; null:
+ * nothing is there that hides more than half
  */
 export function surfaceUnder(player, at) {
   const { renderer, level, size } = player;
@@ -101,6 +109,6 @@ export function surfaceUnder(player, at) {
   renderer.setVisible(visible);
   if (layer === visible.length) return null;
   const matrix = multiplied(projection, renderer.pose ? multiplied(view, renderer.pose) : view);
-  const place = placeUnder(level.geometries[layer], level.info.layers[layer].window, matrix, at);
-  return place && { place, layer };
+  const hit = nearestUnder(level.geometries[layer], level.info.layers[layer].window, matrix, at);
+  return hit && { ...hit, layer };
 }

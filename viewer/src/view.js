@@ -1,9 +1,10 @@
 /** The eye: an orbit by mouse, touch and keys, or for a while an exact camera of a capture. */
 import { FIELD_OF_VIEW } from "./attributes.js";
-import { axesOf, orbitView, projectionOf, viewOf } from "./camera.js";
+import { axesOf, framing, orbitView, projectionOf, viewOf } from "./camera.js";
 import { connectGestures } from "./gestures.js";
-import { bounded, clamp, resisted, strength, unwound } from "./limits.js";
+import { bounded, clamp, hemsFrom, narrowed, resisted, strength, unwound } from "./limits.js";
 import { transformed } from "./matrices.js";
+import { roundAndRound, toAndFro } from "./sway.js";
 
 const FILLED = 0.92; // of the free part of the canvas, by what there is; facefolds_core/packaging/poster.py has it, too
 const halfOf = (degrees) => Math.tan((degrees / 360) * Math.PI);
@@ -13,6 +14,8 @@ const FAINT = 0.9; // strength of the picture below which it is told why
 const LARGEST = 6; // pixels of the canvas that a texel takes when one has come as near as one can
 const SWAY = { degrees: 5, seconds: 9 }; // to each side; there and back
 const ROTATION = { degrees: 25, seconds: 20, speed: 12, patience: 3000 }; // degrees a second all round; ms after a touch
+
+/** @typedef {[import("./attributes.js").Asked, import("./attributes.js").Asked]} Allowed */
 
 export class View {
   /** @param {HTMLElement} surface that takes the pointer @param {() => void} onChange a picture is due */
@@ -26,7 +29,10 @@ export class View {
     this.home = null;
     this.atHome = true; // nobody has moved it: it is fitted again when the canvas changes
     this.framed = null; // arguments of `frame`
-    this.range = bounded(null);
+    this.range = bounded(null); // from where the picture is good
+    this.reach = this.range; // of that, what the page allows
+    this.allowed = [{}, {}]; // least and most, as the page says
+    this.whole = 2; // distance from where all is seen
     this.filmed = null; // of the manifest
     this.front = 0; // units from the middle of what there is to its front
     this.detail = Infinity; // texels that a unit of the scene has at most
@@ -37,6 +43,7 @@ export class View {
     this.swaying = 0; // s since it began; 0: still
     this.rotates = false; // it sways wider, also at rest, and again after a touch
     this.zooms = true; // by wheel, pinch and keys
+    this.pans = true; // what is looked at can be moved
     this.half = halfOf(FIELD_OF_VIEW); // tangent of half the field of view
     this.first = {}; // what the page asks of the first view
     this.eases = !matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -53,6 +60,7 @@ export class View {
   setFree(free) {
     this.free = free;
     this.range = bounded(free ? null : this.filmed);
+    this.reach = free ? this.range : narrowed(this.range, this.allowed);
     if (!free) this.#aim(this.goal);
     this.onChange();
   }
@@ -103,21 +111,22 @@ export class View {
   /** Degrees; it begins gently, and goes no further than the picture is good. */
   #sway() {
     if (!this.swaying) return 0;
-    const { azimuth } = this.range;
-    if (this.rotates && azimuth[1] === Infinity) {
-      const { swaying } = this;
-      return ROTATION.speed * (swaying < 2 ? swaying ** 2 / 4 : swaying - 1);
-    }
-    const { degrees, seconds } = this.rotates ? ROTATION : SWAY;
-    const part = Math.min(1, this.swaying / 2) * Math.sin((2 * Math.PI * this.swaying) / seconds);
-    const room = part > 0 ? azimuth[1] - this.now.azimuth : this.now.azimuth - azimuth[0];
-    return part * Math.max(0, Math.min(degrees, room));
+    const { azimuth } = this.reach;
+    if (this.rotates && azimuth[1] === Infinity) return roundAndRound(this.swaying, ROTATION.speed);
+    const room = [this.now.azimuth - azimuth[0], azimuth[1] - this.now.azimuth];
+    return toAndFro(this.swaying, this.rotates ? ROTATION : SWAY, room);
   }
 
-  /** @param {ReturnType<typeof import("./attributes.js").orbitOf>} orbit @param {number} field of view, degrees */
-  setFirst(orbit, field) {
-    [this.first, this.half] = [orbit, halfOf(field)];
+  /** @param {import("./attributes.js").Asked} first @param {number} field of view, degrees */
+  setFirst(first, field) {
+    [this.first, this.half] = [first, halfOf(field)];
     this.atHome = true;
+  }
+
+  /** How far the page lets it be moved. @param {Allowed} allowed least and most */
+  setAllowed(allowed) {
+    this.allowed = allowed;
+    this.setFree(this.free);
   }
 
   /**
@@ -127,9 +136,10 @@ export class View {
     this.shape = [high[1] - low[1], high[2] - low[2]];
     this.front = high[0] - centre[0];
     const away = this.#distanceFor(...this.shape);
-    const distance = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
-    const { share = 1, ...first } = this.first;
-    this.home = { azimuth: 0, elevation: 0, distance: share * distance, target: [...centre], ...first };
+    this.whole = clamp(away + 0.5 * (high[0] - centre[0]), DISTANCES);
+    const { share = 1, target = [], ...first } = this.first;
+    const looked = centre.map((v, i) => target[i] ?? v);
+    this.home = { azimuth: 0, elevation: 0, distance: share * this.whole, ...first, target: looked };
     if (!this.atHome || this.exact) return;
     const { swaying } = this;
     this.reset();
@@ -148,29 +158,9 @@ export class View {
    * @param {{low: number[], high: number[]}} box @param {{azimuth: number, elevation: number}} direction
    */
   frame({ low, high }, direction) {
-    const { right, up, back } = axesOf(direction);
-    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [0, 1, 2].map((i) => ((k >> i) & 1 ? high[i] : low[i])));
-    const along = (axis) => corners.map((corner) => corner.reduce((sum, v, i) => sum + v * axis[i], 0));
-    const towards = along(back);
-    const middle = (Math.min(...towards) + Math.max(...towards)) / 2;
-    // A corner at r along the picture and b towards the eye is inside where |r - t| <= slope * (distance - b).
-    const distanceOf = (axis, pixels) => {
-      const slope = (this.half * FILLED * pixels) / this.#side();
-      const end = (sign) => Math.max(...along(axis).map((r, i) => sign * r + slope * (towards[i] - middle)));
-      return (end(1) + end(-1)) / 2 / slope;
-    };
     const [width, height] = this.#room();
-    const distance = Math.max(distanceOf(right, width), distanceOf(up, height));
-    const centred = (axis) => {
-      let t = 0;
-      for (let k = 0; k < 8; ++k) {
-        const seen = along(axis).map((r, i) => (r - t) / (distance + middle - towards[i]));
-        t += ((Math.min(...seen) + Math.max(...seen)) / 2) * distance;
-      }
-      return t;
-    };
-    const [x, y] = [centred(right), centred(up)];
-    const target = back.map((v, i) => middle * v + x * right[i] + y * up[i]);
+    const slope = (this.half * FILLED) / this.#side();
+    const { distance, target } = framing({ low, high }, direction, [slope * width, slope * height]);
     this.glide({ ...direction, distance, target });
     this.framed = [{ low, high }, direction];
   }
@@ -202,8 +192,8 @@ export class View {
   }
 
   #aim(orbit) {
-    const azimuth = clamp(unwound(orbit.azimuth, this.range.azimuth), this.range.azimuth);
-    const elevation = clamp(orbit.elevation, this.range.elevation);
+    const azimuth = clamp(unwound(orbit.azimuth, this.reach.azimuth), this.reach.azimuth);
+    const elevation = clamp(orbit.elevation, this.reach.elevation);
     const distance = clamp(orbit.distance, this.#distances());
     this.goal = { azimuth, elevation, distance, target: [...orbit.target] };
     if (Math.abs(azimuth - this.now.azimuth) > 180)
@@ -213,7 +203,10 @@ export class View {
   /** As near as there is detail to be seen, but twice as near as the first view at least. */
   #distances() {
     const detailed = this.front + this.#side() / (2 * this.half * LARGEST * this.detail);
-    return [Math.max(DISTANCES[0], Math.min(detailed, (this.home?.distance ?? Infinity) / 2)), DISTANCES[1]];
+    const nearest = Math.max(DISTANCES[0], Math.min(detailed, (this.home?.distance ?? Infinity) / 2));
+    if (this.free) return [nearest, DISTANCES[1]];
+    const [least, most] = this.allowed.map(({ distance, share }) => distance ?? share * this.whole); // NaN: as it is
+    return [Math.max(nearest, least || 0), Math.max(nearest, Math.min(DISTANCES[1], most || Infinity))];
   }
 
   /** Somebody has moved the view: it stays as it is from now on. */
@@ -241,8 +234,14 @@ export class View {
     this.pushed ??= { azimuth: this.goal.azimuth, elevation: this.goal.elevation };
     this.pushed.azimuth -= 250 * dx;
     this.pushed.elevation += 250 * dy;
-    this.goal.azimuth = resisted(this.pushed.azimuth, this.range.azimuth);
-    this.goal.elevation = clamp(resisted(this.pushed.elevation, this.range.elevation), [-89, 89]);
+    const { reach, range, pushed } = this;
+    for (const angle of ["azimuth", "elevation"]) {
+      // Where the page's limit is the nearer one, the movement ends there; beyond what is good it meets resistance.
+      const ends = reach[angle].map((end, i) => (end === range[angle][i] ? (i ? Infinity : -Infinity) : end));
+      pushed[angle] = clamp(pushed[angle], ends);
+      this.goal[angle] = resisted(pushed[angle], range[angle]);
+    }
+    this.goal.elevation = clamp(this.goal.elevation, [-89, 89]);
     if (strength(this.goal, this.range) < FAINT) this.surface.dispatchEvent(new Event("limit"));
     this.onChange();
   }
@@ -256,6 +255,7 @@ export class View {
 
   /** Moves what is looked at along the picture, by CSS pixels. */
   pan(dx, dy) {
+    if (!this.pans) return;
     this.touched();
     const unit = this.#unit();
     const { right, up } = axesOf(this.goal);
@@ -271,7 +271,7 @@ export class View {
     this.goal.distance = clamp(this.goal.distance * factor, this.#distances());
     const change = before - this.#unit();
     const { right, up } = axesOf(this.goal);
-    this.goal.target = this.goal.target.map((v, i) => v + change * (x * right[i] - y * up[i]));
+    if (this.pans) this.goal.target = this.goal.target.map((v, i) => v + change * (x * right[i] - y * up[i]));
     this.onChange();
   }
 
@@ -306,6 +306,11 @@ export class View {
   /** How strong the picture is: less where nothing was filmed. */
   get strength() {
     return this.exact ? 1 : strength({ ...this.now, azimuth: this.now.azimuth + this.#sway() }, this.range);
+  }
+
+  /** What fades of what lies far round; nothing from an exact camera. */
+  get hems() {
+    return this.exact || this.free ? null : hemsFrom(this.now.azimuth + this.#sway(), this.filmed, this.range);
   }
 
   /**

@@ -1,4 +1,6 @@
 /** All controls of the player, put together; what they need of the element's size and gestures. */
+import { IDENTITY, transformed } from "../matrices.js";
+import { clipOf, surfaceUnder } from "../surface.js";
 import { connectBar } from "./bar.js";
 import { Comparison } from "./compare.js";
 import { connectEmbed } from "./embed.js";
@@ -51,7 +53,20 @@ function connectGesturesOf(element) {
   };
   tell("unwanted-wheel", "Ctrl + wheel zooms, or click first");
   if (element.getAttribute("interaction-prompt") === "auto") prompt(element);
+  player.canvas.addEventListener("dblclick", ({ clientX, clientY }) => {
+    if (!element.hasAttribute("disable-tap") && element.ready)
+      recentre(player, clipOf(player.canvas, clientX, clientY));
+  });
   tell("limit", "Cameras saw too little from further round");
+}
+
+/** Brings a place of the head to the middle; beside the head, the first view comes back. */
+function recentre(player, at) {
+  const { view, renderer } = player;
+  if (view.exact || view.free) return;
+  const hit = surfaceUnder(player, at);
+  view.glide(hit ? { target: transformed(renderer.pose ?? IDENTITY, hit.point) } : view.home);
+  view.atHome = !hit;
 }
 
 /** Says what one can do, where nobody has done it yet. */

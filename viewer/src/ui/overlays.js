@@ -84,18 +84,19 @@ export class Overlays {
     }
   }
 
-  /** Where nothing can be drawn: the poster, and below it why. @param {import("../files.js").Files} files */
+  /** Where nothing is drawn: the poster, and below it why, if that was said. @param {import("../files.js").Files} files */
   async standIn(files) {
+    const stage = this.find(".stage");
+    const poster = this.find(".poster");
     try {
-      const { poster } = parseManifest(await files.text("manifest.json"), files.address("manifest.json"));
-      if (poster) await this.#showPoster(poster, files);
+      const { poster: entry } = parseManifest(await files.text("manifest.json"), files.address("manifest.json"));
+      if (entry && stage.isConnected) await this.#showPoster(entry, files);
     } catch {
       return; // what was said stays
     }
-    const poster = this.find(".poster");
     if (poster.src)
       [poster.hidden, poster.alt] = [false, this.element.getAttribute("alt") ?? "The subject, from the front"];
-    this.find(".stage").classList.toggle("still", !poster.hidden);
+    stage.classList.toggle("still", !poster.hidden);
   }
 
   /** Where the first picture will show the same; one that would show something else is not shown. */
@@ -106,7 +107,8 @@ export class Overlays {
     const { style } = this.find(".poster");
     const place = camera && player.view.placeOf(camera);
     const same = camera?.background.every((v, i) => Math.abs(v - element.paint[i]) < 0.01) && element.paint[3] === 1;
-    const plain = Object.keys(element.state).every((key) => key === "frame") && !element.state.frame;
+    const plain =
+      element.exposure === 1 && Object.keys(element.state).every((key) => key === "frame") && !element.state.frame;
     this.find(".poster").hidden = Boolean(camera) && !(place && same && plain);
     if (!place) return;
     const ratio = player.size[0] / player.canvas.clientWidth;

@@ -1,0 +1,27 @@
+/** The layers pulled apart, and the view that shows all of them. */
+
+const ASIDE = { azimuth: 42, elevation: 8 }; // degrees: from where layers that are pulled apart are seen
+const ACROSS = { azimuth: 28, elevation: 26 }; // the same where the canvas is tall: their row goes up the picture
+
+export class Apart {
+  /** @param {import("./player.js").Player} player */
+  constructor(player) {
+    this.player = player;
+    this.together = null; // the view before
+  }
+
+  /** Pulls the layers apart, and turns aside so that all are seen and fill the canvas; at 0 goes back. */
+  pull(amount) {
+    const { view, renderer, size } = this.player;
+    if (amount && !this.together) this.together = { orbit: view.get(), atHome: view.atHome };
+    renderer.setSpread(amount);
+    if (view.free !== amount > 0) view.setFree(amount > 0);
+    if (amount) view.frame(renderer.bounds(), size[0] > size[1] ? ASIDE : ACROSS);
+    else if (this.together) {
+      view.glide(this.together.orbit);
+      view.atHome = this.together.atHome;
+      this.together = null;
+    }
+    this.player.changed();
+  }
+}
