@@ -62,7 +62,7 @@ WORDS = {
     "middle_from_volume": "middle radius: where half of the subject's opacity is reached from outside",
     "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the subject lies over {reach} "
     "outside it",
-    "offsets_chosen": "{layers} layers, at even shares of the opacity along each ray, {gap:.4f} or more apart",
+    "halfwidth_chosen": "halfwidth: {least}, more where the subject is blurred or far from the middle, at most {most}",
     "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
     "resolution_chosen": "{what}: auto took {chosen} of {tried}: {below:.2f} dB below the best of them on {views} "
     "views of cameras of the split {split}, {to_finest:.1f} dB to the finest one's pictures",

@@ -26,36 +26,36 @@ MARGIN = 0.01
 
 
 class RadialManifolds(nn.Module):
-    """rho_1 > ... > rho_N at each node.
+    """rho_i = middle + halfwidth * o_i, with o_1..o_N falling evenly from 1 to -1 (0 if N = 1): nested by construction.
 
-    The maps are grids over the window whose nodes include its borders: node (0, 0) is at (u1, v0), the top left corner
-    as seen from the front, and values between nodes are bilinear, so that layers nested at the nodes are nested.
-    Outside the window there is no surface. Unlike the MLP's level sets a layer is met from either side: a ray may pass
-    the window's edge and see it from behind, as it would see the exported mesh.
+    Both maps are grids over the window whose nodes include its borders: node (0, 0) is at (u1, v0), the top left corner
+    as seen from the front, and values between nodes are bilinear. Outside the window there is no surface. Unlike the
+    MLP's level sets a layer is met from either side: a ray may pass the window's edge and see it from behind, as it
+    would see the exported mesh.
 
     Args:
         chart: where (u, v) and radii lie.
         window: (u0, u1, v0, v1).
-        radii: [rows, columns, N], outermost first, units.
+        middle: [rows, columns] radii, units.
+        halfwidth: [rows, columns], positive, units.
+        num_layers: N.
     """
 
     centre: Tensor
 
-    def __init__(self, chart: Chart, window: Window, radii: Tensor) -> None:
+    def __init__(self, chart: Chart, window: Window, middle: Tensor, halfwidth: Tensor, num_layers: int) -> None:
         super().__init__()
         self.chart = chart
         self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
         self.window = window
-        self.radii = nn.Parameter(radii.clone())
-
-    @property
-    def num_layers(self) -> int:
-        return self.radii.shape[-1]
+        self.num_layers = num_layers
+        self.middle = nn.Parameter(middle.clone())
+        self.halfwidth = nn.Parameter(halfwidth.clone())
 
     @property
     def radius(self) -> float:
         """Of a ball around c that holds all layers, units."""
-        outermost = self.radii[..., 0].detach()
+        outermost = (self.middle + self.halfwidth).detach()
         if self.chart.belt is None:
             return float(outermost.max()) + MARGIN
         u0, u1, v0, v1 = self.window
@@ -64,8 +64,14 @@ class RadialManifolds(nn.Module):
         points = self.chart.points(torch.stack(torch.meshgrid(u, v, indexing="ij"), -1).to(outermost), outermost)
         return float((points - self.centre).norm(dim=-1).max()) + MARGIN
 
+    def radii(self) -> Tensor:
+        """[rows, columns, N], outermost first."""
+        n = self.num_layers
+        offsets = torch.linspace(1, -1, n) if n > 1 else torch.zeros(1)
+        return self.middle[..., None] + self.halfwidth[..., None] * offsets.to(self.middle)
+
     def regularisation(self) -> Tensor:
-        return self.radii.new_zeros(())
+        return self.middle.new_zeros(())
 
     def crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
         """Nearest crossing with each layer. The compiled search where no gradient is asked for on a CPU."""
@@ -82,7 +88,7 @@ class RadialManifolds(nn.Module):
 
     def tracer(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """`compiled_distances` with the surfaces as they are now, prepared for many calls."""
-        rho = self.radii.detach().cpu().numpy()
+        rho = self.radii().detach().cpu().numpy()
         window, belt = np.array(self.window), self.chart.numbers
         top, bound = ceiling(rho, window, belt), self.radius
 
@@ -96,8 +102,8 @@ class RadialManifolds(nn.Module):
     def radii_at(self, uv: Tensor) -> tuple[Tensor, Tensor]:
         """Directions (u, v) [M, 2] -> rho [M, N], and whether they lie inside the window [M, N]."""
         y, x, inside = self._position(uv)
-        n = self.radii.permute(2, 0, 1)[None]
-        rows, columns = n.shape[2:]
+        n = self.radii().permute(2, 0, 1)[None]
+        rows, columns = self.middle.shape
         at = torch.stack([x / (columns - 1), y / (rows - 1)], -1) * 2 - 1
         rho = torch.nn.functional.grid_sample(n, at[None, None].to(n), padding_mode="border", align_corners=True)
         return rho[0, :, 0].T, inside[:, None].expand(-1, self.num_layers)
@@ -105,18 +111,18 @@ class RadialManifolds(nn.Module):
     def _position(self, uv: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Rows and columns (continuous) of directions (u, v) [..., 2], and whether they lie inside the window."""
         u0, u1, v0, v1 = self.window
-        rows, columns = self.radii.shape[:2]
+        rows, columns = self.middle.shape
         y = (u1 - uv[..., 0]) / (u1 - u0) * (rows - 1)
         x = (uv[..., 1] - v0) / (v1 - v0) * (columns - 1)
         return y, x, (y >= 0) & (x >= 0) & (y <= rows - 1) & (x <= columns - 1)
 
     def reference_crossings(self, origins: Tensor, directions: Tensor) -> Crossings:
-        """The same in torch, differentiable in `radii`.
+        """The same in torch, differentiable in `middle` and `halfwidth`.
 
         At the crossing found, d distance / d rho = 1 / (d(r - rho) / d distance), the slope without gradient and
         bounded away from 0.
         """
-        rho = self.radii
+        rho = self.radii()
         with torch.no_grad():
             distance, hit = self._search(rho, origins, directions)
         points = origins[:, None] + distance[..., None] * directions[:, None]
@@ -159,7 +165,7 @@ class RadialManifolds(nn.Module):
         """
         uv, r = self.chart.uv(points)
         y, x, inside = self._position(uv)
-        rows, columns = self.radii.shape[:2]
+        rows, columns = self.middle.shape
         i = y.floor().clamp(0, rows - 2).long()
         j = x.floor().clamp(0, columns - 2).long()
         a, b = (y - i).clamp(0, 1), (x - j).clamp(0, 1)

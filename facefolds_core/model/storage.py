@@ -103,7 +103,7 @@ class ExplicitSpec(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal["facefolds-model"] = "facefolds-model"
-    version: Literal[2] = 2
+    version: Literal[1] = 1
     kind: Literal["explicit"] = "explicit"
     centre: tuple[float, float, float]
     belt: Annotated[Belt | None, AfterValidator(_sound_belt), Field(exclude_if=lambda belt: belt is None)] = None
@@ -139,6 +139,7 @@ def build_model(spec: Spec) -> RadianceManifolds:
 
 
 def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
+    blank = torch.ones(spec.nodes)
     reflection = None
     if spec.reflection is not None:
         rows, columns, environment = spec.reflection
@@ -148,8 +149,7 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
         textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
     else:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
-    radii = torch.ones(*spec.nodes, spec.num_layers)
-    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, radii)
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, spec.num_layers)
     return RadianceManifolds(manifolds, textures)
 
 

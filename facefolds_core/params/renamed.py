@@ -12,10 +12,10 @@ RENAMED: dict[str, str] = {
 OF_THE_TRAINER: dict[str, str] = {
     "params/surfaces.py": "start.centre_tie start.centre_nodes start.window_limit start.column_limit "
     "start.azimuth_limit start.subject_opacity",
-    "subject/outline.py": "geometry.min_radius",
     "training/explicit/attempt.py": "divergence",
     "training/explicit/clearing.py": "start.beside_opacity pruning.speck_opacity pruning.speck_reach",
-    "training/explicit/fit.py": "start.window_margin textures.radius_quantile",
+    "training/explicit/fit.py": "start.window_margin geometry.max_halfwidth_pixels geometry.min_radius "
+    "textures.radius_quantile",
     "training/explicit/plan.py": "geometry.round_stride geometry.round_rays textures.half_share",
     "training/explicit/rates.py": "textures.final_rate textures.betas textures.layer_rate textures.alpha_rate "
     "textures.frame_rate",
@@ -124,12 +124,8 @@ GONE: dict[str, str] = {
             *("beside_layers_gain", "beside_layers_opacity", "beside_gain", "beside_share", "beside_cameras"),
         )
     },
-    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel` and `geometry.blur` "
-    "can be set",
-    **{
-        f"train.geometry.{key}": "layers lie where the subject's opacity does; `geometry.halfwidth` is the least"
-        for key in ("max_halfwidth", "max_halfwidth_pixels")
-    },
+    "train.few_cameras": "few cameras are trained as many are; `textures.pixels_per_texel`, `geometry.max_halfwidth` "
+    "and `geometry.blur` can be set",
     "train.segments.checkpoint_seconds": NO_CHECKPOINTS,
     "train.segments.checkpoint_share": NO_CHECKPOINTS,
     "train.segments.rate": "frames are fitted at the base's rate",

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Many, Pixels, Section
+from facefolds_core.params.base import Count, Length, Many, Pixels, Section
 
 
 class StartParams(Section):
@@ -48,15 +48,17 @@ class GeometryParams(Section):
     """Nodes along the longer side of the radius maps."""
 
     halfwidth: Annotated[float, Field(gt=0, lt=0.2)] = 0.006
-    """Where the subject is sharp the layers lie within this distance of their middle, units. Where its opacity is
-    spread out, as in hair, they go as far as it does."""
+    """The layers lie within this distance of their middle, units, where the start is sharp."""
+
+    max_halfwidth: Length = 0.015
+    """Largest distance of a layer from the middle, units."""
 
     rounds: Annotated[Many[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1, max_length=100)] = (
         2.5,
         1.6,
         1.0,
     )
-    """Least distances between layers in the rounds of geometry, in those of the model."""
+    """Halfwidths of the rounds of geometry, in halfwidths of the model."""
 
     round_iterations: Count = 60
     """Adam steps of each round."""

@@ -20,7 +20,7 @@ from facefolds_core.subject.volume import Volume
 Array = NDArray[np.float64]
 
 MIN_RADIUS = 0.08
-"""Least radius of a layer, units: at c the search for crossings ends."""
+"""Least radius of a layer's middle, units: at c the search for crossings ends."""
 BEYOND = 3.0
 """Voxels: a surface between two voxels is blurred by so much."""
 
@@ -31,23 +31,23 @@ class Profile:
 
     Attributes:
         radius: (...) where half of the opacity is reached from outside; NaN where there is too little of it, units.
-        quantiles: (..., N) where (i - 1/2) / N of it is, for each layer i; NaN in the same directions.
+        outer, inner: (...) where a tenth and nine tenths of it are reached, units.
         opacity: (...) along the whole direction, float32.
         rgb: (..., 3) colour, composited from outside and divided by the opacity, float32.
     """
 
     radius: Array
-    quantiles: Array
+    outer: Array
+    inner: Array
     opacity: NDArray[np.float32]
     rgb: NDArray[np.float32]
 
 
-def profile(volume: Volume, chart: Chart, uv: Array, least: float, layers: int = 1) -> Profile:
+def profile(volume: Volume, chart: Chart, uv: Array, least: float) -> Profile:
     """Integrate the volume from outside inwards along the chart's rays of (u, v) (..., 2).
 
     Args:
         least: opacity of a direction from which on it has radii.
-        layers: N.
     """
     size = np.array(volume.grid.shape[:3]) - 1
     ends = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -62,13 +62,13 @@ def profile(volume: Volume, chart: Chart, uv: Array, least: float, layers: int =
         directions,
         farthest,
         0.5 * volume.voxel,
-        np.concatenate([[0.5], (np.arange(layers) + 0.5) / layers]),
+        np.array([0.5, 0.1, 0.9]),
     )
     radii = np.where(opacity[:, None] >= least, radii, np.nan).astype(np.float64)
     rgb /= np.maximum(opacity, look_kernel.CLEAR)[:, None]
     shape = uv.shape[:-1]
-    half, quantiles = radii[:, 0].reshape(shape), radii[:, 1:].reshape(*shape, layers)
-    return Profile(half, quantiles, opacity.reshape(shape), rgb.reshape(*shape, 3))
+    middle, outer, inner = (radii[:, k].reshape(shape) for k in range(3))
+    return Profile(middle, outer, inner, opacity.reshape(shape), rgb.reshape(*shape, 3))
 
 
 def shells(volume: Volume, chart: Chart, uv: Array, radii: Array) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

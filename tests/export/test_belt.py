@@ -39,7 +39,6 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model
 from facefolds_core.params import ReconstructParams
 from facefolds_core.rendering.intersection import EmbreeMesh
-from tests.layers import evenly
 
 CHART = Chart((-0.25, 0.0, 0.05), Belt(0.2, 0.3))
 WINDOW: Window = (-1.0, 0.7, -1.3, 1.3)
@@ -57,7 +56,8 @@ def model(waves: float = 0.0) -> RadianceManifolds:
     assert isinstance(made.manifolds, RadialManifolds)
     u, v = texel_uv(48, 60, WINDOW).transpose(2, 0, 1)
     middle = 0.25 + waves * np.sin(7 * u + 1) * np.cos(5 * v)
-    made.manifolds.radii.data = evenly(torch.tensor(middle, dtype=torch.float32), 0.01, 2)
+    made.manifolds.middle.data = torch.tensor(middle, dtype=torch.float32)
+    made.manifolds.halfwidth.data.fill_(0.01)
     return made
 
 

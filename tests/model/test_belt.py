@@ -16,7 +16,6 @@ from facefolds_core.model import load_model, radial, save_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radial_kernel import ceiling, crossing_distances
 from facefolds_core.model.storage import ExplicitSpec, build_model
-from tests.layers import evenly
 
 C = (-0.25, 0.0, 0.05)
 SLANTED = Chart(C, Belt(0.2, 0.3))
@@ -28,7 +27,7 @@ def bumpy(chart: Chart = SLANTED, window: tuple[float, float, float, float] = BR
     generator = torch.Generator().manual_seed(0)
     coarse = torch.randn(1, 1, 6, 6, generator=generator)
     bumps = torch.nn.functional.interpolate(coarse, size=(48, 60), mode="bicubic")[0, 0]
-    return RadialManifolds(chart, window, evenly(0.25 + 0.01 * bumps, 0.01, 4))
+    return RadialManifolds(chart, window, 0.25 + 0.01 * bumps, torch.full((48, 60), 0.01), 4)
 
 
 def rays_around(count: int, seed: int = 0) -> tuple[Tensor, Tensor]:
@@ -45,7 +44,7 @@ def test_a_column_is_a_cylinder(grad: bool) -> None:
     """Belt at elevation 0, constant radius: a vertical wall, open behind, met from outside or from within."""
     window = (-1.2, -0.05, -1.4, 1.4)
     chart = Chart(C, Belt(0.0, 0.3))
-    wall = RadialManifolds(chart, window, evenly(torch.full((8, 12), 0.2), 0.02, 3))
+    wall = RadialManifolds(chart, window, torch.full((8, 12), 0.2), torch.full((8, 12), 0.02), 3)
     origins, directions = (x.double() for x in rays_around(600))
     with torch.set_grad_enabled(grad):
         found = wall.crossings(origins, directions)
@@ -91,7 +90,7 @@ def test_compiled_search_matches_the_reference() -> None:
 def test_strides_through_empty_space_miss_nothing(chart: Chart) -> None:
     window = BROAD if chart.belt is not None else (-0.8, 0.7, -1.4, 1.4)
     manifolds = bumpy(chart, window)
-    rho, belt = manifolds.radii.detach().numpy(), chart.numbers
+    rho, belt = manifolds.radii().detach().numpy(), chart.numbers
     origins, directions = (x.double().numpy() for x in rays_around(3000, seed=1))
     top = ceiling(rho, np.array(window), belt)
     assert (top == 0).mean() > 0.2
@@ -113,7 +112,7 @@ def test_strides_downwards_miss_no_ledge(elevation: float) -> None:
     chart, window = Chart(C, Belt(elevation, 0.05)), (-1.9, -0.2, -1.4, 1.4)
     middle = torch.full((120, 12), 0.15)
     middle[56:64] = 0.25  # 0.009 units thick: more than a step, less than a stride
-    column = RadialManifolds(chart, window, evenly(middle, 0.001, 2))
+    column = RadialManifolds(chart, window, middle, torch.full_like(middle, 0.001), 2)
     azimuth = np.linspace(-2, 2, 200)
     offsets = np.stack([0.2 * np.cos(azimuth), 0.2 * np.sin(azimuth), np.linspace(0.03, 0.06, 200)], -1)
     found = column.compiled_distances(offsets, np.tile([0.0, 0.0, -1.0], (200, 1)))
@@ -141,12 +140,11 @@ def test_distance_gradient_against_finite_differences() -> None:
     assert crossings.hit.all() and 0.5 < below.float().mean() < 0.95
     weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance)
     (crossings.distance * weights).sum().backward()
-    step = torch.cos(torch.arange(48 * 60).float()).view(48, 60, 1)
-    assert manifolds.radii.grad is not None
-    analytic = float((manifolds.radii.grad * step).sum())
+    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
+    analytic = float((manifolds.middle.grad * step).sum())
     values = []
     for sign in (1, -1):
-        moved = RadialManifolds(SLANTED, BROAD, manifolds.radii.detach() + sign * 2e-4 * step)
+        moved = RadialManifolds(SLANTED, BROAD, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4)
         with torch.no_grad():
             values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
     assert analytic == pytest.approx((values[0] - values[1]) / 4e-4, rel=0.03)
@@ -157,7 +155,7 @@ def test_the_ball_around_c_holds_the_column() -> None:
     uv = torch.tensor([[-1.2, 0.3], [0.7, 0.0], [-0.3, 1.4], [-1.2, -1.4]])
     radii, _ = manifolds.radii_at(uv)
     far = (manifolds.chart.points(uv, radii[:, 0]) - manifolds.centre).norm(dim=-1)
-    assert manifolds.radius > far.max() > manifolds.radii.max() + 0.1
+    assert manifolds.radius > far.max() > manifolds.radii().max() + 0.1
 
 
 @pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])

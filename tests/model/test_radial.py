@@ -9,21 +9,20 @@ import torch
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.radial import RadialManifolds
-from tests.layers import evenly
 
 C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
 
 
 def _spheres(radius: float = 0.3, halfwidth: float = 0.03, layers: int = 3) -> RadialManifolds:
-    return RadialManifolds(Chart(C), WINDOW, evenly(torch.full((24, 20), radius), halfwidth, layers))
+    return RadialManifolds(Chart(C), WINDOW, torch.full((24, 20), radius), torch.full((24, 20), halfwidth), layers)
 
 
 def _bumpy(seed: int = 0) -> RadialManifolds:
     generator = torch.Generator().manual_seed(seed)
     coarse = torch.randn(1, 1, 6, 6, generator=generator)
     bumps = torch.nn.functional.interpolate(coarse, size=(48, 40), mode="bicubic")[0, 0]
-    return RadialManifolds(Chart(C), WINDOW, evenly(0.3 + 0.01 * bumps, 0.01, 4))
+    return RadialManifolds(Chart(C), WINDOW, 0.3 + 0.01 * bumps, torch.full((48, 40), 0.01), 4)
 
 
 def _rays(count: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
@@ -65,7 +64,7 @@ def test_compiled_search_matches_the_reference() -> None:
 
 
 def test_layers_are_nested() -> None:
-    radii = _bumpy().radii
+    radii = _bumpy().radii()
     assert (radii[..., :-1] > radii[..., 1:]).all()
 
 
@@ -85,12 +84,13 @@ def test_distance_gradient_against_finite_differences() -> None:
     crossings = manifolds.crossings(origins, directions)
     weights = torch.linspace(-1, 1, crossings.distance.numel()).view_as(crossings.distance) * crossings.hit
     (crossings.distance * weights).sum().backward()
-    step = torch.cos(torch.arange(48 * 40).float()).view(48, 40, 1)
-    assert manifolds.radii.grad is not None
-    analytic = float((manifolds.radii.grad * step).sum())
+    step = torch.cos(torch.arange(manifolds.middle.numel()).float()).view_as(manifolds.middle)
+    analytic = float((manifolds.middle.grad * step).sum())
     values = []
     for sign in (1, -1):
-        moved = RadialManifolds(Chart(C), WINDOW, manifolds.radii.detach() + sign * 2e-4 * step)
+        moved = RadialManifolds(
+            Chart(C), WINDOW, manifolds.middle.detach() + sign * 2e-4 * step, manifolds.halfwidth, 4
+        )
         with torch.no_grad():
             values.append(float((moved.reference_crossings(origins, directions).distance * weights).sum()))
     numeric = (values[0] - values[1]) / 4e-4
@@ -108,7 +108,7 @@ def test_radii_in_a_direction_are_where_a_ray_along_it_crosses() -> None:
     torch.manual_seed(0)
     window = (-0.4, 0.5, -0.3, 0.45)
     middle = 0.3 + 0.02 * torch.rand(9, 7)
-    manifolds = RadialManifolds(Chart(C), window, evenly(middle, 0.01, 3))
+    manifolds = RadialManifolds(Chart(C), window, middle, torch.full((9, 7), 0.01), 3)
     uv = torch.rand(200, 2) * torch.tensor([0.8, 0.7]) + torch.tensor([-0.35, -0.27])
     uv = torch.cat([uv, torch.tensor([[0.6, 0.0]])])
     radii, valid = manifolds.radii_at(uv)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
+from facefolds_core.subject.outline import Profile
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import train_explicit
@@ -25,6 +27,8 @@ from facefolds_core.training.explicit.state import TextureState
 from tests.scenes import OPAQUE, make_scene
 
 pytestmark = pytest.mark.slow
+
+GEOMETRY = ExplicitParams().geometry
 
 
 def _params(**values: object) -> ExplicitParams:
@@ -78,7 +82,7 @@ def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
 
 def test_reasons_are_facts(trained: tuple[Scene, Path]) -> None:
     reasons = [read_fact(value) for value in json.loads((trained[1] / "fit.json").read_text())["reasons"]]
-    wanted = ["centre_chosen", "window_chosen", "middle_from_mesh", "offsets_chosen", "texels_chosen"]
+    wanted = ["centre_chosen", "window_chosen", "middle_from_mesh", "halfwidth_chosen", "texels_chosen"]
     assert [reason.kind for reason in reasons][:5] == wanted
     assert 0 <= reasons[0].values["lost"] < 1
 
@@ -115,27 +119,24 @@ def test_recentring_stays_where_nothing_is_opaque() -> None:
     np.testing.assert_allclose(fit.recentre(radii, np.zeros((20, 20, 11), np.float32), 2.0), 0, atol=1e-9)
 
 
-def test_layers_lie_where_the_opacity_does() -> None:
-    quantiles = np.broadcast_to(np.array([0.40, 0.38, 0.31, 0.30]), (30, 30, 4))
-    offsets = fit.offsets_of(quantiles, np.full((30, 30), 0.35))
-    np.testing.assert_allclose(offsets, quantiles - 0.35, atol=1e-12)
-    np.testing.assert_allclose(fit.nested(offsets, 0.005), quantiles - 0.35, atol=1e-12)
+def test_layers_are_as_thin_as_asked_for_where_the_subject_is_sharp() -> None:
+    radius = np.full((30, 30), 0.3)
+    seen = Profile(
+        radius, radius + 0.01, radius - 0.01, np.ones((30, 30), np.float32), np.ones((30, 30, 3), np.float32)
+    )
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, 0.015, voxel=0.01), 0.006)
+    np.testing.assert_allclose(fit.spread(seen, radius, 0.006, 0.015, voxel=0.002), 0.006 + 0.5 * (0.02 - 3 * 0.002))
+    np.testing.assert_allclose(fit.spread(seen, radius + 0.5, 0.006, 0.015, voxel=0.01), 0.015)
 
 
-def test_no_layer_lies_where_no_opacity_is_known() -> None:
-    unknown = np.full((30, 30, 4), np.nan)
-    np.testing.assert_array_equal(fit.offsets_of(unknown, np.full((30, 30), 0.35)), 0)
-
-
-@pytest.mark.parametrize("layers", [1, 2, 5, 12])
-def test_layers_at_one_place_are_drawn_apart_evenly_about_it(layers: int) -> None:
-    even = 0.01 * (0.5 * (layers - 1) - np.arange(layers))
-    np.testing.assert_allclose(fit.nested(np.zeros((3, 2, layers)), 0.01), np.broadcast_to(even, (3, 2, layers)))
-
-
-def test_layers_that_cross_are_nested() -> None:
-    offsets = np.random.default_rng(0).normal(0, 0.01, (50, 40, 7))
-    assert np.diff(fit.nested(offsets, 0.002), axis=-1).max() <= -0.002 + 1e-12
+@pytest.mark.parametrize(("pixel", "most"), [(0.001, 0.008), (0.002, 0.015), (0.0002, 0.006)])
+def test_layers_are_no_more_than_so_many_pixels_wide(
+    pixel: float, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    params = GEOMETRY.model_copy(update={"halfwidth": 0.006, "max_halfwidth": 0.015})
+    assert fit.greatest_halfwidth(params, pixel) == pytest.approx(most)
+    monkeypatch.setattr(fit, "MAX_HALFWIDTH_PIXELS", math.inf)
+    assert fit.greatest_halfwidth(params, pixel) == pytest.approx(0.015)
 
 
 def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camera(
@@ -152,9 +153,8 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    maps, volume = (ones, ones, np.ones((4, 4, 3))), Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
-    layers = ones, np.zeros((4, 4, 6)), 0.01
-    chosen = fit.Fit(Chart((0, 0, 0)), window, *layers, *maps, (128, 96), (), (), volume, {}, 30.0)
+    maps, volume = (ones, ones, ones, ones, np.ones((4, 4, 3))), Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
+    chosen = fit.Fit(Chart((0, 0, 0)), window, *maps, (128, 96), (), (), volume, {}, 30.0)
     levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)
     assert sum(level.iterations for level in levels) == 400
     assert levels[-1].texels == (128, 96)
@@ -189,7 +189,12 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
     train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
-    assert model.manifolds.radii.min().item() == pytest.approx(fit.MIN_RADIUS, abs=1e-6)
+    assert fit.MIN_RADIUS <= model.manifolds.radii().min().item() < fit.MIN_RADIUS + 0.05
+
+
+def test_wide_layers_keep_their_distance_from_the_centre() -> None:
+    halfwidth = np.array([0.006, 0.03, 0.2])
+    assert (fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= fit.MIN_RADIUS - 1e-12).all()
 
 
 def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:

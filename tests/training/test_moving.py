@@ -16,7 +16,6 @@ from facefolds_core.params import MovingParams
 from facefolds_core.training.explicit.views import MovingRays, Sampling, first_pixel, trace_views
 from facefolds_core.training.rays import RaySampler
 from tests.geometry.test_track import about
-from tests.layers import evenly
 from tests.scenes import CENTRE, make_scene
 
 STILL = Track.of([np.eye(3)] * 2, np.zeros((2, 3)))
@@ -29,8 +28,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def layers() -> RadialManifolds:
-    radii = evenly(torch.full((9, 9), 0.33), 0.01, 3)
-    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), radii)
+    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
+    return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 
 
 def rays(scene: Scene, stride: int = 1, share: float = 400.0, **keys: int) -> MovingRays:

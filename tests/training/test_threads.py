@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
-import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
+from torch import Tensor
 
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.trainer import Trainer
@@ -22,30 +21,28 @@ def threads() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-def recentred(count: int) -> NDArray[np.float64]:
+def recentred(count: int) -> Tensor:
     """The middle radius after a round of geometry whose opacity is random."""
     torch.set_num_threads(count)
     draw = torch.Generator().manual_seed(0)
     texture = torch.rand(48 * 48, 3, 4, generator=draw)
-    middle = np.full((384, 355), 0.3)
+    middle = torch.full((384, 355), 0.3)
+    radii = middle[..., None] + torch.tensor([0.05, 0.0, -0.05])
+    whole = torch.ones(384, 355, dtype=torch.float64).numpy()
     trainer: Any = SimpleNamespace(
         state=SimpleNamespace(shape=(48, 48), activated=lambda k: texture, layers=torch.ones(3, 48 * 48, 3, 4)),
         scene=SimpleNamespace(num_frames=1),
         middle=middle,
-        geometry=1.0,
+        manifolds=lambda: SimpleNamespace(radii=lambda: radii),
         params=ExplicitParams(),
-        fit=SimpleNamespace(
-            middle=middle,
-            trust=0 * middle,
-            radii=lambda middle, apart: middle[..., None] + np.array([0.05, 0.0, -0.05]),
-        ),
+        fit=SimpleNamespace(middle=0.3 * whole, halfwidth=0.05 * whole, trust=0 * whole),
     )
     Trainer._recentre(cast(Trainer, trainer))
-    return cast("NDArray[np.float64]", trainer.middle)
+    return cast(Tensor, trainer.middle)
 
 
 def test_layers_move_to_the_same_places_on_any_number_of_threads(threads: None) -> None:
     one = recentred(1)
     assert one.std() > 0
     for count in (2, 3, 4):
-        np.testing.assert_array_equal(recentred(count), one)
+        assert torch.equal(recentred(count), one)

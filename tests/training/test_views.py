@@ -13,7 +13,6 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Views, trace_views
-from tests.layers import evenly
 from tests.scenes import CENTRE, make_scene
 from tests.subject.splats import found
 
@@ -24,9 +23,9 @@ def scene(tmp_path: Path) -> Scene:
 
 
 def traced(scene: Scene, stride: int) -> Views:
-    radii = evenly(torch.full((9, 9), 0.33), 0.01, 3)
+    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
     chart = Chart((float(CENTRE[0]), 0.0, 0.0))
-    return trace_views(scene, RadialManifolds(chart, (-0.6, 0.6, -0.6, 0.6), radii), stride)
+    return trace_views(scene, RadialManifolds(chart, (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3), stride)
 
 
 def test_four_rays_at_outlines_around_the_centres_and_one_elsewhere(scene: Scene) -> None:
@@ -68,8 +67,8 @@ def test_parts_and_what_is_put_together_keep_their_rays(scene: Scene) -> None:
 
 def test_virtual_cameras_have_fewer_pixels_and_finer_rays_at_their_outlines(scene: Scene) -> None:
     teacher = Teacher(scene, found(scene, 30.0), seed=0).virtual
-    radii = evenly(torch.full((9, 9), 0.33), 0.01, 3)
-    layers = RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), radii)
+    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
+    layers = RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
     plain, views = trace_views(scene, layers, 1), trace_views(scene, layers, 1, teacher)
     real = len(scene.indices("train"))
     photos = views.part(np.flatnonzero(views.camera < real))

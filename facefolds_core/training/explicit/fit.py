@@ -14,11 +14,12 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window
-from facefolds_core.params import ExplicitParams, StartParams
+from facefolds_core.params import ExplicitParams, GeometryParams, StartParams
 from facefolds_core.rendering.compositing import transmittance_before
 from facefolds_core.subject.find import reference_frame
 from facefolds_core.subject.outline import (
     MIN_RADIUS,
+    Profile,
     choose_chart,
     profile,
     visible_points,
@@ -38,8 +39,8 @@ MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 WINDOW_MARGIN = 0.04
 """Margin of the window in u and v beyond what holds the subject."""
-OFFSET_BLUR = 2.0
-"""Smoothing of the layers' offsets from the middle, standard deviation, nodes."""
+MAX_HALFWIDTH_PIXELS = 8.0
+"""Largest distance of a layer from the middle, pixels of the median camera; `geometry.halfwidth` is always allowed."""
 RADIUS_QUANTILE = 0.9
 """`textures.pixels_per_texel` holds on a sphere of this quantile of the radii of what is opaque: nearly the farthest,
 where texels are largest."""
@@ -53,8 +54,7 @@ class Fit:
         chart: of (u, v) and radii.
         window: (u0, u1, v0, v1).
         middle: starting radii of the middle of the layers, units.
-        offsets: (rows, columns, N) of the layers from it, outermost first, units.
-        gap: what lies between two layers at least, units.
+        halfwidth: half the space between the outermost and the innermost layer, units.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
@@ -68,8 +68,7 @@ class Fit:
     chart: Chart
     window: Window
     middle: Array
-    offsets: Array
-    gap: float
+    halfwidth: Array
     trust: Array
     opacity: Array
     rgb: Array
@@ -79,12 +78,6 @@ class Fit:
     volume: Volume
     losses: dict[Chart, float]
     start_psnr: float
-
-    def radii(self, middle: Array, apart: float) -> Array:
-        """(rows, columns, N) of the layers about a middle (rows, columns), `apart` gaps from one another at least, none
-        nearer to c than `MIN_RADIUS`."""
-        offsets = nested(self.offsets, apart * self.gap)
-        return np.maximum(middle, MIN_RADIUS - offsets[..., -1])[..., None] + offsets
 
 
 def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fit:
@@ -103,7 +96,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
     window = fit_window(coarse, chart, visible, vertices, start)
     rows, columns = _nodes(window, geometry.nodes)
     uv = window_uv(window, rows, columns)
-    seen = profile(volume, chart, uv, start.subject_opacity, params.layers)
+    seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
         known, kept = seen.radius, np.zeros((rows, columns))
@@ -112,30 +105,26 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         mesh = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
-        unseen &= np.isfinite(mesh)
-        seen = replace(
-            seen,
-            radius=np.where(unseen, np.nan, seen.radius),
-            quantiles=np.where(unseen[..., None], np.nan, seen.quantiles),
-        )
+        seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, MESH.reach)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH.opacity), opacity)
         source = fact("middle_from_mesh", reach=MESH.reach)
     middle = extrapolate(known).clip(MIN_RADIUS)
-    gap = 2 * geometry.halfwidth / max(1, params.layers - 1)
+    most = greatest_halfwidth(geometry, pixel_size(scene))
+    widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
+    middle = np.maximum(middle, least_middle(widths, geometry))
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
         chart=chart,
         window=window,
         middle=middle,
-        offsets=offsets_of(seen.quantiles, middle),
-        gap=gap,
+        halfwidth=widths,
         trust=MESH.trust * kept,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source, gap), *notes),
+        reasons=(*_reasons(params, losses[chart], source, most), *notes),
         notes=notes,
         volume=volume,
         losses=losses,
@@ -143,14 +132,14 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
     )
 
 
-def _reasons(params: ExplicitParams, lost: float, middle: Fact, gap: float) -> tuple[Fact, ...]:
+def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float) -> tuple[Fact, ...]:
     """One a choice."""
-    start = params.start
+    start, geometry = params.start, params.geometry
     return (
         fact("centre_chosen", tie=start.centre_tie, lost=lost),
         fact("window_chosen", opacity=start.subject_opacity, margin=WINDOW_MARGIN),
         middle,
-        fact("offsets_chosen", layers=params.layers, gap=gap),
+        fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
         fact("texels_chosen", pixels=params.textures.pixels_per_texel),
     )
 
@@ -187,30 +176,23 @@ def fit_window(volume: Volume, chart: Chart, points: Array, vertices: Array | No
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def offsets_of(quantiles: Array, middle: Array) -> Array:
-    """How far each layer lies outside of the middle, units, (rows, columns, N): where the subject's opacity reaches
-    even shares along the chart's rays, smoothed. 0 where it has no radii.
-
-    Args:
-        quantiles: (rows, columns, N), NaN where there are none, units.
-    """
-    offsets = np.nan_to_num(np.maximum(quantiles, MIN_RADIUS) - middle[..., None])
-    smooth: Array = ndimage.gaussian_filter(offsets, (OFFSET_BLUR, OFFSET_BLUR, 0), mode="nearest")
-    return smooth
+def greatest_halfwidth(params: GeometryParams, pixel: float) -> float:
+    """Units; `pixel`: of the median camera at the subject, units."""
+    return max(params.halfwidth, min(params.max_halfwidth, MAX_HALFWIDTH_PIXELS * pixel))
 
 
-def nested(offsets: Array, gap: float) -> Array:
-    """Offsets (..., N), outermost first, moved away from the middle until they are `gap` apart, units."""
-    found, n = offsets.copy(), offsets.shape[-1]
-    half = n // 2
-    if n % 2 == 0:
-        found[..., half - 1] = np.maximum(found[..., half - 1], gap / 2)
-        found[..., half] = np.minimum(found[..., half], -gap / 2)
-    for k in range((n - 1) // 2 - 1, -1, -1):
-        found[..., k] = np.maximum(found[..., k], found[..., k + 1] + gap)
-    for k in range(half + 1, n):
-        found[..., k] = np.minimum(found[..., k], found[..., k - 1] - gap)
-    return found
+def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float) -> Array:
+    """Halfwidths: the least one, plus half of the spread of the volume's opacity beyond the three voxels that a sharp
+    surface has in it, plus the distance of the middle from the volume's beyond a voxel; smoothed."""
+    thick = np.nan_to_num(0.5 * np.clip(seen.outer - seen.inner - 3 * voxel, 0, None))
+    off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
+    wide: Array = ndimage.gaussian_filter(least + thick + off, 4.0, mode="nearest").clip(least, most)
+    return wide
+
+
+def least_middle(halfwidth: Array, params: GeometryParams) -> Array:
+    """The smallest middle radius with which no layer of any round comes nearer to c than `MIN_RADIUS`."""
+    return MIN_RADIUS + max(params.rounds) * halfwidth
 
 
 def _nodes(window: Window, longest: int) -> tuple[int, int]:
@@ -249,9 +231,9 @@ def pixel_size(scene: Scene) -> float:
 def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
     """How far the layers should move to lie around the opacity found, along the rays, from outside inwards.
 
-    With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - mean) / sum_i w_i. The mean
-    of the radii is where opacity lies that all layers share evenly. The offset is smoothed with sum_i w_i as the
-    weight, so that transparent directions follow their neighbours and detail of the start finer than `blur` is kept.
+    With w_i = alpha_i prod_{k<i} (1 - alpha_k), the offset of a node is sum_i w_i (rho_i - middle) / sum_i w_i. It is
+    smoothed with sum_i w_i as the weight, so that transparent directions follow their neighbours and detail of the
+    start finer than `blur` is kept.
 
     Args:
         radii: (rows, columns, N).
@@ -263,9 +245,9 @@ def recentre(radii: Array, alpha: NDArray[np.float32], blur: float) -> Array:
     """
     weights = (alpha * transmittance_before(alpha, -1)).astype(np.float64)
     mass = weights.sum(-1)
-    mean = radii.mean(-1)
-    moment = (weights * (radii - mean[..., None])).sum(-1)
-    moved: Array = np.zeros_like(mean)
+    middle = 0.5 * (radii[..., 0] + radii[..., -1])
+    moment = (weights * (radii - middle[..., None])).sum(-1)
+    moved = np.zeros_like(middle)
     # From coarse to fine: where a scale holds less opacity than a tenth of a layer, the coarser one decides.
     for scale in (16.0, 4.0, 1.0):
         near = ndimage.gaussian_filter(mass, scale * blur, mode="nearest")

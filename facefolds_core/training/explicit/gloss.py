@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from facefolds_core.facts import Fact, fact
@@ -59,12 +60,12 @@ class GlossFit:
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, pictures: Pictures, middle: NDArray[np.float64]) -> None:
+    def follow(self, state: TextureState, source: Rays, pictures: Pictures, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
-        shape = map_shape(self.window, self.params.texels)
-        self._normals = surface_normals(middle, self.chart, self.window, shape, self.how.normal_blur)
+        radii, shape = middle.cpu().numpy().astype(np.float64), map_shape(self.window, self.params.texels)
+        self._normals = surface_normals(radii, self.chart, self.window, shape, self.how.normal_blur)
         if self.maps is not None:
             self.maps = replace(self.maps, surface=self._normals)
             if self.poses is None:

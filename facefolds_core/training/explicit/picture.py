@@ -21,7 +21,6 @@ def draw_fit(path: Path, fit: Fit, layers: int, subject_opacity: float) -> None:
         figure = Figure(figsize=(14, 3.6), layout="constrained")
         axes = figure.subplots(1, 5)
         u0, u1, v0, v1 = fit.window
-        radii = fit.radii(fit.middle, 1.0)
         extent = (v0, v1, u0, u1)
         hidden = np.ma.masked_where(fit.opacity < subject_opacity, fit.middle)
         axes[0].imshow(fit.rgb.clip(0, 1), extent=extent)
@@ -30,7 +29,7 @@ def draw_fit(path: Path, fit: Fit, layers: int, subject_opacity: float) -> None:
         axes[1].set_title("opacity at the start")
         for axis, values, title in (
             (axes[2], hidden, "middle radius"),
-            (axes[3], 0.5 * (radii[..., 0] - radii[..., -1]), f"half of the space of {layers} layers"),
+            (axes[3], fit.halfwidth, f"half of the space of {layers} layers"),
         ):
             figure.colorbar(axis.imshow(values, extent=extent, cmap="viridis"), ax=axis, shrink=0.8)
             axis.set_title(title + ", units")

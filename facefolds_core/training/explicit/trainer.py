@@ -21,7 +21,7 @@ from facefolds_core.subject.outline import shells, texel_uv
 from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
-from facefolds_core.training.explicit.fit import Fit, recentre
+from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Epochs, Level
@@ -33,7 +33,7 @@ from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
 
 LAYER_ALPHA = 1 / 255
-"""Layers whose alpha is nowhere larger are dropped: no pixel changes by more."""
+"""Outer or inner layers whose alpha is nowhere larger are dropped: no pixel changes by more."""
 
 
 class Trainer:
@@ -52,7 +52,7 @@ class Trainer:
         self.scene = cameras.scene
         self.pictures, self.virtual = CutOuts(self.scene, cameras.gains, teacher=teacher), teacher.virtual
         self.random = np.random.default_rng(params.seed)
-        self.middle = fit.middle
+        self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
         self.views: Rays | None = None
         self.stride = 0
@@ -66,8 +66,8 @@ class Trainer:
         self.usual = np.zeros((0, 3), np.float32)
 
     def manifolds(self) -> RadialManifolds:
-        radii = torch.from_numpy(self.fit.radii(self.middle, self.geometry)).float()
-        return RadialManifolds(self.fit.chart, self.fit.window, radii)
+        halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
+        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level, again from its start at a lower learning rate if it diverges."""
@@ -137,7 +137,7 @@ class Trainer:
         assert self.state is not None
         shape = self.state.shape
         with on_one_thread():
-            nodes = self.manifolds().radii.detach().permute(2, 0, 1)[None]
+            nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
         places = radii[0].permute(1, 2, 0).double().numpy()
         opacity, rgb = shells(self.fit.volume, self.fit.chart, texel_uv(self.fit.window, *shape), places)
@@ -156,10 +156,15 @@ class Trainer:
         size = self.middle.shape[0], self.middle.shape[1]
         with on_one_thread():
             nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
-        radii = self.fit.radii(self.middle, self.geometry)
+        radii = self.manifolds().radii().detach().double().numpy()
         offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
-        moved = self.middle + offsets - self.fit.middle
-        self.middle = self.fit.middle + np.sign(moved) * np.maximum(np.abs(moved) - self.fit.trust, 0)
+        moved = self.middle + torch.from_numpy(offsets).float()
+        start = torch.from_numpy(self.fit.middle).float()
+        # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
+        moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
+        self.middle = torch.maximum(
+            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
+        )
 
     def _attempt(self, level: Level, at: Attempt, live: Live, bar: tqdm) -> bool:
         """What is left of a level's iterations; False if it diverges."""
@@ -217,24 +222,30 @@ class Trainer:
         self.events += clear_texels(state, self.views, self._stride(), self.params.pruning)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
         kept = [i for i in range(n) if float(peak[i]) >= LAYER_ALPHA] or [n // 2]
-        self.events += [fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(n) if i not in kept]
+        # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
+        first, last = kept[0], kept[-1]
+        self.events += [
+            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(n) if not first <= i <= last
+        ]
+        radii = self.manifolds().radii().detach()
+        outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
-        radii = self.manifolds().radii.detach()[..., kept]
-        manifolds = RadialManifolds(self.fit.chart, self.fit.window, radii)
+        halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
+        manifolds = RadialManifolds(self.fit.chart, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
         reflection = self.gloss.model()
-        textures = GridTextures(self.fit.window, (h, w), len(kept), self.scene.num_frames, reflection)
+        textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames, reflection)
         with torch.no_grad():
             textures.colour.copy_(state.colour[0].view(h, w, 3))
-            textures.layers.copy_(state.layers[0].view(h, w, n, 4)[:, :, kept])
+            textures.layers.copy_(state.layers[0].view(h, w, n, 4)[:, :, first : last + 1])
             textures.frame_colour.copy_(state.frame_colour[0].view(-1, h, w, 3))
-            textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., kept])
+            textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., first : last + 1])
         spec = ExplicitSpec(
             centre=self.fit.chart.centre,
             belt=self.fit.chart.belt,
             window=self.fit.window,
-            nodes=(radii.shape[0], radii.shape[1]),
+            nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),
-            num_layers=len(kept),
+            num_layers=last - first + 1,
             num_frames=self.scene.num_frames,
             reflection=None if reflection is None else (*reflection.shape.maps, reflection.shape.environment),
             fingerprint=fingerprint,
@@ -243,14 +254,12 @@ class Trainer:
 
     def summary(self, spec: ExplicitSpec) -> dict[str, Any]:
         """`fit.json`: what was chosen, and why."""
-        radii = self.fit.radii(self.middle, self.geometry)
-        half = 0.5 * (radii[..., 0] - radii[..., -1])
         return {
             "window": list(spec.window),
             "middle_radius": {"least": float(self.middle.min()), "greatest": float(self.middle.max())},
             "centre": list(spec.centre),
             "belt": None if spec.belt is None else spec.belt.degrees,
-            "halfwidth": {"least": float(half.min()), "greatest": float(half.max())},
+            "halfwidth": {"least": float(self.fit.halfwidth.min()), "greatest": float(self.fit.halfwidth.max())},
             "layers": spec.num_layers,
             "texels": list(spec.texels),
             "reasons": [reason.to_json() for reason in self.fit.reasons],
@@ -259,3 +268,8 @@ class Trainer:
             "cameras": self.cameras.summary,
             "events": [event.to_json() for event in self.events],
         }
+
+
+def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:
+    """Towards 0 by `by`, not beyond."""
+    return values.sign() * (values.abs() - by).clamp(min=0)
