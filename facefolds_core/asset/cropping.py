@@ -1,9 +1,11 @@
 """What of each layer holds anything: the part of its texture that ships, and the triangles that show it.
 
 A texel holds something if its alpha exceeds ALPHA_BOUND in any frame. A triangle stays if any texel that bilinear
-look-ups within its bounding box touch holds something; a layer without triangles is left out. What goes has alpha <=
-1/255 everywhere and in all frames: of one layer, it changes no pixel by more than 1/255 (colours lie in [0, 1]).
-The texture is cropped to what the remaining triangles look up, so that no look-up changes.
+look-ups within its bounding box touch holds something, or if such a triangle lies behind it: the nearest hit of a layer
+counts, so through a hole in the front of a head the back of that layer would be drawn over all others. A layer without
+triangles that hold anything is left out. What goes has alpha <= 1/255 everywhere and in all frames: of one layer, it
+changes no pixel by more than 1/255 (colours lie in [0, 1]). The texture is cropped to what the remaining triangles look
+up, so that no look-up changes.
 """
 
 from __future__ import annotations
@@ -18,10 +20,14 @@ from numpy.typing import NDArray
 from facefolds_core.asset.packing import Rect
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.geometry.rays import EmbreeMesh
 from facefolds_core.geometry.sphere_uv import Window
 
 ALPHA_BOUND = 1
 """Of 255: alpha up to it counts as nothing."""
+DIRECTIONS = 128
+"""Spread over the sphere, about 18 degrees apart: along those that enter a triangle from outside it is asked what lies
+behind it."""
 
 
 class Textures(Protocol):
@@ -72,7 +78,8 @@ def crop_layers(
             alpha = np.maximum(alpha, textures.image(layer, frame)[..., 3])
         shown = _shown_faces(mesh, alpha > ALPHA_BOUND)
         if shown.any():
-            cropped.append(_crop(layer, mesh, mesh.faces[shown], window, len(alpha), unit))
+            kept = shown | _covering(mesh, shown)
+            cropped.append(_crop(layer, mesh, mesh.faces[kept], window, len(alpha), unit))
     if not cropped:
         raise UserError(
             "every layer is transparent",
@@ -92,6 +99,27 @@ def _shown_faces(mesh: TexturedMesh, holds: NDArray[np.bool_]) -> NDArray[np.boo
     last = np.clip(np.floor(corners.max(1)) + 2, 1, size).astype(np.intp)
     (left, top), (right, bottom) = first.T, last.T
     return np.asarray(area[bottom, right] - area[top, right] - area[bottom, left] + area[top, left] > 0)
+
+
+def _covering(mesh: TexturedMesh, shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(F,) bool: faces that are not shown and through which somebody outside would see one that is."""
+    found, clear = np.zeros(len(shown), bool), np.flatnonzero(~shown)
+    corners = mesh.vertices[mesh.faces[clear]].astype(np.float64)
+    middles, normals = corners.mean(1), np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    behind = EmbreeMesh(mesh.vertices, mesh.faces[shown])
+    for direction in _directions():
+        asked = np.flatnonzero(~found[clear] & (normals @ direction < 0))
+        hit = behind.meets(middles[asked], np.tile(direction, (len(asked), 1)))
+        found[clear[asked[hit]]] = True
+    return found
+
+
+def _directions() -> NDArray[np.float64]:
+    """(DIRECTIONS, 3) unit vectors, evenly over the sphere: a spiral that turns by the golden angle."""
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(DIRECTIONS)
+    height = 1 - 2 * (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+    across = np.sqrt(1 - height**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), height], -1)
 
 
 def _crop(

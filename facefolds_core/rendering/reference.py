@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.rays import MISS, EmbreeMesh
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.compositing import FrontToBack
-from facefolds_core.rendering.intersection import MISS, EmbreeMesh
 
 Image = NDArray[np.float32]
 Texture = NDArray[np.uint8]

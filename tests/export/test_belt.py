@@ -33,12 +33,12 @@ from facefolds_core.export.stores import (
 )
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import Surface
+from facefolds_core.geometry.rays import EmbreeMesh
 from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_st
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model
 from facefolds_core.params import ReconstructParams
-from facefolds_core.rendering.intersection import EmbreeMesh
 
 CHART = Chart((-0.25, 0.0, 0.05), Belt(0.2, 0.3))
 WINDOW: Window = (-1.0, 0.7, -1.3, 1.3)

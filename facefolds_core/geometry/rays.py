@@ -67,6 +67,14 @@ class EmbreeMesh:
         if len(faces):
             TriangleMesh(self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32))
 
+    def meets(self, origins: Array, directions: Array) -> NDArray[np.bool_]:
+        """(R,) whether rays hit anything; origins, directions: (R, 3)."""
+        if not len(self.triangles):
+            return np.zeros(len(origins), bool)
+        rays = (np.ascontiguousarray(of, np.float32) for of in (origins, directions))
+        found: NDArray[np.bool_] = np.asarray(self._scene.run(*rays)) != MISS
+        return found
+
     def nearest(self, origins: Array, directions: Array) -> TriangleHits:
         """Nearest hits of rays; origins, directions: (R, 3)."""
         if not len(self.triangles):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from facefolds_core.rendering.intersection import MISS, EmbreeMesh, TriangleHits, hits_in, moeller_trumbore
+from facefolds_core.geometry.rays import MISS, EmbreeMesh, TriangleHits, hits_in, moeller_trumbore
 
 
 def brute_force_hits(
