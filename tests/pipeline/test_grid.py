@@ -51,7 +51,7 @@ class GridProject:
         variables = {**kept, "PATH": path, "RAN": str(self.ran), "DVC_NO_ANALYTICS": "1"}
         # Not a pipe: a queue's workers may hold on to it after their command's end.
         with tempfile.TemporaryFile("w+") as printed:
-            done = subprocess.run(command, cwd=self.root, env=variables, stdout=printed, stderr=printed, timeout=300)
+            done = subprocess.run(command, cwd=self.root, env=variables, stdout=printed, stderr=printed, timeout=900)
             printed.seek(0)
             text = printed.read()
         assert done.returncode == 0, text

@@ -98,7 +98,7 @@ class TinyProject:
     def run(self, *command: str) -> tuple[int, str]:
         """Exit status and output (both streams) of a command in the project's folder."""
         process = self.start(*command)
-        output, _ = process.communicate(timeout=300)
+        output, _ = process.communicate(timeout=900)
         return process.returncode, output
 
     def repro(self, *targets: str) -> tuple[int, str]:
