@@ -348,6 +348,7 @@ export class Player extends EventTarget {
     this.#showIfThere(source.shown);
     if (ended && !playback.loop) {
       playback.playing = false;
+      this.seek(source.frames - 1); // a busy machine may not have shown the last one
       this.#end();
     }
   }
