@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
+import stages  # noqa: F401  (threads that wait sleep, as a stage's do: workers share the cores; before torch is imported)
 from tests.chromium import BROWSERS, Chromium, find_browser
 
 ROOT = Path(__file__).resolve().parents[1]
