@@ -119,8 +119,7 @@ class Row(Entry):
 
     Attributes:
         params: "section.key" -> value of what differs, numbers only.
-        figures: scores of the asset and costs, as `facefolds collect` has them, and pictures a second that `renderer`
-            draws; empty if it failed.
+        figures: by `figures_of`; pictures a second that `renderer` draws; empty if it failed.
     """
 
     KEY = ("sweep", "subject", "value")

@@ -25,16 +25,15 @@ import typer
 from dvc.api import DVCFileSystem
 
 from bench import charts
+from bench.experiments import runs_of, shown_experiments
 from bench.results import Row, Store, commit_name, machine_name, now
 from bench.run import own_params
 from bench.tables import AXES, RATES, rate_tables, replace_between, sweep_table
 from facefolds_core.asset import read_asset
-from facefolds_core.cli.collect import shown_experiments
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.export.sampling import LEAST
 from facefolds_core.rendering.camera_paths import Eye, camera_of, turntable
 from facefolds_core.rendering.opengl import OpenGLRenderer
-from facefolds_core.sweeps.experiments import runs_of
 from facefolds_core.sweeps.table import Run, write_runs
 
 RESULTS = Path("bench/results/sweeps.json")
@@ -180,7 +179,7 @@ def collect(results: Results = RESULTS) -> None:
     """Keep what has ended; a failed cell is a result."""
     with report_user_errors("sweeps"):
         store = Store(results, "rows", Row)
-        runs, pending = runs_of(shown_experiments(), distinct=False)
+        runs, pending = runs_of(shown_experiments())
         for row in filter(None, map(row_of, runs)):
             store.add(row)
             said = f"failed: {row.failure}" if row.failure else f"{row.psnr:.2f} dB, {row.bytes} bytes"

@@ -1,4 +1,4 @@
-"""Assets as older versions of facefolds wrote them, made from today's."""
+"""Assets as older versions of facefolds wrote them, which the web player still plays, made from today's."""
 
 from __future__ import annotations
 
@@ -6,23 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tests.hostile.fuzz_assets import seal
 
 Value = dict[str, Any]
 
 NEWER = ("minVersion", "bounds", "extensionsUsed", "extras", "track_file")
-
-
-def as_version_3(folder: Path, value: Value) -> Value:
-    """With the poses of a head that moves in the manifest."""
-    old = {key: part for key, part in value.items() if key != "track_file"} | {"version": 3}
-    if "track_file" in value:
-        rows = np.fromfile(folder / value["track_file"]["file"], "<f4").astype(float).reshape(-1, 7).tolist()
-        old["track"] = [{"quaternion": row[:4], "translation": row[4:]} for row in rows]
-        (folder / value["track_file"]["file"]).unlink()
-    return old
 
 
 def as_version_2(value: Value) -> Value:
@@ -57,9 +45,6 @@ def as_version_1(value: Value) -> Value:
 def make_older(folder: Path, version: int) -> Path:
     """Rewrite an asset on disk: manifest and meshes; returns the folder."""
     value = json.loads((folder / "manifest.json").read_text())
-    if version == 3:
-        seal(folder, as_version_3(folder, value))
-        return folder
     for level in value["levels"]:
         data = (folder / level["meshes"][0]["file"]).read_bytes()
         for index, layer in enumerate(level["layers"]):

@@ -1,7 +1,6 @@
 """What manifest.json of an asset says, format version 4 (docs/reference/asset-format.md), as validated models.
 
-`manifest_file.py` reads and writes the file, and makes the JSON schema beside it; `older.py` brings manifests of older
-versions into this form.
+`manifest_file.py` reads and writes the file, and makes the JSON schema beside it.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from facefolds_core.asset.manifest_base import (
     StoredFile,
     Vector,
 )
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Pose, Poster, Stream
+from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster, Stream
 from facefolds_core.geometry.similarity import Similarity
 
 FORMAT_VERSION, LEAST_VERSION = 4, 3
@@ -240,7 +239,6 @@ class Manifest(Part):
         audio: of the sequence.
         photos: for comparison.
         track_file: the meshes' motion as a whole, one pose a frame (`track_file.py`); absent where they stand still.
-        track: the same in manifests of version 3.
         view: the range that was filmed; absent where it is not known.
         manifest_sha256: of the manifest's own bytes with these 64 digits replaced by zeros.
     """
@@ -261,7 +259,6 @@ class Manifest(Part):
     poster: Poster | None = None
     photos: tuple[Photo, ...] = ()
     track_file: Maybe[StoredFile] = None
-    track: Maybe[tuple[Pose, ...]] = None
     view: Maybe[FilmedView] = None
     manifest_sha256: Sha256 = UNSEALED
 

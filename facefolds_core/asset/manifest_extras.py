@@ -54,18 +54,6 @@ class Audio(StoredFile):
     mime: Maybe[str] = None
 
 
-class Pose(Part):
-    """Where the head stands in one frame: X_world = R X_mesh + t, normalised coordinates.
-
-    Attributes:
-        quaternion: w, x, y, z of R, of unit length.
-        translation: t.
-    """
-
-    quaternion: Row
-    translation: Vector
-
-
 class Directions(Part):
     """A range of directions, seen from the origin.
 

@@ -16,7 +16,6 @@ from pydantic import ValidationError
 
 from facefolds_core.asset.manifest import FORMAT_VERSION, LEAST_VERSION, REMEDY, UNSEALED, Manifest
 from facefolds_core.asset.manifest_base import without_absent
-from facefolds_core.asset.older import OLDEST, brought_up
 from facefolds_core.asset.stored import MISSING, special_problem
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import read_json, write_text
@@ -86,20 +85,19 @@ def parse_manifest(path: Path) -> Manifest:
             found=_shown(found),
             remedy=REMEDY,
         )
-    return _validated(path, _of_this_version(path, value))
+    _check_version(path, value)
+    return _validated(path, value)
 
 
-def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
-    """The same manifest as this version says it.
+def _check_version(path: Path, value: dict[str, Any]) -> None:
+    """Refuse what is not for this reader.
 
     Raises:
-        UserError: if it needs a newer reader, or an extension: none is known here.
+        UserError: if it is of an older version, needs a newer reader, or an extension: none is known here.
     """
     version, least = value.get("version"), value.get("minVersion")
-    if not isinstance(version, int) or isinstance(version, bool) or version < OLDEST:
+    if not isinstance(version, int) or isinstance(version, bool) or version < FORMAT_VERSION:
         least = None
-    elif version < FORMAT_VERSION:
-        return brought_up(value)
     elif version == FORMAT_VERSION:
         least = LEAST_VERSION  # a wrong one is said with the other keys
     if not isinstance(least, int) or isinstance(least, bool) or least > FORMAT_VERSION:
@@ -107,7 +105,7 @@ def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
             "an asset of another format version",
             file=path,
             place="version",
-            expected=f"{OLDEST} to {FORMAT_VERSION}",
+            expected=FORMAT_VERSION,
             found=_shown(version),
             remedy="make the asset again with this version of facefolds, or read it with the one that made it",
         )
@@ -120,7 +118,6 @@ def _of_this_version(path: Path, value: dict[str, Any]) -> dict[str, Any]:
             found=_shown(required[0]),
             remedy="read it with the program that made it",
         )
-    return value
 
 
 def _validated(path: Path, value: dict[str, Any]) -> Manifest:

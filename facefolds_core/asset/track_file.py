@@ -1,7 +1,6 @@
 """The head's poses as a file beside the manifest: ten minutes of them are half a megabyte, and 4.3 as JSON.
 
-`track.bin` has for each frame 7 little-endian float32: the quaternion w, x, y, z, and the translation. Manifests of
-version 3 have the poses in themselves.
+`track.bin` has for each frame 7 little-endian float32: the quaternion w, x, y, z, and the translation.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ def read_track(folder: Path, manifest: Manifest) -> Track | None:
     """
     entry = manifest.track_file
     if entry is None:
-        return _in_manifest(manifest)
+        return None
     path = folder / entry.file
     data = read_slice(path, 0, entry.bytes, entry.sha256, REMEDY)
     problems = track_problems(manifest, data)
@@ -54,16 +53,14 @@ def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
     """What is wrong with the poses, in words.
 
     Args:
-        data: of the track's file; without it what the manifest itself says is looked at.
+        data: of the track's file; without it only what the manifest says is looked at.
     """
     frames, entry = manifest.full.texture.frames, manifest.track_file
     if entry is not None and entry.bytes != POSE_BYTES * frames:
         return [f"{entry.bytes} bytes are no poses of {POSE_BYTES} for {frames} frames"]
-    if entry is not None and manifest.track is not None:
-        return ["poses in the manifest and in a file"]
-    track = _in_manifest(manifest) if entry is None else None if data is None else _unpacked(data)
-    if track is None:
+    if data is None:
         return []
+    track = _unpacked(data)
     problems = track.problems(frames)
     if not problems and np.abs(track.translations).max() > FARTHEST:
         problems.append(f"the head is more than {FARTHEST:g} units away")
@@ -73,10 +70,3 @@ def track_problems(manifest: Manifest, data: bytes | None = None) -> list[str]:
 def _unpacked(data: bytes) -> Track:
     numbers = np.frombuffer(data, "<f4").reshape(-1, NUMBERS).astype(float)
     return Track(numbers[:, :4].copy(), numbers[:, 4:].copy())
-
-
-def _in_manifest(manifest: Manifest) -> Track | None:
-    if manifest.track is None:
-        return None
-    rows = np.array([[*pose.quaternion, *pose.translation] for pose in manifest.track], float).reshape(-1, NUMBERS)
-    return Track(rows[:, :4].copy(), rows[:, 4:].copy())

@@ -25,7 +25,6 @@ COMMANDS = {
     "scores": "Scores, size and place of the assets that were made.",
     "report": "A page that tells all about a subject.",
     "run": "Many subjects, or a grid of parameters, at once: here or on a cluster.",
-    "collect": "One table of the experiments of `dvc exp run`.",
     "doctor": "Is all here that the pipeline needs? Mends what a killed DVC leaves. What is in a folder?",
 }
 """Name -> what it does. `NAME` is the function `command` of `facefolds_core/cli/NAME.py`, with _ for -."""
@@ -36,7 +35,6 @@ EXTRAS = {
     "scores": "train",
     "report": "report",
     "run": "cluster",
-    "collect": "pipeline",
 }
 """Commands that need more than the base -> the extra that brings it."""
 

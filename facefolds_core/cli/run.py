@@ -18,8 +18,7 @@ from facefolds_core.cluster.jobs import how_to_repeat, read_grid, record, subjec
 from facefolds_core.config.params_file import load_params
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.writing import write_text
-from facefolds_core.sweeps.experiments import figures_of
-from facefolds_core.sweeps.table import Run, write_runs
+from facefolds_core.sweeps.table import Run, figures_of, write_runs
 
 LOGS = Path(".dvc", "tmp", "jobs", "logs")
 CELLS = LOGS.with_name("cells")

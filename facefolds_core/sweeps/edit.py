@@ -61,5 +61,5 @@ def set_for_subject(path: Path, subject: str, values: Mapping[str, Any]) -> None
                 place=error.place,
                 expected=error.expected,
                 found=error.found,
-                remedy="collect the sweep again with this version of the project",
+                remedy="correct the values: docs/reference/params.md lists what each key takes",
             ) from None

@@ -23,6 +23,8 @@ from facefolds_core.files.writing import atomic_file
 
 NAMES = ("experiment", "revision", "subject", "error")
 SUFFIXES = (".parquet", ".csv")
+VALIDATE = "validate_"
+"""Before the name of a figure: on the cameras for validation, not on the held-out ones."""
 MISSING = object()
 """In place of a value where a run lacks the key."""
 
@@ -46,6 +48,23 @@ class Run:
     params: Mapping[str, Any] = field(default_factory=dict)
     figures: Mapping[str, float] = field(default_factory=dict)
     error: str = ""
+
+
+def figures_of(metrics: Mapping[str, Any]) -> dict[str, float]:
+    """Scores of the asset and all costs of a metrics.json, those that are numbers; and `bytes`, all that ships.
+
+    Scores on cameras for validation are named `validate_psnr_subject` and so on. Scores within the model's own matte
+    are left out: each training has its own, so they tell nothing of which is better.
+    """
+    listed = dict(metrics.get("asset", {}))
+    listed |= {f"{VALIDATE}{name}": value for name, value in metrics.get("validate", {}).get("asset", {}).items()}
+    if metrics.get("matte") == "found":
+        listed = {name: value for name, value in listed.items() if not name.endswith("_found")}
+    listed |= metrics.get("cost", {})
+    found = {name: float(v) for name, v in listed.items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
+    if found:
+        found["bytes"] = sum(found.get(name, 0.0) for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
+    return found
 
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:

@@ -149,7 +149,7 @@ def test_what_became_of_experiments_is_kept_failures_too(monkeypatch: pytest.Mon
         Run("brisk-otter", "actor", "abc", figures=figures),
     ]
     monkeypatch.setattr(sweeps, "shown_experiments", lambda: None)
-    monkeypatch.setattr(sweeps, "runs_of", lambda *_, distinct: (runs, 2))
+    monkeypatch.setattr(sweeps, "runs_of", lambda _: (runs, 2))
     monkeypatch.setattr(sweeps, "DVCFileSystem", Files)
     monkeypatch.setattr(sweeps, "drawing_speed", lambda _: (8.5, "llvmpipe"))
     path = tmp_path / "rows.json"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -13,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from bench.experiments import runs_of
 from facefolds_core.sweeps.table import Run
 from tests.pipeline.test_dvc_yaml import STAGES
-from tests.sweeps.tables import read_runs
 
 COMPUTING = STAGES[1:]
 STUB = Path(__file__).with_name("stub_stage.py")
@@ -79,8 +80,7 @@ def grid(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
         assert time.monotonic() < end
         time.sleep(2)
     project.run("dvc", "queue", "stop", "--kill")
-    project.run("python", "-m", "facefolds_core", "collect", "--out", "sweep.parquet")
-    return read_runs(root / "sweep.parquet"), project.stages_run()
+    return runs_of(json.loads(project.run("dvc", "exp", "show", "--json")))[0], project.stages_run()
 
 
 def test_a_failed_cell_does_not_lose_the_others(grid: tuple[list[Run], Counter[str]]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.sweeps.table import Run, write_runs
+from facefolds_core.sweeps.table import Run, figures_of, write_runs
 from tests.sweeps.tables import read_runs
 
 RUNS = [
@@ -36,3 +36,19 @@ def test_round_trip(name: str, tmp_path: Path) -> None:
 def test_another_kind_of_table_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="kind of table"):
         write_runs(tmp_path / "sweep.xlsx", RUNS)
+
+
+def test_scores_for_validation_have_names_of_their_own() -> None:
+    metrics = {
+        "asset": {"psnr_subject": 30.0},
+        "validate": {"images": 3, "asset": {"psnr_subject": 29.0, "ssim": None}},
+    }
+    figures = figures_of(metrics)
+    assert (figures["psnr_subject"], figures["validate_psnr_subject"]) == (30, 29)
+    assert "validate_ssim" not in figures
+
+
+@pytest.mark.parametrize(("matte", "kept"), [("found", False), ("scene", True)])
+def test_a_models_own_matte_is_no_judge(matte: str, kept: bool) -> None:
+    figures = figures_of({"matte": matte, "asset": {"psnr_found": 20.0, "psnr": 10.0}})
+    assert ("psnr_found" in figures, figures["psnr"]) == (kept, 10)

@@ -57,11 +57,11 @@ namespace Facefolds
     /// in words for people.</summary>
     public sealed class Manifest
     {
-        public const int Oldest = 2, Newest = 4;
+        public const int Known = 4;
         public string Subject;
         public int Version;
         public List<Level> Levels; // coarsest first
-        public List<Pose> Track; // empty: the head stands still, or its poses are in TrackFile
+        public List<Pose> Track = new List<Pose>(); // empty: the head stands still, or TrackFile has not been read
         public string TrackFile; // null: none
 
         public static Manifest Parse(string text)
@@ -71,9 +71,9 @@ namespace Facefolds
                 throw new FormatException("this is no manifest of facefolds");
             int version = fields.Whole("version");
             int needed = fields.Has("minVersion") ? fields.Whole("minVersion") : version; // whose readers show it right
-            if (version < Oldest || needed > Newest)
-                throw new FormatException("format " + version + " cannot be read: this player reads " + Oldest + " to " + Newest
-                    + (needed > Newest ? "; update the package" : "; make the asset again"));
+            if (version < Known || needed > Known)
+                throw new FormatException("format " + version + " cannot be read: this player reads " + Known
+                    + (needed > Known ? "; update the package" : "; make the asset again"));
             if (fields.Has("extensionsRequired"))
                 throw new FormatException("the asset needs extensions that this player does not know; update the package");
             var result = new Manifest
@@ -81,13 +81,9 @@ namespace Facefolds
                 Subject = fields.Has("subject") ? fields.Text("subject") : "",
                 Version = version,
                 Levels = fields.Objects("levels").Select(OfLevel).ToList(),
-                Track = fields.Has("track") ? fields.Objects("track").Select(OfPose).ToList() : new List<Pose>(),
                 TrackFile = fields.Has("track_file") ? PlainName(fields.Object("track_file").Text("file")) : null,
             };
             if (result.Levels.Count == 0) throw new FormatException("levels is empty");
-            int frames = result.Levels.Last().Frames;
-            if (result.Track.Count != 0 && result.Track.Count != frames)
-                throw new FormatException("track has " + result.Track.Count + " poses for " + frames + " frames");
             return result;
         }
 
@@ -128,7 +124,7 @@ namespace Facefolds
                 Width = texture.Whole("width"),
                 Height = texture.Whole("height"),
                 Frames = texture.Whole("frames"),
-                Fps = texture.Has("frame_rate") ? Ratio(texture.Numbers("frame_rate", 2)) : texture.Number("fps"),
+                Fps = Ratio(texture.Numbers("frame_rate", 2)),
                 Colour = Rect4.From(texture.Numbers("colour_rect", 4)),
                 Alpha = Rect4.From(texture.Numbers("alpha_rect", 4)),
                 Videos = texture.Has("videos") ? texture.Objects("videos").Select(OfVideo).ToList() : new List<Video>(),
@@ -146,7 +142,7 @@ namespace Facefolds
             return new Layer
             {
                 Mesh = PlainName(fields.Text("mesh")),
-                Offset = fields.Has("offset") ? fields.Whole("offset") : 0, // format 2: a file a mesh
+                Offset = fields.Whole("offset"),
                 Bytes = fields.Whole("bytes"),
                 Rect = Rect4.From(fields.Numbers("texture_rect", 4)),
                 Window = fields.Numbers("uv_window", 4),
@@ -179,11 +175,6 @@ namespace Facefolds
                 GlossScale = fields.Number("gloss_scale"),
                 OffsetScale = fields.Number("offset_scale"),
             };
-        }
-
-        static Pose OfPose(Fields fields)
-        {
-            return new Pose { Quaternion = fields.Numbers("quaternion", 4), Translation = fields.Numbers("translation", 3) };
         }
 
         /// <summary>Files lie in the asset's folder itself: a name that leads elsewhere is refused.</summary>

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from bench.experiments import runs_of
 from facefolds_core.errors import UserError
-from facefolds_core.sweeps.experiments import figures_of, runs_of
 
 
 def data(r: int, t: int, psnr: dict[str, float]) -> dict[str, Any]:
@@ -62,30 +62,6 @@ def test_a_row_has_the_overrides_that_differ_and_what_was_measured() -> None:
 def test_a_section_counts_where_a_subject_has_no_override() -> None:
     anna = [run for run in runs_of(SHOWN)[0] if run.subject == "anna" and run.figures]
     assert [dict(run.params) for run in anna] == [{"decimate.resolution": 64}, {"decimate.resolution": 16}]
-
-
-def test_rows_that_agree_are_one() -> None:
-    again = experiment("again", "success", data(64, 256, {"actor": 25.0}))
-    runs, _ = runs_of([*SHOWN, {"rev": "1", "name": "x", "data": None, "experiments": [again]}])
-    assert [run.experiment for run in runs if run.subject == "actor"] == ["workspace", "coarse", "fine", "broken"]
-    runs, _ = runs_of([*SHOWN, {"rev": "1", "name": "x", "data": None, "experiments": [again]}], distinct=False)
-    assert {run.experiment for run in runs if run.subject == "actor"} >= {"again", "workspace"}
-
-
-def test_scores_for_validation_have_names_of_their_own() -> None:
-    metrics = {
-        "asset": {"psnr_subject": 30.0},
-        "validate": {"images": 3, "asset": {"psnr_subject": 29.0, "ssim": None}},
-    }
-    figures = figures_of(metrics)
-    assert (figures["psnr_subject"], figures["validate_psnr_subject"]) == (30, 29)
-    assert "validate_ssim" not in figures
-
-
-@pytest.mark.parametrize(("matte", "kept"), [("found", False), ("scene", True)])
-def test_a_models_own_matte_is_no_judge(matte: str, kept: bool) -> None:
-    figures = figures_of({"matte": matte, "asset": {"psnr_found": 20.0, "psnr": 10.0}})
-    assert ("psnr_found" in figures, figures["psnr"]) == (kept, 10)
 
 
 @pytest.mark.parametrize("shown", [{"a": 1}, [1], [{"name": "main"}], None])

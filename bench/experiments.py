@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from facefolds_core.errors import UserError
 from facefolds_core.params import STAGE_SECTIONS
-from facefolds_core.sweeps.table import Run
+from facefolds_core.sweeps.table import Run, figures_of
 
 PARAMS = "params.yaml"
 METRICS = "data/{subject}/metrics.json"
-VALIDATE = "validate_"
-"""Before the name of a figure: on the cameras for validation, not on the held-out ones."""
 PENDING = ("queued", "running")
 
 
@@ -29,16 +29,28 @@ class _Shown:
     pending: bool
 
 
-def runs_of(shown: Any, distinct: bool = True) -> tuple[list[Run], int]:
+def shown_experiments() -> object:
+    """What `dvc exp show --json` says in this folder.
+
+    Raises:
+        UserError: with DVC's own message, if it fails.
+    """
+    command = [sys.executable, "-m", "dvc", "exp", "show", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        remedy = "run this in the project's root folder, a git checkout"
+        raise UserError("`dvc exp show` failed", found=done.stderr.strip()[-500:], remedy=remedy)
+    return json.loads(done.stdout)
+
+
+def runs_of(shown: Any) -> tuple[list[Run], int]:
     """Rows, and how many experiments have not ended yet.
 
     A row is an experiment (or the working folder, "workspace", or a commit) and a subject. Its parameters are those of
-    the stages' sections, the subject's overrides merged in, that differ among the subject's rows. Rows that agree in
-    all but the name are one: an experiment on one subject shows the others as they were.
+    the stages' sections, the subject's overrides merged in, that differ among the subject's rows.
 
     Args:
         shown: the parsed JSON.
-        distinct: False keeps rows that agree in all but the name.
 
     Raises:
         UserError: if it is not of the kind that DVC 3 writes.
@@ -54,8 +66,7 @@ def runs_of(shown: Any, distinct: bool = True) -> tuple[list[Run], int]:
     measured = {run.subject for run in runs if run.figures}
     known = [run for run in runs if run.figures or (run.error and (run.subject in measured or not measured))]
     subjects = sorted({run.subject for run in known})
-    groups = [[run for run in known if run.subject == subject] for subject in subjects]
-    return [row for group in groups for row in _rows(group, distinct)], pending
+    return [row for subject in subjects for row in _rows([run for run in known if run.subject == subject])], pending
 
 
 def _revisions(shown: Any) -> Iterator[_Shown]:
@@ -85,23 +96,6 @@ def _runs(shown: _Shown) -> Iterator[Run]:
         yield Run(shown.name, subject, shown.revision, sections_of(params, subject), figures, error)
 
 
-def figures_of(metrics: Mapping[str, Any]) -> dict[str, float]:
-    """Scores of the asset and all costs of a metrics.json, those that are numbers; and `bytes`, all that ships.
-
-    Scores on cameras for validation are named `validate_psnr_subject` and so on. Scores within the model's own matte
-    are left out: each training has its own, so they tell nothing of which is better.
-    """
-    listed = dict(metrics.get("asset", {}))
-    listed |= {f"{VALIDATE}{name}": value for name, value in metrics.get("validate", {}).get("asset", {}).items()}
-    if metrics.get("matte") == "found":
-        listed = {name: value for name, value in listed.items() if not name.endswith("_found")}
-    listed |= metrics.get("cost", {})
-    found = {name: float(v) for name, v in listed.items() if isinstance(v, (int, float)) and not isinstance(v, bool)}
-    if found:
-        found["bytes"] = sum(found.get(name, 0.0) for name in ("mesh_bytes", "texture_bytes", "reflection_bytes"))
-    return found
-
-
 def sections_of(params: Mapping[str, Any], subject: str) -> dict[str, Any]:
     """ "section.key" -> value for one subject, from a whole params.yaml; overrides beat sections."""
     found: dict[str, Any] = {}
@@ -119,14 +113,8 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def _rows(runs: list[Run], distinct: bool) -> list[Run]:
-    """Of one subject: with the parameters that differ; each row once, if they are to be distinct."""
+def _rows(runs: list[Run]) -> list[Run]:
+    """Of one subject: with the parameters that differ."""
     names = list(dict.fromkeys(name for run in runs for name in run.params))
     differ = [name for name in names if len({json.dumps(run.params.get(name)) for run in runs}) > 1]
-    rows: dict[str, Run] = {}
-    for run in runs:
-        kept = {name: run.params[name] for name in differ if name in run.params}
-        name = "" if distinct else run.experiment
-        key = json.dumps([kept, dict(run.figures), run.error, name], sort_keys=True)
-        rows.setdefault(key, replace(run, params=kept))
-    return list(rows.values())
+    return [replace(run, params={name: run.params[name] for name in differ if name in run.params}) for run in runs]
