@@ -46,5 +46,5 @@ class Registry:
 SOURCES = Registry("facefolds_core.captures.sources")
 CODECS = Registry("facefolds_core.asset.codecs")
 EXPORTERS = Registry("facefolds_core.engines")
-MODELS = Registry("facefolds_core.models")
+MODELS = Registry("facefolds_core.training.trainers")
 REGISTRIES = (SOURCES, CODECS, EXPORTERS, MODELS)

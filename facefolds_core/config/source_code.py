@@ -54,10 +54,10 @@ def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, 
 CALLED_BY = {
     "spec": "facefolds_core.model.storage",
     "build": "facefolds_core.model.storage",
-    "fit": "facefolds_core.models",
-    "train": "facefolds_core.models",
+    "fit": "facefolds_core.training.trainers",
+    "train": "facefolds_core.training.trainers",
 }
-"""Function of a model's module (facefolds_core/models) -> module that calls it."""
+"""Function of a model's module (facefolds_core/training/trainers) -> module that calls it."""
 
 
 def _join_models(graph: grimp.ImportGraph, root: Path) -> None:

@@ -127,7 +127,7 @@ class ExplicitSpec(BaseModel):
 
 @cache
 def _specs() -> TypeAdapter[Spec]:
-    """Of all models (facefolds_core/models), told apart by `kind`."""
+    """Of all models (facefolds_core/training/trainers), told apart by `kind`."""
     kinds: Any = Union[tuple(MODELS[name].spec() for name in MODELS.names)]  # noqa: UP007
     return TypeAdapter(Annotated[kinds, Field(discriminator="kind")])
 

@@ -1,4 +1,4 @@
-"""`train`: one of the models (facefolds_core/models), told apart by the preset, each with its own keys."""
+"""`train`: one of the models (facefolds_core/training/trainers), told apart by the preset, each with its own keys."""
 
 from __future__ import annotations
 

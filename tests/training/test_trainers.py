@@ -8,9 +8,9 @@ from typing import get_args
 
 import pytest
 
-from facefolds_core import models
 from facefolds_core.params import PRESETS, TrainParams
 from facefolds_core.registry import MODELS, Registry
+from facefolds_core.training import trainers
 
 
 @pytest.mark.parametrize("name", MODELS.names)
@@ -29,5 +29,5 @@ def test_a_model_without_files_of_its_own_is_written_by_its_fit(
     trained = SimpleNamespace(save=saved.append, report="seconds")
     monkeypatch.setattr(Registry, "__getitem__", lambda *_: SimpleNamespace(fit=lambda *_: trained))
     params = SimpleNamespace(model="new")
-    assert models.train(None, params, tmp_path, tmp_path, tmp_path) == "seconds"  # type: ignore[arg-type]
+    assert trainers.train(None, params, tmp_path, tmp_path, tmp_path) == "seconds"  # type: ignore[arg-type]
     assert saved == [tmp_path]
