@@ -80,6 +80,3 @@ def test_processes_are_handed_what_is_reflected(made: tuple[Scene, Path, Base], 
         shutil.copytree(folder / "checkpoints", place / "checkpoints")
         train_take(scene, lit(processes=processes), place / "model", place / "checkpoints", place / "log")
     assert same(tmp_path / "1" / "model", tmp_path / "2" / "model")
-    shutil.copytree(folder / "checkpoints", tmp_path / "checkpoints")
-    train_take(scene, lit("end", processes=1), tmp_path / "model", tmp_path / "checkpoints", tmp_path / "log")
-    assert not same(tmp_path / "1" / "model", tmp_path / "model")
