@@ -160,7 +160,7 @@ def test_outlines_that_are_too_thin_are_caught(scene: Scene, run: Run, monkeypat
 
 def test_geometry_that_drifts_is_caught(scene: Scene, run: Run) -> None:
     """All layers lie a hundredth of a unit (three millimetres) too far out."""
-    centre = run.asset.manifest.sphere_centre
+    centre = run.asset.manifest.coordinates.sphere_centre
     layers = tuple(replace(layer, vertices=outwards(layer.vertices, centre, 0.01)) for layer in run.asset.layers)
     drifted = cast(Asset, Changed(run.asset, list(run.asset.frames()), layers))
     assert {"psnr_any", "psnr_interior"} & caught(run, judge(scene, run.model, drifted))

@@ -17,13 +17,14 @@ subjects:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {preset: fast, iterations: 130, layers: 3}
+    train: {preset: fast, iterations: 60, layers: 3, geometry: {nodes: 48, round_iterations: 20},
+            reflection: {texels: 6, environment_texels: 4}}
   stabilised:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     normalize: {stabilize: true}
-    train: {iterations: 300, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+    train: {iterations: 150, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
 capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true, plates: false}
 subject: {iterations: 150}
 train: {preset: quick}
@@ -34,6 +35,7 @@ texture: {resolution: 32}
 bake: {}
 normalize: {}
 compress:
+  video: {preset: veryfast, target_psnr: null}
   levels: [{name: small, mesh_resolution: 8, texture_resolution: 32, crf: 30}]
 evaluate: {}
 """
