@@ -23,8 +23,9 @@ RUN_ONCE = ("tests/pipeline/test_end_to_end.py", "tests/pipeline/test_commands.p
 """Tests of one project that DVC has run."""
 COMPILED = ("tests/captures/test_actor_pictures.py",)
 """The actor's renderer: in a fresh clone it is compiled for 40 s, which one worker should do before others need it."""
-LONGEST = (*COMPILED, *RUN_ONCE, *BROWSER, "tests/hostile/", "tests/pipeline/", "tests/training/")
-"""What several workers begin with."""
+LONGEST = (*COMPILED, *BROWSER, *RUN_ONCE, "tests/pipeline/", "tests/training/", "tests/hostile/")
+"""What several workers begin with. Of two, one compiles the actor's renderer and runs the project; the other has
+the browser meanwhile, which needs no kernel of a training: none is compiled twice."""
 
 
 @pytest.fixture(scope="session")

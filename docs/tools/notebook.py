@@ -29,16 +29,20 @@ def read(path: Path = NOTEBOOK) -> dict[str, Any]:
     return notebook
 
 
-def run(notebook: dict[str, Any], folder: Path) -> Iterator[tuple[dict[str, Any], Any]]:
+def run(
+    notebook: dict[str, Any], folder: Path, names: dict[str, Any] | None = None
+) -> Iterator[tuple[dict[str, Any], Any]]:
     """Execute the code cells one after the other, as a notebook does.
 
     Args:
         folder: that they run in; it is the working directory until the last one has been taken.
+        names: gets what the cells define.
 
     Yields:
         each code cell, and the value of its last line; None where that is no expression.
     """
-    names: dict[str, Any] = {"__name__": "__main__"}
+    names = {} if names is None else names
+    names["__name__"] = "__main__"
     with chdir(folder):
         for cell in notebook["cells"]:
             if cell["cell_type"] == "code":

@@ -1,9 +1,11 @@
-"""The lines that people type, from a capture to scores, on a tiny film; every object on the way, and what it shows."""
+"""The lines that people type, from footage to scores: the cells of the documents' notebook, on a tinier film."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import trimesh
 from PIL import Image
 
 import facefolds_core as facefolds
+from docs.tools.notebook import NOTEBOOK, run
 from facefolds_core.api import asset as shown
 from facefolds_core.errors import UserError
 from tests.hostile.damage import fingerprint
@@ -23,7 +26,16 @@ CUT = {
     "texture": {"resolution": 48},
     "compress": {"levels": [], "video": {"target_psnr": None, "preset": "fast"}},
 }
-TRAIN = {"layers": 3, "iterations": 63, "geometry": {"nodes": 48, "round_iterations": 20}}
+SMALLER = {
+    "cameras=12, frames=3, height=96, width=64": "name='anna', folder='FOLDER/data', mattes=True, "
+    "cameras=8, frames=2, height=48, width=32",
+    "iterations=400": "iterations=60",
+    'layers=6, iterations=150, geometry={"nodes": 96, "round_iterations": 30}': "layers=3, iterations=63, "
+    'geometry={"nodes": 48, "round_iterations": 20}',
+    'export("face", sample={"resolution": 96}, decimate={"resolution": 24}, texture={"resolution": 96}': "export("
+    f"'FOLDER/face', **{CUT}",
+}
+"""What the notebook has, and what is run here in its place."""
 
 
 @dataclass(frozen=True)
@@ -41,21 +53,19 @@ class Made:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
-    folder = tmp_path_factory.mktemp("lines")
-    film = facefolds.film_actor(
-        name="film", folder=folder / "films", cameras=8, frames=2, height=48, width=32, mattes=True
-    )
-    capture = facefolds.load_capture(film.folders.capture, name="anna", folder=folder / "data", holdout=["A003"])
-    scene = facefolds.normalize(capture)
-    subject = facefolds.find_subject(scene, iterations=60)
-    model = facefolds.train(scene, subject, **TRAIN)
-    asset = model.export(folder / "face", **CUT)
-    scores = facefolds.evaluate(asset, scene, films=False)
-    return Made(folder, capture, scene, subject, model, asset, scores)
+    folder, text = tmp_path_factory.mktemp("lines"), NOTEBOOK.read_text(encoding="utf-8")
+    for old, new in SMALLER.items():
+        old, new = (json.dumps(words.replace("FOLDER", str(folder)))[1:-1] for words in (old, new))
+        assert text.count(old) == 1, f"the notebook has not once: {old}"
+        text = text.replace(old, new)
+    names = dict[str, Any]()
+    for _ in run(json.loads(text), folder, names):
+        pass
+    return Made(folder, *(names[field.name] for field in fields(Made)[1:]))
 
 
 def test_each_says_what_it_is(made: Made) -> None:
-    assert repr(made.capture).startswith("Capture(anna, multiface: 8 cameras, 2 frames at 30 a second")
+    assert repr(made.capture).startswith("Capture(anna, actor: 8 cameras, 2 frames at 1.33333 a second")
     assert repr(made.scene).startswith("Scene(anna: 8 cameras, 1 of them not for training, 2 frames")
     assert repr(made.subject).startswith("Subject(anna: ")
     assert repr(made.model) == "Model(anna: 3 layers, 2 frames)"
@@ -63,11 +73,16 @@ def test_each_says_what_it_is(made: Made) -> None:
     assert "PSNR over any background, dB" in repr(made.scores)
 
 
+def test_what_was_filmed_is_a_capture_like_any_other(made: Made, tmp_path: Path) -> None:
+    capture = facefolds.load_capture(made.capture.folders.capture, name="bea", folder=tmp_path, holdout=["A005"])
+    assert repr(capture).startswith("Capture(bea, multiface: 8 cameras, 2 frames at 30 a second")
+
+
 def test_model_and_asset_show_what_was_filmed(made: Made) -> None:
-    photo = made.scene.photo("A003", 1).astype(float)
-    subject = made.subject.matte("A003", 1) > 250
+    photo = made.scene.photo("A005", 1).astype(float)
+    subject = made.subject.matte("A005", 1) > 250
     assert subject.mean() > 0.05
-    for picture in (made.model.render("A003", 1, (0, 0, 0)), made.asset.render("A003", 1, (0, 0, 0))):
+    for picture in (made.model.render("A005", 1, (0, 0, 0)), made.asset.render("A005", 1, (0, 0, 0))):
         assert picture.dtype == np.uint8 and picture.shape == photo.shape
         assert np.abs(picture - photo)[subject].mean() < 40
 
@@ -121,7 +136,7 @@ def test_a_loaded_model_is_the_same_and_leaves_its_folder_alone(made: Made) -> N
 def test_a_scene_shows_its_cameras(made: Made) -> None:
     svg = made.scene._repr_html_()
     assert svg.startswith("<svg") and svg.count("<polygon") == 2 * len(made.scene.cameras)
-    assert svg.count("A003 (holdout)") == 2
+    assert svg.count("A005 (holdout)") == 2
 
 
 def test_a_subject_shows_its_cut_outs(made: Made) -> None:

@@ -159,6 +159,7 @@ def test_results_travel_through_s3(tmp_path: Path, project_root: Path) -> None:
     assert not list((root / ".dvc" / "tmp" / "jobs" / "dask-scratch-space").glob("worker-*"))
 
 
+@pytest.mark.nightly
 def test_a_sweep_gives_a_table(tmp_path: Path, project_root: Path) -> None:
     root = make_project(tmp_path / "project", "a")
     (root / "grid.yaml").write_text("decimate.resolution: [8, 16]\n")

@@ -8,7 +8,7 @@ import pytest
 
 from tests.hostile.fuzz_kills import run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
 
 
 def test_killed_runs_are_recovered(tmp_path: Path) -> None:

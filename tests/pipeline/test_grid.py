@@ -66,12 +66,33 @@ class GridProject:
 
 
 @pytest.fixture(scope="module")
-def grid(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], Counter[str]]:
-    """Rows of a grid of two texture resolutions, one of which fails, and which stages it ran."""
-    root = tmp_path_factory.mktemp("grid") / "project"
-    project = GridProject(project_root, root)
+def project(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> GridProject:
+    """One that was run."""
+    project = GridProject(project_root, tmp_path_factory.mktemp("grid") / "project")
     project.run("dvc", "repro", "evaluate@actor")
     assert project.stages_run() == Counter(COMPUTING)
+    return project
+
+
+def test_a_texture_resolution_reruns_what_follows_and_is_kept(project: GridProject) -> None:
+    """For all subjects or for one: DVC's cache has it either way."""
+    path = project.root / "params.yaml"
+    before = path.read_text()
+    place = "    path: facefolds_core/captures/actor\n"
+    for old, new, ran in (
+        ("auto # R^t", "48 # R^t", ["texture", "bake", "compress", "evaluate"]),
+        (place, f"{place}    texture: {{resolution: 48}}\n", []),
+    ):
+        assert before.count(old) == 1
+        path.write_text(before.replace(old, new))
+        project.run("dvc", "repro", "evaluate@actor")
+        assert project.stages_run() == Counter(ran)
+    path.write_text(before)
+
+
+@pytest.fixture(scope="module")
+def grid(project: GridProject) -> tuple[list[Run], Counter[str]]:
+    """Rows of a grid of two texture resolutions, one of which fails, and which stages it ran."""
     values = "texture.resolution=13,128"
     project.run("dvc", "exp", "run", "--queue", "-S", values, "-S", "decimate.resolution=16", "evaluate@actor")
     project.run("dvc", "queue", "start", "-j", "2")

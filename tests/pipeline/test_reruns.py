@@ -49,13 +49,9 @@ def test_another_subjects_key_reruns_that_subject(project: TinyProject) -> None:
     assert ran(project) == ["capture@two", "configure"]
 
 
-def test_words_in_the_code_rerun_configure_alone(project: TinyProject) -> None:
+def test_words_and_code_that_the_stage_does_not_use_rerun_configure_alone(project: TinyProject) -> None:
     change(project, "stages/capture.py", '"""Generate the embedded', '"""Generate (in other words) the embedded')
     change(project, "facefolds_core/geometry/cameras.py", "from __future__", "# a comment\nfrom __future__")
-    assert ran(project) == ["configure"]
-
-
-def test_code_that_the_stage_does_not_use_does_not_rerun_it(project: TinyProject) -> None:
     change(project, "facefolds_core/pipeline/train.py", "PSNR {report", "psnr {report")
     assert ran(project) == ["configure"]
 

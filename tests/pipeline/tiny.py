@@ -17,21 +17,14 @@ subjects:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
-    train: {iterations: 60, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
+    train: {preset: fast, iterations: 60, layers: 3, geometry: {nodes: 48, round_iterations: 20},
+            reflection: {texels: 6, environment_texels: 4}}
   stabilised:
     source: actor
     path: facefolds_core/captures/actor
     holdout: {every: 4}
     normalize: {stabilize: true}
-    train: {iterations: 300, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
-  fast:
-    source: actor
-    path: facefolds_core/captures/actor
-    holdout: {every: 4}
-    train:
-      preset: fast
-      layers: 3
-      iterations: 130
+    train: {iterations: 150, checkpoint_seconds: 0.2, rays: 512, layers: 3, texture_width: 32, manifold_width: 32}
 capture: {cameras: 8, frames: 2, height: 48, width: 32, mattes: true, plates: false}
 subject: {iterations: 150}
 train: {preset: quick}
@@ -42,6 +35,7 @@ texture: {resolution: 32}
 bake: {}
 normalize: {}
 compress:
+  video: {preset: veryfast, target_psnr: null}
   levels: [{name: small, mesh_resolution: 8, texture_resolution: 32, crf: 30}]
 evaluate: {}
 """
@@ -104,15 +98,12 @@ class TinyProject:
     def repro(self, *targets: str) -> tuple[int, str]:
         return self.run("dvc", "repro", *targets)
 
-    def stage(self, name: str, *arguments: str) -> tuple[int, str]:
-        return self.run("python", "-m", f"stages.{name}", "--subject", "actor", *arguments)
-
-    def stage_here(self, name: str) -> tuple[int, str]:
-        """The same in this process, which has imported what stages import (seconds)."""
+    def stage_here(self, name: str, subject: str = "actor") -> tuple[int, str]:
+        """A stage in this process, which has imported what stages import (seconds): exit status and output."""
         said = io.StringIO()
         before = sys.argv
         with chdir(self.root), redirect_stdout(said), redirect_stderr(said):
-            sys.argv = [name, "--subject", "actor"]
+            sys.argv = [name, "--subject", subject]
             try:
                 runpy.run_path(str(self.root / "stages" / f"{name}.py"), run_name="__main__")
             except SystemExit as end:

@@ -32,8 +32,9 @@ GEOMETRY = ExplicitParams().geometry
 
 
 def _params(**values: object) -> ExplicitParams:
-    given = {"preset": "fast", "device": "cpu", "layers": 6, "iterations": 330, **values}
-    params = train_params(given)
+    few = {"iterations": 10, "geometry": {"nodes": 48, "round_iterations": 15}}
+    small = {"layers": 6, "reflection": {"texels": 6, "environment_texels": 4}, **few}
+    params = train_params({"preset": "fast", "device": "cpu", **small, **values})
     assert isinstance(params, ExplicitParams)
     return params
 
@@ -57,7 +58,7 @@ def _held_out_psnr(scene: Scene, folder: Path) -> float:
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, Path]:
     folder = tmp_path_factory.mktemp("explicit")
     scene = make_scene(folder / "scene", size=64, surface_radius=OPAQUE[0].radius, mattes=True)
-    train_explicit(scene, _params(), folder / "model", folder / "log")
+    train_explicit(scene, _params(iterations=330, geometry={}), folder / "model", folder / "log")
     return scene, folder / "model"
 
 
@@ -65,14 +66,11 @@ def test_a_textured_sphere_is_seen_from_a_new_camera(trained: tuple[Scene, Path]
     assert _held_out_psnr(*trained) > 22
 
 
-def test_a_matte_sphere_has_no_reflection(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+def test_a_matte_sphere_has_no_reflection(trained: tuple[Scene, Path]) -> None:
     """It is tried, found to gain nothing on cameras left out, and said to be left out."""
-    reflection = {"enabled": True, "texels": 6, "environment_texels": 4}
-    train_explicit(trained[0], _params(reflection=reflection), tmp_path / "model", tmp_path / "log")
-    events = json.loads((tmp_path / "model" / "fit.json").read_text())["events"]
+    events = json.loads((trained[1] / "fit.json").read_text())["events"]
     assert "no_reflection" in {event["kind"] for event in events}
-    assert load_model(tmp_path / "model").reflection_maps() is None
-    assert _held_out_psnr(trained[0], tmp_path / "model") > 22
+    assert load_model(trained[1]).reflection_maps() is None
 
 
 def test_model_folder_is_whole(trained: tuple[Scene, Path]) -> None:
@@ -85,13 +83,6 @@ def test_reasons_are_facts(trained: tuple[Scene, Path]) -> None:
     wanted = ["centre_chosen", "window_chosen", "middle_from_mesh", "halfwidth_chosen", "texels_chosen"]
     assert [reason.kind for reason in reasons][:5] == wanted
     assert 0 <= reasons[0].values["lost"] < 1
-
-
-def test_same_seed_same_model(trained: tuple[Scene, Path], tmp_path: Path) -> None:
-    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
-    a, b = (load_model(folder).state_dict() for folder in (trained[1], tmp_path / "model"))
-    for name, tensor in a.items():
-        torch.testing.assert_close(tensor, b[name], atol=0, rtol=0, msg=name)
 
 
 def test_surface_points_lie_on_the_sphere(trained: tuple[Scene, Path]) -> None:
@@ -163,7 +154,7 @@ def test_plan_spends_all_iterations() -> None:
 def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TextureState, "step", lambda self, *args: float("nan"))
     with pytest.raises(UserError, match="diverged"):
-        train_explicit(trained[0], _params(iterations=60), tmp_path / "model", tmp_path / "log")
+        train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
     assert not (tmp_path / "model").exists()
 
 
@@ -177,7 +168,7 @@ def test_divergence_is_rolled_back(
         return float("nan") if len(calls) == 30 else real(self, *args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(TextureState, "step", fail_once)
-    train_explicit(trained[0], _params(iterations=60), tmp_path / "model", tmp_path / "log")
+    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
     assert "diverged" in (tmp_path / "model" / "fit.json").read_text()
 
 
@@ -186,7 +177,7 @@ def test_layers_that_drift_inwards_stop_before_the_centre(
 ) -> None:
     """Thin hair does that: the search for crossings needs a radius to step along."""
     monkeypatch.setattr(trainer, "recentre", lambda radii, *_: np.full(radii.shape[:2], -1.0))
-    train_explicit(trained[0], _params(iterations=40), tmp_path / "model", tmp_path / "log")
+    train_explicit(trained[0], _params(), tmp_path / "model", tmp_path / "log")
     model = load_model(tmp_path / "model")
     assert isinstance(model.manifolds, RadialManifolds)
     assert fit.MIN_RADIUS <= model.manifolds.radii().min().item() < fit.MIN_RADIUS + 0.05
@@ -220,12 +211,12 @@ def test_pictures_without_a_subject_are_refused(tmp_path: Path, grey: int) -> No
 def test_a_tracked_mesh_of_another_size_is_left_out_and_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plain = make_scene(tmp_path / "plain", size=64, mattes=True)
-    train_explicit(plain, _params(), tmp_path / "plain_model", tmp_path / "plain_log")
-    assert "left out" not in capsys.readouterr().out
-    scene = make_scene(tmp_path / "scene", size=64, surface_radius=1.25 * OPAQUE[0].radius, mattes=True)
-    train_explicit(scene, _params(), tmp_path / "model", tmp_path / "log")
-    assert "left out" in (tmp_path / "model" / "fit.json").read_text()
-    assert "left out" in capsys.readouterr().out
-    without = _held_out_psnr(plain, tmp_path / "plain_model")
-    assert _held_out_psnr(scene, tmp_path / "model") == pytest.approx(without, abs=0.1)
+    """All else is as without one, bit for bit: the same seed makes the same model."""
+    models = []
+    for name, radius in (("none", None), ("larger", 1.25 * OPAQUE[0].radius)):
+        scene = make_scene(tmp_path / name / "scene", size=64, surface_radius=radius, mattes=True)
+        train_explicit(scene, _params(), tmp_path / name / "model", tmp_path / name / "log")
+        said = capsys.readouterr().out, (tmp_path / name / "model" / "fit.json").read_text()
+        assert all(("left out" in words) == (name == "larger") for words in said)
+        models.append(load_model(tmp_path / name / "model").state_dict())
+    assert all(torch.equal(a, b) for a, b in zip(*(model.values() for model in models), strict=True))

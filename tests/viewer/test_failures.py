@@ -160,7 +160,10 @@ def spoil_codec(asset: Path) -> str:
 
 @pytest.mark.parametrize(
     "spoil",
-    [spoil_missing, spoil_short, spoil_changed, spoil_mesh, spoil_video, spoil_codec],
+    [
+        *(spoil_missing, spoil_changed, spoil_video),
+        *(pytest.param(spoil, marks=pytest.mark.nightly) for spoil in (spoil_short, spoil_mesh, spoil_codec)),
+    ],
     ids=lambda f: f.__name__[6:],
 )
 def test_a_file_that_is_missing_or_damaged(new_player: NewPlayer, one_level: Path, spoil: object) -> None:

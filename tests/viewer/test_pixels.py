@@ -50,7 +50,7 @@ def check(new_player: NewPlayer, asset: Asset, size: int = SIZE, script: str = "
             assert psnr(found, expected[camera.name, frame]) >= AGREE, (camera.name, frame)
 
 
-@pytest.mark.parametrize("size", [SIZE, 96])
+@pytest.mark.parametrize("size", [SIZE, pytest.param(96, marks=pytest.mark.nightly)])
 def test_five_cameras_and_three_frames_agree_with_the_reference(new_player: NewPlayer, caps: Asset, size: int) -> None:
     check(new_player, caps, size)
 
