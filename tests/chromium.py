@@ -7,12 +7,13 @@ import shutil
 import subprocess
 import threading
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import Any
 
 import psutil
 import pytest
-from playwright.sync_api import Browser, Playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright
 
 from facefolds_core.errors import UserError
 
@@ -23,6 +24,14 @@ FLAGS = (
     "--no-sandbox",  # containers run as root
     "--autoplay-policy=no-user-gesture-required",
 )
+THRIFTY = (
+    "--disable-gpu-compositing",  # llvmpipe draws what the player draws, and no page around it
+    "--in-process-gpu",
+    "--renderer-process-limit=1",  # the pages of a context share a process, which stays while one is open
+    "--js-flags=--no-wasm-tier-up",  # a decoder that works for a moment is not compiled twice
+)
+"""More flags, for tests: a page with the player takes half of the processor's time."""
+VIEWPORT = {"width": 480, "height": 400}
 PATIENCE = 120.0
 """Seconds that a test may take, fixtures included. Seen: 15 on a busy machine."""
 ALLOWED_KILLS = 3
@@ -58,14 +67,41 @@ class Chromium:
         self.playwright = playwright
         self._mark = f"--facefolds-tests={uuid.uuid4().hex}"  # by which its process is known
         self._browser: Browser | None = None
+        self._shared: BrowserContext | None = None
 
     def browser(self) -> Browser:
         if self.kills >= ALLOWED_KILLS:
             pytest.fail(f"Chromium hung and was killed {self.kills} times: it is not tried again")
         if self._browser is None or not self._browser.is_connected():
-            flags = [*FLAGS, self._mark]
-            self._browser = self.playwright.chromium.launch(executable_path=self.path, args=flags)
+            flags, env = [*FLAGS, *THRIFTY, self._mark], {**os.environ, "LP_NUM_THREADS": "0"}  # llvmpipe's
+            self._browser = self.playwright.chromium.launch(executable_path=self.path, args=flags, env=env)
+            self._shared = None
         return self._browser
+
+    def shared(self) -> BrowserContext:
+        """A context for pages that leave nothing behind: what their first page started serves the next ones too."""
+        browser = self.browser()
+        if self._shared is None:
+            self._shared = browser.new_context()
+            self._shared.new_page()  # stays
+        return self._shared
+
+    @contextmanager
+    def page(
+        self, viewport: Any = None, permissions: Sequence[str] = (), reduced_motion: Any = None, **own: Any
+    ) -> Iterator[Page]:
+        """A page in the shared context; with options that only a context takes, in one of its own."""
+        viewport = viewport or VIEWPORT
+        context = self.browser().new_context(viewport=viewport, **own) if own else self.shared()
+        page = context.new_page()
+        page.set_viewport_size(viewport)
+        page.emulate_media(reduced_motion=reduced_motion)
+        context.grant_permissions(permissions)
+        yield page
+        context.clear_permissions()
+        page.close()
+        if own:
+            context.close()
 
     def kill(self) -> None:
         """From any thread: every call that waits for the browser fails with TargetClosedError."""

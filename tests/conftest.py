@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 import stages  # noqa: F401  (threads that wait sleep, as a stage's do: workers share the cores; before torch is imported)
 from tests.chromium import BROWSERS, Chromium, find_browser
@@ -58,6 +59,13 @@ def browser(chromium: Chromium) -> Iterator[Browser]:
     """A browser that is killed when the test hangs; the test then fails, and is run once more in a new one."""
     with chromium.watched():
         yield chromium.browser()
+
+
+@pytest.fixture
+def new_page(browser: Browser, chromium: Chromium) -> Iterator[Callable[..., Page]]:
+    """Opens pages (`Chromium.page`) for as long as the test lasts."""
+    with ExitStack() as pages:
+        yield lambda **options: pages.enter_context(chromium.page(**options))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
 WIDTHS = (1440, 390)
+NewPage = Callable[..., Page]
 PAGES = ("index", "guide/results", "guide/engines", "reference/params", "research/results")
 
 
@@ -23,9 +25,9 @@ def site(tmp_path_factory: pytest.TempPathFactory, project_root: Path) -> Path:
     return folder
 
 
-def opened(browser: Browser, file: Path, width: int = 1440) -> tuple[Page, list[str]]:
+def opened(new_page: NewPage, file: Path, width: int = 1440) -> tuple[Page, list[str]]:
     """The page, and what it said or asked other hosts for."""
-    page, noted = browser.new_page(viewport={"width": width, "height": 844}), []
+    page, noted = new_page(viewport={"width": width, "height": 844}), []
     page.on("request", lambda request: noted.append(request.url) if request.url.startswith("http") else None)
     page.on("console", lambda message: noted.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: noted.append(str(error)))
@@ -33,22 +35,21 @@ def opened(browser: Browser, file: Path, width: int = 1440) -> tuple[Page, list[
     return page, noted
 
 
-def test_search_finds_pages_of_files(browser: Browser, site: Path) -> None:
-    page, noted = opened(browser, site / "guide" / "viewer.html")
+def test_search_finds_pages_of_files(new_page: NewPage, site: Path) -> None:
+    page, noted = opened(new_page, site / "guide" / "viewer.html")
     page.locator(".md-search__input").click()
     page.keyboard.type("alphaMode")
     found = page.locator(".md-search-result__link")
     found.first.wait_for(timeout=30_000)
     assert any("asset-format.html" in (link.get_attribute("href") or "") for link in found.all())
     assert noted == []
-    page.close()
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_is_cut_off(browser: Browser, site: Path, width: int) -> None:
+def test_nothing_is_cut_off(new_page: NewPage, site: Path, width: int) -> None:
     """Pages are as wide as the window; wider tables can be scrolled."""
     for name in PAGES:
-        page, noted = opened(browser, site / f"{name}.html", width)
+        page, noted = opened(new_page, site / f"{name}.html", width)
         page.wait_for_function(
             "() => [...document.querySelectorAll('article table')].every(t => t.closest('.md-typeset__scrollwrap'))"
         )
@@ -57,22 +58,19 @@ def test_nothing_is_cut_off(browser: Browser, site: Path, width: int) -> None:
             box.scrollWidth > box.clientWidth + 1 && getComputedStyle(box).overflowX !== 'auto').length"""
         assert page.evaluate(cut) == 0, name
         assert noted == [], name
-        page.close()
 
 
-def test_expert_keys_are_closed_until_they_are_asked_for(browser: Browser, site: Path) -> None:
-    page, _ = opened(browser, site / "reference" / "params.html", 390)
+def test_expert_keys_are_closed_until_they_are_asked_for(new_page: NewPage, site: Path) -> None:
+    page, _ = opened(new_page, site / "reference" / "params.html", 390)
     assert page.evaluate("document.documentElement.scrollHeight") < 20_000
     tables = page.locator("details.keys")
     assert tables.count() > 10
     assert not tables.first.locator("table").is_visible()
     tables.first.locator("summary").click()
     assert tables.first.locator("table").is_visible()
-    page.close()
 
 
-def test_the_chart_of_the_first_page_needs_no_script(browser: Browser, site: Path) -> None:
-    page, _ = opened(browser, site / "index.html")
+def test_the_chart_of_the_first_page_needs_no_script(new_page: NewPage, site: Path) -> None:
+    page, _ = opened(new_page, site / "index.html")
     assert page.locator("ol.steps li").all_inner_texts()[0] == "calibrated films"
     assert page.locator(".mermaid").count() == 0
-    page.close()

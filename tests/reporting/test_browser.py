@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
 from facefolds_core.reporting.build import make_report
 from tests.reporting.tiny import FRAMES, make_subject
@@ -34,16 +34,13 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def open_report(browser: Browser, report: Path) -> Iterator[Open]:
+def open_report(new_page: Callable[..., Page], report: Path) -> Iterator[Open]:
     """Opens the page; fails if it says or fetches anything."""
     said: list[str] = []
     requests: list[str] = []
-    contexts = []
 
     def start(**options: object) -> Page:
-        context = browser.new_context(**({"viewport": DESKTOP} | options))  # type: ignore[arg-type]
-        contexts.append(context)
-        page = context.new_page()
+        page = new_page(**({"viewport": DESKTOP} | options))
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
@@ -51,8 +48,6 @@ def open_report(browser: Browser, report: Path) -> Iterator[Open]:
         return page
 
     yield start
-    for context in contexts:
-        context.close()
     assert said == []
     assert {url for url in requests if not url.startswith("data:")} == {report.as_uri()}
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Page
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
@@ -125,24 +124,13 @@ def serve(player_folder: Path) -> Iterator[Callable[[dict[str, Path]], str]]:
         server.__exit__(None, None, None)
 
 
-@contextmanager
-def fresh_context(browser: Browser, **options: object) -> Iterator[BrowserContext]:
-    context = browser.new_context(**{"viewport": {"width": 480, "height": 400}, **options})  # type: ignore[arg-type]
-    yield context
-    context.close()
-
-
 @pytest.fixture
-def new_player(browser: Browser, serve: Callable[[dict[str, Path]], str]) -> Iterator[NewPlayer]:
+def new_player(new_page: Callable[..., Page], serve: Callable[[dict[str, Path]], str]) -> Iterator[NewPlayer]:
     """A page with the player; fails if the console holds an error or a warning that is not allowed."""
     players: list[tuple[Player, tuple[str, ...]]] = []
-    contexts = []
 
     def make(assets: dict[str, Path], allow: tuple[str, ...] = (), script: str = "", **options: object) -> Player:
-        manager = fresh_context(browser, **options)
-        context = manager.__enter__()
-        contexts.append(manager)
-        page = context.new_page()
+        page = new_page(**options)
         if script:
             page.add_init_script(script)
         player = Player(page, serve(assets))
@@ -150,8 +138,7 @@ def new_player(browser: Browser, serve: Callable[[dict[str, Path]], str]) -> Ite
         return player
 
     yield make
-    for manager in contexts:
-        manager.__exit__(None, None, None)
     for player, allow in players:
+        player.page.close()
         unexpected = [line for line in player.said if not any(part in line for part in allow)]
         assert unexpected == []

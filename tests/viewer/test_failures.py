@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Page
 
 from tests.assets import make_asset
 from tests.older import make_older
@@ -251,11 +251,10 @@ def test_another_server_that_does_not_allow_it(
         assert "Content-Security-Policy" in player.message()
 
 
-def test_the_page_opened_as_a_file_says_what_to_do(browser: Browser, player_folder: Path) -> None:
-    page = browser.new_page()
+def test_the_page_opened_as_a_file_says_what_to_do(new_page: Callable[..., Page], player_folder: Path) -> None:
+    page = new_page()
     page.goto((player_folder / "index.html").as_uri())
     assert "facefolds export-html" in page.locator("#words").inner_text()
-    page.close()
 
 
 def test_it_goes_on_by_itself_when_the_connection_is_back(new_player: NewPlayer, asset: Path) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Page
 
 import facefolds_core as facefolds
 from facefolds_core.api import asset as shown
@@ -13,12 +14,12 @@ from tests.viewer.conftest import PATIENCE
 
 
 def test_an_asset_plays_in_a_notebook(
-    browser: Browser, rich: Path, player_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    new_page: Callable[..., Page], rich: Path, player_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shown, "find_player", lambda: player_folder)
     notebook = tmp_path / "notebook.html"
     notebook.write_text(f"<!doctype html><title>x</title>{facefolds.load_asset(rich)._repr_html_()}", encoding="utf-8")
-    page = browser.new_page()
+    page = new_page()
     said: list[str] = []
     fetched: list[str] = []
     page.on("console", lambda message: said.append(message.text))
@@ -30,4 +31,3 @@ def test_an_asset_plays_in_a_notebook(
     page.frames[1].wait_for_function(playing, timeout=PATIENCE)
     assert said == []
     assert {url for url in fetched if not url.startswith(("data:", "blob:"))} <= {notebook.as_uri(), "about:srcdoc"}
-    page.close()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Page
 
 from facefolds_core.asset import read_asset
 from facefolds_core.reporting import face
@@ -14,9 +15,9 @@ from tests.reporting.tiny import make_subject
 from tests.viewer.conftest import PATIENCE
 
 
-def test_the_face_plays_in_the_report(browser: Browser, player_folder: Path, tmp_path: Path) -> None:
+def test_the_face_plays_in_the_report(new_page: Callable[..., Page], player_folder: Path, tmp_path: Path) -> None:
     report = make_report(make_subject(tmp_path / "somebody"), player=player_folder)
-    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    page = new_page(viewport={"width": 1440, "height": 900})
     said: list[str] = []
     fetched: list[str] = []
     page.on("console", lambda message: said.append(message.text))
@@ -32,7 +33,6 @@ def test_the_face_plays_in_the_report(browser: Browser, player_folder: Path, tmp
     assert all(box is not None and box["y"] + box["height"] <= 900 for box in fold)  # both at the first glance
     assert said == []
     assert {url for url in fetched if not url.startswith(("data:", "blob:"))} == {report.as_uri()}
-    page.close()
 
 
 def test_a_level_that_the_page_has_no_room_for_is_left_out(
