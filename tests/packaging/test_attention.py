@@ -16,9 +16,9 @@ from facefolds_core.asset.regions import Region, nowhere
 from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of
-from facefolds_core.packaging.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
 from facefolds_core.params import AttentionParams, VideoCodec
 from facefolds_core.rendering import AssetCaster, composite
+from tests.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
 
 USUAL = AttentionParams(strength=2.0)
 
