@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.generated import is_generated
-from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.source_code import digests_of_stages
 from facefolds_core.files.paths import SubjectFolders, check_capture_place, check_mattes_place, check_start_place
 from facefolds_core.files.writing import atomic_folder, write_json
@@ -36,8 +36,7 @@ def configure(data: Path) -> str:
     with atomic_folder(data / ".code") as temporary:
         for stage, digests in code.items():
             write_json(temporary / f"{stage}.json", digests)
-    notes = "".join(f"\nconfigure: note: {line}" for line in idle_keys(params))
-    return f"{len(params.subjects)} subjects in {data / '.config'}{notes}"
+    return f"{len(params.subjects)} subjects in {data / '.config'}"
 
 
 if __name__ == "__main__":

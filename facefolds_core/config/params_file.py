@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.paths import check_path_text, check_subject_name
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
-from facefolds_core.params.renamed import remedy_for
 
 
 class Params(Section):
@@ -82,13 +80,12 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         )
     unknown = [name for name in value if name not in ("subjects", *STAGE_SECTIONS)]
     if unknown:
-        known = [f"`{name}`: {remedy}" for name in unknown if (remedy := remedy_for(str(name))) is not None]
         raise UserError(
             "unknown sections",
             file=path,
             place=brief(", ".join(brief(name) for name in unknown), 200),
             expected=", ".join(["subjects", *STAGE_SECTIONS]),
-            remedy="; ".join(known) or "remove or rename them",
+            remedy="remove or rename them",
         )
     sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
     for name, section in sections.items():
@@ -115,37 +112,6 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         for stage in STAGE_SECTIONS:
             params.stage(stage, name)
     return params
-
-
-def idle_keys(params: Params) -> list[str]:
-    """Keys of sections that no subject uses, since every one overrides them: a line for each."""
-    lines = []
-    for stage, section in params.sections.items():
-        for key, value in _leaves(section, stage):
-            if all(_has(subject.model_dump(), key) for subject in params.subjects.values()):
-                others = ", ".join(f"subjects.{name}.{key}" for name in list(params.subjects)[:3])
-                more = ", ..." if len(params.subjects) > 3 else ""
-                lines.append(f"{key}: {brief(value, 30)} is used by no subject: overridden by {others}{more}")
-    return lines
-
-
-def _leaves(value: Any, name: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict) and value:
-        for key, entry in value.items():
-            yield from _leaves(entry, f"{name}.{key}")
-    elif "." in name:
-        yield name, value
-
-
-def _has(overrides: Any, name: str) -> bool:
-    """Whether "texture.resolution" is given; a value that is no mapping replaces all that is deeper."""
-    for part in name.split("."):
-        if not isinstance(overrides, dict):
-            return True
-        if part not in overrides:
-            return False
-        overrides = overrides[part]
-    return True
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:

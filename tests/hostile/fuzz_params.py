@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.stages import read_stage, read_subject, read_train
 from facefolds_core.files.paths import SubjectFolders, check_capture_place, subject_folders
 from facefolds_core.params import SECTIONS, STAGE_SECTIONS
@@ -120,7 +120,6 @@ def _configure(path: Path) -> None:
         folders = subject_folders(data, name)
         check_capture_place(subject.path, folders)
         write_configs(params, name, folders.config)
-    idle_keys(params)
 
 
 def _read_damaged_config(folder: Path, random: np.random.Generator) -> None:
