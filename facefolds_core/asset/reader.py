@@ -130,8 +130,7 @@ class AssetLevel:
 
     def _decode(self, start: int) -> Iterator[Frame]:
         layout = layout_of(self.entry)
-        location = self.entry.texture.chroma_location
-        return (unpack_picture(picture, layout, location) for picture in self.pictures(start))
+        return (unpack_picture(picture, layout) for picture in self.pictures(start))
 
     def _wrong_count(self, found: int) -> UserError:
         return UserError(

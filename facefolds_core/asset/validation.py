@@ -151,7 +151,7 @@ def _video_problems(folder: Path, video: Video, texture: Texture) -> list[str]:
             ("codec", facts.codec, video.codec),
             ("container", facts.container, video.container),
             ("level", facts.level, video.level),
-            ("MIME type", facts.mime if "codecs=" in video.mime else video.mime, video.mime),  # version 1 had none
+            ("MIME type", facts.mime, video.mime),
             ("pixel format", facts.pixel_format, video.pixel_format),
             ("width and height", (facts.width, facts.height), (texture.width, texture.height)),
             ("frames a second", facts.rate, texture.rate),

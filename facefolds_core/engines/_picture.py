@@ -15,7 +15,7 @@ def rgb_picture(picture: Picture, texture: Texture) -> NDArray[np.uint8]:
     height, width = texture.height, texture.width
     y = picture[:height]
     cb, cr = picture[height:].reshape(2, height // 2, width // 2)
-    rgb = yuv420_to_rgb(y, cb, cr, texture.chroma_location)
+    rgb = yuv420_to_rgb(y, cb, cr)
     x0, y0, w, h = texture.alpha_rect
     rgb[y0 : y0 + h, x0 : x0 + w] = luma_to_alpha(y[y0 : y0 + h, x0 : x0 + w])[..., None]
     return rgb
