@@ -38,9 +38,6 @@ WORDS = {
     "front_found": "note: no `front` and no tracked mesh: the subject is taken to face where most cameras stand, near "
     "camera {camera} ({share:.0%} of them within 60 degrees of there); if it does not, name one that it faces in "
     "`front`",
-    "pictures_disagree": "note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation "
-    "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
-    "another's?",
     "head_turns": "note: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of its size: "
     "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
     "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
@@ -106,7 +103,7 @@ WORDS = {
 
 WARNINGS = frozenset(
     {
-        *("pictures_disagree", "camera_contradicts", "mesh_is_off"),
+        *("camera_contradicts", "mesh_is_off"),
         *("start_explains_little", "surface_without_a_place", "front_is_guessed"),
         *("codec_misses", "stands_still", "matte_is_found", "training_view_bad"),
     }
