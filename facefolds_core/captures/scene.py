@@ -32,7 +32,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, read_fact
 from facefolds_core.files.archives import read_npz
 from facefolds_core.files.frame_store import FrameStore
-from facefolds_core.files.reading import check_regular, is_there, remake
+from facefolds_core.files.reading import is_there, remake
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
@@ -233,7 +233,6 @@ def read_scene(folder: str | Path) -> Scene:
     folder = Path(folder)
     path = folder / "scene.json"
     remedy = remake(path)
-    check_regular(path, remedy)
     value: Any = read_json(path, remedy=remedy)
     if not isinstance(value, dict) or value.get("version") != SCENE_VERSION:
         raise UserError(

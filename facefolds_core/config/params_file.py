@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.paths import check_path_text, check_subject_name
+from facefolds_core.files.reading import is_there, read_text
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
 
@@ -61,15 +62,8 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             or the key.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UserError(
-            "file not found", file=path, remedy="run the command in the project's root folder, which has params.yaml"
-        ) from None
-    except UnicodeDecodeError as error:
-        place = f"byte {error.start}"
-        raise UserError("garbled YAML", file=path, place=place, expected="UTF-8", remedy="save it as UTF-8") from None
+    here = "run the command in the project's root folder, which has params.yaml"
+    text = read_text(path, here if not is_there(path) else "save it as UTF-8", expected="YAML")
     value = parse_yaml(text, path, "mend it; docs/guide/subjects.md describes the file")
     if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
         raise UserError(

@@ -17,7 +17,7 @@ import yaml
 
 from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.stages import read_stage, read_subject, read_train
-from facefolds_core.files.paths import SubjectFolders, check_capture_place, subject_folders
+from facefolds_core.files.paths import SubjectFolders, check_place, subject_folders
 from facefolds_core.params import SECTIONS, STAGE_SECTIONS
 from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
 
@@ -118,7 +118,7 @@ def _configure(path: Path) -> None:
     data = path.parent / "data"
     for name, subject in params.subjects.items():
         folders = subject_folders(data, name)
-        check_capture_place(subject.path, folders)
+        check_place(subject.path, folders, "path")
         write_configs(params, name, folders.config)
 
 
