@@ -27,6 +27,7 @@ GONE: dict[str, str] = {
     "reconstruct.point_weight": FIXED,
     "reconstruct.trim": FIXED,
     "compress.frame_rate_factor": "an asset has the capture's frames",
+    "compress.video.lossless": "set `target_psnr`, or a low `crf`",
     "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",
     "compress.view_effects": "a reflection takes their place (`train.reflection`)",
 }
