@@ -24,14 +24,13 @@ from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.hold import held_rows, texel_weights
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
-from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
-from facefolds_core.export.sheets import Gridded, grid_sheets
+from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.facts import Fact
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
-from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
+from facefolds_core.params import BakeParams, DecimateParams, SampleParams, TextureParams
 from facefolds_core.progress import progress
 
 if TYPE_CHECKING:
@@ -86,11 +85,6 @@ def sample_model(
     grids = sample_grids(model, r, window)
     opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
-
-
-def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:
-    """Surfaces of the layers, with what is to be said of them."""
-    return grid_sheets(grids, params.resolution) if params.method == "grid" else reconstruct_layers(grids, params)
 
 
 @dataclass(frozen=True)
@@ -197,7 +191,7 @@ def _fit(
     kept: Path | None,
 ) -> Codes:
     """Write the fitted textures; the rays on the meshes that ship. What else was gathered is let go."""
-    sheets = grid_sheets(grids, None).sheets
+    sheets = grid_sheets(grids, None)
     _check_match(meshes, sheets, textures, samples)
     rays = gather_rays(cameras, meshes, sheets)
     baker = Baker(meshes, sheets, rays, textures.height)

@@ -51,7 +51,7 @@ def export(
     grids = sample_grids(model, resolution, window, progress=False)
     write_textures(folder / "samples.arrow", model, grids, progress=False)
     poisson = ReconstructParams(depth=6)
-    surfaces = [reconstruct(gather_samples(grids, i, None), poisson, i).surface for i in range(grids.num_layers)]
+    surfaces = [reconstruct(gather_samples(grids, i, None), poisson, i) for i in range(grids.num_layers)]
     meshes = decimate_layers(surfaces, grids, 32, DecimateParams(uv=uv), progress=False)
     resample_store(folder / "samples.arrow", folder / "textures.arrow", size or resolution, progress=False)
     return Exported(meshes, FrameStore(folder / "textures.arrow"))
@@ -92,7 +92,7 @@ def test_each_step_of_the_grid_export_loses_no_more_than_this(
     # and 64.5 dB at 32 x 32 vertices, 67, 39 and 40.4 at 8 x 8.
     grids = sample_grids(model, 192, visible_window(model, RIG), progress=False)
     opacity = write_textures(tmp_path / "samples.arrow", model, grids, progress=False)
-    sheets = grid_sheets(replace(grids, opacity=opacity), None).sheets
+    sheets = grid_sheets(replace(grids, opacity=opacity), None)
     samples = FrameStore(tmp_path / "samples.arrow")
     coarse = decimate_sheets(sheets, resolution**2)
     baker = Baker(coarse, sheets, gather_rays(RIG, coarse, sheets, progress=False), 192)

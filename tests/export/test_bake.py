@@ -86,7 +86,7 @@ def test_what_is_shown_has_eight_bits() -> None:
 
 @pytest.fixture(scope="module")
 def sheets() -> Sheets:
-    return grid_sheets(sample_grids(MODEL, R, WINDOW, progress=False), None).sheets
+    return grid_sheets(sample_grids(MODEL, R, WINDOW, progress=False), None)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from facefolds_core.errors import UserError
 from facefolds_core.export.bake import reprojection
 from facefolds_core.export.collapse import decimate_sheets
-from facefolds_core.export.decimation import decimate, exact_st, layer_order, upright_faces
+from facefolds_core.export.decimation import decimate, exact_st, upright_faces
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.refit import radial_cosines, refit_radii
 from facefolds_core.export.sampling import sample_grids
@@ -39,6 +39,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model
 from facefolds_core.params import ReconstructParams
+from tests.export.order import layer_order
 
 CHART = Chart((-0.25, 0.0, 0.05), Belt(0.2, 0.3))
 WINDOW: Window = (-1.0, 0.7, -1.3, 1.3)
@@ -68,12 +69,12 @@ def grids() -> Grids:
 
 @pytest.fixture(scope="module")
 def sheets(grids: Grids) -> Sheets:
-    return grid_sheets(grids, None).sheets
+    return grid_sheets(grids, None)
 
 
 @pytest.fixture(scope="module")
 def bumpy() -> Sheets:
-    return grid_sheets(sample_grids(model(0.02), N, WINDOW, progress=False), None).sheets
+    return grid_sheets(sample_grids(model(0.02), N, WINDOW, progress=False), None)
 
 
 def off(points: NDArray[np.float32], radius: float) -> NDArray[np.float64]:
@@ -176,7 +177,7 @@ def test_cosines_of_a_cone_are_those_of_its_normals() -> None:
 
 
 def test_poisson_surfaces_are_decimated_upright(grids: Grids) -> None:
-    dense = reconstruct(gather_samples(grids, 0, None), ReconstructParams(depth=6), 0).surface
+    dense = reconstruct(gather_samples(grids, 0, None), ReconstructParams(depth=6), 0)
     assert len(dense.faces) > 2000
     coarse = decimate(dense, 20**2, CHART)
     assert 0.9 * 20**2 < len(coarse.vertices) <= 20**2

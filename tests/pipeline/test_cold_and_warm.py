@@ -50,7 +50,7 @@ SCRIPTS = {
         from tests.ellipsoids import Ellipsoids
 
         grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
-        for mesh in decimate_sheets(grid_sheets(grids, None).sheets, 64):
+        for mesh in decimate_sheets(grid_sheets(grids, None), 64):
             show(mesh.vertices, mesh.faces, mesh.st)
     """,
     "bake": """
