@@ -26,6 +26,7 @@ GONE: dict[str, str] = {
     "train.lr_volume": "the stage `subject` fits Gaussians; its section `subject` has keys of its own",
     "reconstruct.point_weight": FIXED,
     "reconstruct.trim": FIXED,
+    "bake.iterations": "textures fitted to the meshes were no better than the model's own",
     "compress.frame_rate_factor": "an asset has the capture's frames",
     "compress.video.lossless": "set `target_psnr`, or a low `crf`",
     "compress.glb.draco": "the meshes of asset.glb are plain, which all programs read",

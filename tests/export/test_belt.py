@@ -15,7 +15,6 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.bake import reprojection
 from facefolds_core.export.collapse import decimate_sheets
 from facefolds_core.export.decimation import decimate, exact_st, upright_faces
 from facefolds_core.export.poisson import gather_samples, reconstruct
@@ -187,20 +186,6 @@ def test_poisson_surfaces_are_decimated_upright(grids: Grids) -> None:
     assert layer_order([coarse, inner], CHART).crossed == 0
     turned = layer_order([inner, coarse], CHART)
     assert turned.crossed == turned.compared > 500
-
-
-def test_reprojection_finds_the_point_where_a_texel_lies(sheets: Sheets) -> None:
-    mesh = decimate_sheets(sheets, 36)[0]
-    share = np.array([0.2, 0.3, 0.5])
-    uv, _ = CHART.uv((share @ mesh.vertices[mesh.faces]).astype(np.float64))
-    below = CHART.below(CHART.uv(mesh.vertices[mesh.faces].astype(np.float64))[0]).all(1)
-    true, at = uv_to_st(uv, WINDOW) * N - 0.5, share @ mesh.st[mesh.faces].astype(np.float64) * N - 0.5
-    worst = int(np.where(below, np.abs(true - at).max(-1), 0).argmax())
-    column, row = np.rint(at[worst]).astype(int)
-    found = reprojection(mesh, sheets, N)[row, column] - (column, row)
-    # Positions are smooth inside a triangle: compared through the difference to the texel's own place.
-    assert found == pytest.approx(true[worst] - at[worst], abs=0.05)
-    assert np.abs(true - at)[worst].max() > 0.2
 
 
 def test_grids_and_sheets_keep_the_chart(tmp_path: Path, grids: Grids, sheets: Sheets) -> None:

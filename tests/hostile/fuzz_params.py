@@ -35,7 +35,7 @@ SOUND: dict[str, Any] = {
     "reconstruct": {"method": "grid"},
     "decimate": {"resolution": 64},
     "texture": {"resolution": 512},
-    "bake": {"iterations": 2},
+    "bake": {"hold": 0.01},
     "compress": {"video": {"codec": "h264", "crf": 20}, "levels": [LEVEL]},
     "evaluate": {"background": [0, 0, 0]},
 }
