@@ -49,6 +49,7 @@ class Mattes:
         scene: whose own mattes count.
         named: (H, W, 1) by picture, that the user has corrected; they come first.
         body: by which others are found; None while it is not known.
+        edge: how their outlines are found.
 
     Attributes:
         alone: Gaussians that were trained with the subject cut out, once they are known. They are whole where room of
@@ -56,8 +57,14 @@ class Mattes:
             asked where a picture contradicts the first fit.
     """
 
-    def __init__(self, scene: Scene, named: Mapping[Key, Image] | None = None, body: Body | None = None) -> None:
-        self.scene, self.named, self.body, self.edge = scene, dict(named or {}), body, EdgeParams()
+    def __init__(
+        self,
+        scene: Scene,
+        named: Mapping[Key, Image] | None = None,
+        body: Body | None = None,
+        edge: EdgeParams | None = None,
+    ) -> None:
+        self.scene, self.named, self.body, self.edge = scene, dict(named or {}), body, edge or EdgeParams()
         self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
