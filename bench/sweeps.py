@@ -58,7 +58,7 @@ QUANTISED: dict[str, Any] = {"compress.mesh.max_error_pixels": 0.2, "compress.me
 PAPER_EXPORT: dict[str, Any] = {
     **{"sample.resolution": 1024, "sample.window": "full"},
     **{"reconstruct.method": "poisson", "reconstruct.resolution": 512},
-    **{"decimate.resolution": 32, "decimate.uv": "nearest", "texture.resolution": 1024, "bake.iterations": 0},
+    **{"decimate.resolution": 32, "decimate.uv": "nearest", "texture.resolution": 1024, "bake.hold": 0},
     **{"compress.mesh.max_error_pixels": None, "compress.mesh.quantization_bits": 0},
     **{"compress.mesh.compression_level": 0, "compress.video.codec": "h264", "compress.video.preset": "medium"},
 }

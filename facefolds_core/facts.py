@@ -10,11 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-TEXT = "text"
-"""The kind of a line that an older version wrote, or that is nothing but words."""
-
 WORDS = {
-    TEXT: "{text}",
     # of a capture
     "camera_without_images": "camera {camera}: in KRT, but has no images",
     "camera_without_calibration": "camera {camera}: has images, but is not in KRT",
@@ -39,13 +35,9 @@ WORDS = {
     "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
     "krt_is_of_full_size": "note: K of KRT is for full-size images; scaled (median principal point ({point[0]:.1f}, "
     "{point[1]:.1f}); images {image[0]} x {image[1]}); `krt_size` overrides",
-    "front_guessed": "note: no `front` camera and no tracked mesh; +x is the cameras' mean direction",
     "front_found": "note: no `front` and no tracked mesh: the subject is taken to face where most cameras stand, near "
     "camera {camera} ({share:.0%} of them within 60 degrees of there); if it does not, name one that it faces in "
     "`front`",
-    "pictures_disagree": "note: neighbouring cameras' pictures do not agree about the tracked mesh (median correlation "
-    "{correlation:.2f}; of sound captures 0.9): are all poses inverted, cameras or frames mixed up, or is the mesh "
-    "another's?",
     "head_turns": "note: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of its size: "
     "the model is made in its own frame, and the asset carries its poses ({source}); `stabilize` overrides",
     "head_turns_unheeded": "warning: the head turns by up to {degrees:.1f} degrees and shifts by up to {shift:.1%} of "
@@ -111,7 +103,7 @@ WORDS = {
 
 WARNINGS = frozenset(
     {
-        *("pictures_disagree", "front_guessed", "camera_contradicts", "mesh_is_off", "cut_by_the_ball"),
+        *("camera_contradicts", "mesh_is_off"),
         *("start_explains_little", "surface_without_a_place", "front_is_guessed"),
         *("codec_misses", "stands_still", "matte_is_found", "training_view_bad"),
     }
@@ -150,13 +142,11 @@ def fact(kind: str, **values: Any) -> Fact:
 
 
 def read_fact(value: Any) -> Fact:
-    """A fact of a file; a line of text, as older versions wrote, is one of kind `TEXT`.
+    """A fact of a file.
 
     Raises:
         ValueError: if it is none of ours.
     """
-    if isinstance(value, str):
-        return fact(TEXT, text=value)
     if not isinstance(value, dict) or not isinstance(value.get("kind"), str) or value["kind"] not in WORDS:
         raise ValueError(f"{str(value)[:100]} is no fact")
     found = Fact(value["kind"], {key: part for key, part in value.items() if key not in ("kind", "words")})

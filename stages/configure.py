@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from facefolds_core.captures.generated import is_generated
-from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.source_code import digests_of_stages
-from facefolds_core.files.paths import SubjectFolders, check_capture_place, check_mattes_place, check_start_place
+from facefolds_core.files.paths import SubjectFolders, check_place
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.params import STAGE_SECTIONS
 from stages.common import run_for_all
@@ -23,12 +23,12 @@ def configure(data: Path) -> str:
     """Write all subjects' files below `data`; returns a line that says what was made."""
     params = load_params("params.yaml")
     for name, subject in params.subjects.items():
+        named = {"mattes": subject.mattes, "start": subject.start}
         if not is_generated(subject.source):
-            check_capture_place(subject.path, SubjectFolders(data / name))
-        if subject.mattes is not None:
-            check_mattes_place(subject.mattes, SubjectFolders(data / name))
-        if subject.start is not None:
-            check_start_place(subject.start, SubjectFolders(data / name))
+            named["path"] = subject.path
+        for key, path in named.items():
+            if path is not None:
+                check_place(path, SubjectFolders(data / name), key)
     code = digests_of_stages(ROOT, STAGE_SECTIONS)
     with atomic_folder(data / ".config") as temporary:
         for name in params.subjects:
@@ -36,8 +36,7 @@ def configure(data: Path) -> str:
     with atomic_folder(data / ".code") as temporary:
         for stage, digests in code.items():
             write_json(temporary / f"{stage}.json", digests)
-    notes = "".join(f"\nconfigure: note: {line}" for line in idle_keys(params))
-    return f"{len(params.subjects)} subjects in {data / '.config'}{notes}"
+    return f"{len(params.subjects)} subjects in {data / '.config'}"
 
 
 if __name__ == "__main__":

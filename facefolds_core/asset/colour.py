@@ -5,16 +5,16 @@ Own code rather than swscale's: PyAV has no way to name the siting, and swscale 
 In the centre, because that is where browsers and graphics cards look, whatever the stream says: a linear look-up in a
 plane of half the size at luma's coordinate is right for centred chroma. Sited left, as H.264 does by default, every
 player that does so shows chroma half a pixel to the side: measured, Chromium against the reference renderer on the
-conformance vectors, 42 dB over the head, and 51 with chroma in the centre. Assets from before are still read.
+conformance vectors, 42 dB over the head, and 51 with chroma in the centre.
 
 Matrix (ITU-R BT.709-6, items 3.2 and 3.3), with R, G, B, Y' in [0, 1] and Cb, Cr in [-0.5, 0.5]:
 Y' = 0.2126 R + 0.7152 G + 0.0722 B, Cb = (B - Y') / 1.8556, Cr = (R - Y') / 1.5748; codes 16 + 219 Y', 128 + 224 C.
-Chroma sample (i, j) lies, in luma's pixel indices, at row 2i + 0.5 and column 2j + 0.5; sited left, at column 2j.
+Chroma sample (i, j) lies, in luma's pixel indices, at row 2i + 0.5 and column 2j + 0.5.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,6 @@ KR, KG, KB = 0.2126, 0.7152, 0.0722
 CB_SCALE, CR_SCALE = 2 * (1 - KB), 2 * (1 - KR)
 NEUTRAL = 128
 BLACK = 16
-
-ChromaLocation = Literal["center", "left"]
-"""Where chroma lies across, by FFmpeg's names: what is written, and what older assets have."""
 
 
 def rgb_to_yuv420(rgb: NDArray[np.uint8]) -> tuple[Plane, Plane, Plane]:
@@ -44,11 +41,11 @@ def rgb_to_yuv420(rgb: NDArray[np.uint8]) -> tuple[Plane, Plane, Plane]:
     return y, _halve((b - luma) / CB_SCALE), _halve((r - luma) / CR_SCALE)
 
 
-def yuv420_to_rgb(y: Plane, cb: Plane, cr: Plane, location: ChromaLocation = "center") -> NDArray[np.uint8]:
-    """Y (H, W), Cb and Cr (H/2, W/2) -> RGB (H, W, 3). Chroma is interpolated linearly from where it is sited."""
+def yuv420_to_rgb(y: Plane, cb: Plane, cr: Plane) -> NDArray[np.uint8]:
+    """Y (H, W), Cb and Cr (H/2, W/2) -> RGB (H, W, 3). Chroma is interpolated linearly."""
     luma = _unit_luma(y)
-    r = luma + CR_SCALE * _double(cr, location)
-    b = luma + CB_SCALE * _double(cb, location)
+    r = luma + CR_SCALE * _double(cr)
+    b = luma + CB_SCALE * _double(cb)
     g = (luma - KR * r - KB * b) / KG
     return np.stack([_to_byte(value) for value in (r, g, b)], -1)
 
@@ -102,16 +99,10 @@ def _fitted(values: Float) -> Float:
     return found
 
 
-def _double(codes: Plane, location: ChromaLocation) -> Float:
+def _double(codes: Plane) -> Float:
     """Codes (h, w) -> chroma in [-0.5, 0.5] at luma's pixels (2h, 2w)."""
     chroma: Float = (codes.astype(np.float32) - np.float32(NEUTRAL)) / np.float32(224)
-    rows = _between(chroma)
-    if location == "center":
-        return np.ascontiguousarray(_between(rows.T).T)
-    full = np.empty((rows.shape[0], 2 * rows.shape[1]), np.float32)
-    full[:, 0::2] = rows
-    full[:, 1::2] = 0.5 * (rows + np.concatenate([rows[:, 1:], rows[:, -1:]], 1))
-    return full
+    return np.ascontiguousarray(_between(_between(chroma).T).T)
 
 
 def _between(values: Float) -> Float:

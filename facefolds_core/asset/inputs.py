@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from facefolds_core.asset.checks import mesh_problems
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -18,7 +17,7 @@ def check_inputs(meshes: Sequence[TexturedMesh], windows: Sequence[Window], text
     Raises:
         UserError: if they cannot, or do not belong together.
     """
-    frames = _check_textures(textures, len(meshes))
+    frames = check_textures(textures, len(meshes))
     if len(windows) != len(meshes):
         raise UserError(
             "the meshes and the texture windows do not belong together",
@@ -31,8 +30,12 @@ def check_inputs(meshes: Sequence[TexturedMesh], windows: Sequence[Window], text
     return frames
 
 
-def _check_textures(textures: FrameStore, layers: int) -> int:
-    """The number K of frames of a store that holds N x K square RGBA textures."""
+def check_textures(textures: FrameStore, layers: int | None = None) -> int:
+    """The number K of frames of a store that holds N x K square RGBA textures.
+
+    Raises:
+        UserError: if it does not; where `layers` is None, of any number of them.
+    """
     remedy = "run `dvc repro` to make the textures again"
     if textures.channels != 4 or textures.height != textures.width:
         raise UserError(
@@ -43,6 +46,7 @@ def _check_textures(textures: FrameStore, layers: int) -> int:
         )
     keys = textures.keys()
     frames = 1 + max((frame for _, frame in keys), default=-1)
+    layers = 1 + keys[-1][0] if layers is None and keys else layers or 1
     if frames == 0 or keys != [(layer, frame) for layer in range(layers) for frame in range(frames)]:
         raise UserError(
             "the texture store is not complete",
@@ -55,16 +59,12 @@ def _check_textures(textures: FrameStore, layers: int) -> int:
 
 
 def _check_mesh(mesh: TexturedMesh, place: str) -> None:
-    problem = None
     if len(mesh.vertices) == 0 or len(mesh.faces) == 0:
-        problem = "no faces"
+        problems = ["no faces"]
     elif mesh.st.shape != (len(mesh.vertices), 2):
-        problem = f"texture coordinates {mesh.st.shape} for {len(mesh.vertices)} vertices"
-    elif not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.st).all()):
-        problem = "numbers that are not finite"
-    elif mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        problem = "faces that name vertices which are not there"
-    elif mesh.st.min() < 0 or mesh.st.max() > 1:
-        problem = f"texture coordinates from {mesh.st.min():g} to {mesh.st.max():g}, outside [0, 1]"
-    if problem:
-        raise UserError("a layer's mesh cannot be written", place=place, found=problem, remedy="run `dvc repro` again")
+        problems = [f"texture coordinates {mesh.st.shape} for {len(mesh.vertices)} vertices"]
+    else:
+        problems = mesh_problems(mesh, len(mesh.vertices), len(mesh.faces))
+    if problems:
+        found = "; ".join(problems)
+        raise UserError("a layer's mesh cannot be written", place=place, found=found, remedy="run `dvc repro` again")

@@ -12,7 +12,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from facefolds_core.asset.codecs import CodecName
-from facefolds_core.asset.colour import ChromaLocation
 from facefolds_core.asset.manifest_base import (
     UV,
     ByteRange,
@@ -126,7 +125,6 @@ class Texture(Part):
         colour_rect, alpha_rect: in pixels of the decoded picture; of one size.
         frame_rate: numerator and denominator of the frames a second.
         keyframes: the numbers of the frames that can be decoded without the ones before, in order.
-        chroma_location: where chroma lies across; "left" in older assets.
         videos: the same pictures; a player takes the first that it can decode.
     """
 
@@ -139,7 +137,7 @@ class Texture(Part):
     keyframes: Annotated[tuple[Offset, ...], Field(min_length=1)]
     colour_space: Literal["bt709"] = "bt709"
     colour_range: Literal["tv"] = "tv"
-    chroma_location: ChromaLocation = "center"
+    chroma_location: Literal["center"] = "center"
     videos: Annotated[tuple[Video, ...], Field(min_length=1)]
 
     @property

@@ -20,10 +20,11 @@ from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.segments import decode_segments
-from facefolds_core.asset.stored import check_file, is_folder, read_slice, refuse_changed
+from facefolds_core.asset.stored import check_file, read_slice, refuse_changed
 from facefolds_core.asset.track_file import read_track
 from facefolds_core.asset.video import Picture, decode_video, unpack_picture
 from facefolds_core.errors import UserError
+from facefolds_core.files.reading import is_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
@@ -130,8 +131,7 @@ class AssetLevel:
 
     def _decode(self, start: int) -> Iterator[Frame]:
         layout = layout_of(self.entry)
-        location = self.entry.texture.chroma_location
-        return (unpack_picture(picture, layout, location) for picture in self.pictures(start))
+        return (unpack_picture(picture, layout) for picture in self.pictures(start))
 
     def _wrong_count(self, found: int) -> UserError:
         return UserError(

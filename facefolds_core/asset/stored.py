@@ -15,14 +15,6 @@ from facefolds_core.files.writing import file_sha256
 MISSING = "the file is missing"
 
 
-def is_folder(path: Path) -> bool:
-    """Whether a path is a folder's; False also for names that no file system takes, where `Path.is_dir` raises."""
-    try:
-        return stat.S_ISDIR(path.stat().st_mode)
-    except (OSError, ValueError):
-        return False
-
-
 def special_problem(path: Path) -> str | None:
     """Why a path cannot be read as a file, in words; None if it can. Opens nothing: a FIFO would wait for ever."""
     try:

@@ -16,11 +16,12 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import layer_bytes
 from facefolds_core.asset.segments import decode_segments, probe_segments
-from facefolds_core.asset.stored import check_file, is_folder, leads_out
+from facefolds_core.asset.stored import check_file, leads_out
 from facefolds_core.asset.track_file import track_problems
 from facefolds_core.asset.video import Picture, decode_video, probe_video
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
+from facefolds_core.files.reading import is_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 
 _BT709_LIMITED = (1, 1)
@@ -151,7 +152,7 @@ def _video_problems(folder: Path, video: Video, texture: Texture) -> list[str]:
             ("codec", facts.codec, video.codec),
             ("container", facts.container, video.container),
             ("level", facts.level, video.level),
-            ("MIME type", facts.mime if "codecs=" in video.mime else video.mime, video.mime),  # version 1 had none
+            ("MIME type", facts.mime, video.mime),
             ("pixel format", facts.pixel_format, video.pixel_format),
             ("width and height", (facts.width, facts.height), (texture.width, texture.height)),
             ("frames a second", facts.rate, texture.rate),

@@ -25,7 +25,6 @@ from facefolds_core.asset.codecs import CODECS, Codec, Stream
 from facefolds_core.asset.colour import (
     BLACK,
     NEUTRAL,
-    ChromaLocation,
     alpha_to_luma,
     luma_to_alpha,
     rgb_to_yuv420,
@@ -91,16 +90,14 @@ def pack_frame(textures: Sequence[NDArray[np.uint8]], layout: AtlasLayout) -> Pi
     return np.concatenate([y, cb.reshape(-1, width), cr.reshape(-1, width)])
 
 
-def unpack_picture(
-    picture: Picture, layout: AtlasLayout, location: ChromaLocation = "center"
-) -> tuple[NDArray[np.uint8], ...]:
+def unpack_picture(picture: Picture, layout: AtlasLayout) -> tuple[NDArray[np.uint8], ...]:
     """A decoded picture -> the layers' textures, N of (h, w, 4) RGBA."""
     height, width = layout.height, layout.width
     y = picture[:height]
     cb, cr = picture[height:].reshape(2, height // 2, width // 2)
     x0, y0, w, h = layout.colour_rect
     half = (slice(y0 // 2, (y0 + h) // 2), slice(x0 // 2, (x0 + w) // 2))
-    colour = yuv420_to_rgb(y[y0 : y0 + h, x0 : x0 + w], cb[half], cr[half], location)
+    colour = yuv420_to_rgb(y[y0 : y0 + h, x0 : x0 + w], cb[half], cr[half])
     x1, y1, _, _ = layout.alpha_rect
     alpha = luma_to_alpha(y[y1 : y1 + h, x1 : x1 + w])
     return cut(np.concatenate([colour, alpha[..., None]], -1), layout.rects)

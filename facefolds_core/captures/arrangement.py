@@ -64,13 +64,11 @@ class Arrangement:
     cameras: name -> indices of its shots.
     frames: names, in order.
     frame_of: for each shot, the name of its frame.
-    gathered: whether poses that differ were taken for one camera's.
     """
 
     cameras: dict[str, list[int]]
     frames: list[str]
     frame_of: list[str]
-    gathered: bool
 
 
 def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
@@ -83,8 +81,7 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
         UserError: if they show a single camera that moves.
     """
     groups = _by_pose(shots)
-    gathered = _gathered(shots, groups)
-    groups = gathered or groups
+    groups = _gathered(shots, groups) or groups
     times = {shot.time for shot in shots}
     if max(len(group) for group in groups) == 1:
         if len(times) > 1:
@@ -97,7 +94,7 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
                 "use a capture of several fixed cameras; for a static scene, take the `time` keys out",
             )
         names = _unique([(shots[group[0]].stem, shots[group[0]].folder) for group in groups])
-        return Arrangement(dict(zip(names, groups, strict=True)), ["0"], ["0"] * len(shots), False)
+        return Arrangement(dict(zip(names, groups, strict=True)), ["0"], ["0"] * len(shots))
     timed = None not in times
     named = _time_names([time for time in times if time is not None]) if timed else {}
     stems = _frame_is_folder(shots, groups)
@@ -107,7 +104,7 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
     ordered = list(named.values()) if timed else sorted(set(frame_of))
     firsts = [shots[group[0]] for group in groups]
     cameras = _unique([(s.stem, s.folder) if stems else (s.folder, s.stem) for s in firsts])
-    return Arrangement(dict(zip(cameras, groups, strict=True)), ordered, frame_of, gathered is not None)
+    return Arrangement(dict(zip(cameras, groups, strict=True)), ordered, frame_of)
 
 
 def mean_calibration(some: Sequence[Calibration]) -> Calibration:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.agreement import AGREE, agreement
 from facefolds_core.captures.capture import Capture, check_image_sizes, complete_subset
 from facefolds_core.captures.developing import Negative, opacities, photos
 from facefolds_core.captures.images import fit_box
@@ -21,7 +20,7 @@ from facefolds_core.captures.scene import Scene, write_scene
 from facefolds_core.captures.sound import cut_sound, sound_start
 from facefolds_core.captures.visibility import check_sight
 from facefolds_core.errors import UserError
-from facefolds_core.facts import Fact, fact
+from facefolds_core.facts import fact
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.params import NormalizeParams, Subject
@@ -137,9 +136,6 @@ def _ball(radius: float, capture: Capture) -> float:
 def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     """Write the scene's folder, whole or not at all; a few images are held in memory at a time.
 
-    Returns:
-        The scene, with what its pictures show to be odd in `left_out`.
-
     Raises:
         UserError: if an image is damaged.
     """
@@ -167,23 +163,8 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
             seconds = scene.num_frames / (scene.fps or 1.0)
             cut_sound(capture.sound.path, temporary / "audio.wav", plan.sound_start, seconds)
         draw_place(temporary / "place.png", scene, FrameStore(temporary / "frames.arrow"))
-        scene = replace(scene, left_out=(*_doubts(plan, temporary), *scene.left_out))
         write_scene(scene, temporary)
     return scene
-
-
-def _doubts(plan: Plan, written: Path) -> list[Fact]:
-    """A note if the pictures of the first frame do not agree about the tracked mesh."""
-    tracking = plan.capture.tracking
-    if plan.vertices is None or tracking is None or tracking.faces is None:
-        return []
-    first = [row.camera for row in plan.rows if row.frame == 0]
-    store = FrameStore(written / "frames.arrow")
-    cameras, vertices = [plan.scene.camera_in_head(c, 0) for c in first], plan.vertices[0].astype(np.float64)
-    found = agreement(cameras, vertices, tracking.faces, lambda i: store.image(first[i], 0))
-    if found is None or found >= AGREE:
-        return []
-    return [fact("pictures_disagree", correlation=found)]
 
 
 def _negatives(rows: Sequence[Row], pictures: Mapping[tuple[int, int], Picture], what: Callable[..., str]) -> Negatives:

@@ -1,25 +1,25 @@
 """One picture of a capture, wherever it lies: a file, bytes inside a zip or an HDF5 file, a frame of a video.
 
 Readers say where pictures lie (`Picture`), `normalize` asks for their sizes without decoding them, then for their
-pixels. Frames of videos are decoded in order (`decoded`): a video is read once.
+pixels. Frames of videos are decoded in order (`developing`): a video is read once.
 """
 
 from __future__ import annotations
 
-import itertools
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import h5py
 import numpy as np
 
 from facefolds_core.captures.images import Image, decode_image, decode_mask, image_size, opacity_of, rgb_of
-from facefolds_core.captures.videos import Channels, Video
+from facefolds_core.captures.videos import Video
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import FORMATS, DamagedPictureError, picture_size
 from facefolds_core.files.reading import check_regular
@@ -63,18 +63,20 @@ class FilePicture:
 
 
 @dataclass(frozen=True)
-class ZipPicture:
-    """An encoded picture in a zip archive.
+class _Stored(ABC):
+    """An encoded picture inside a file of many.
 
     Attributes:
-        file: the archive.
-        member: the picture's name in it.
+        file: that it lies in.
+        name: its own in there.
         formats: what it may be.
     """
 
     file: Path
-    member: str
+    name: str
     formats: tuple[str, ...] = FORMATS
+    largest: ClassVar[bool] = False
+    """Whether of a coloured mask the largest channel counts."""
 
     def size(self, place: str) -> tuple[int, int]:
         return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), self.formats)
@@ -83,42 +85,31 @@ class ZipPicture:
         return rgb_of(self._bytes(place), self.file, self._at(place), self.formats)
 
     def opacity(self, place: str) -> Image:
-        return opacity_of(self._bytes(place), self.file, self._at(place), self.formats)
+        return opacity_of(self._bytes(place), self.file, self._at(place), self.formats, largest=self.largest)
 
     def _at(self, place: str) -> str:
-        return f"{place} ({self.member})"
+        return f"{place} ({self.name})"
 
-    def _bytes(self, place: str, most: int = -1) -> bytes:
-        return read_member(self.file, self.member, self._at(place), most)
+    @abstractmethod
+    def _bytes(self, place: str, most: int | None = None) -> bytes:
+        """All, or the first `most`."""
 
 
-@dataclass(frozen=True)
-class Hdf5Picture:
-    """An encoded picture in an HDF5 file: a data set of its bytes. Of a coloured mask the largest channel counts.
+class ZipPicture(_Stored):
+    """A member of a zip archive."""
 
-    Attributes:
-        file: the HDF5 file.
-        dataset: the path of the data set in it.
-    """
+    def _bytes(self, place: str, most: int | None = None) -> bytes:
+        return read_member(self.file, self.name, self._at(place), -1 if most is None else most)
 
-    file: Path
-    dataset: str
 
-    def size(self, place: str) -> tuple[int, int]:
-        return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), FORMATS)
+class Hdf5Picture(_Stored):
+    """A data set of bytes in an HDF5 file."""
 
-    def rgb(self, place: str) -> Image:
-        return rgb_of(self._bytes(place), self.file, self._at(place))
-
-    def opacity(self, place: str) -> Image:
-        return opacity_of(self._bytes(place), self.file, self._at(place), largest=True)
-
-    def _at(self, place: str) -> str:
-        return f"{place} ({self.dataset})"
+    largest = True
 
     def _bytes(self, place: str, most: int | None = None) -> bytes:
         try:
-            value = open_hdf5(self.file)[self.dataset]
+            value = open_hdf5(self.file)[self.name]
             part = (
                 slice(most) if isinstance(value, h5py.Dataset) and value.shape[:1] and value.dtype.itemsize == 1 else ()
             )
@@ -132,7 +123,7 @@ class Hdf5Picture:
 
 @dataclass(frozen=True)
 class VideoFrame:
-    """A frame of a video. `decoded` reads many in one go; by itself, all before it are decoded, too.
+    """A frame of a video. `Video.frames` reads many in one go; by itself, all before it are decoded, too.
 
     Attributes:
         video: whose.
@@ -154,32 +145,6 @@ class VideoFrame:
 
     def opacity(self, place: str) -> Image:
         return next(self.video.frames([self.index], "opacity"))
-
-
-def decoded(
-    pictures: Sequence[tuple[Picture, str]], channels: Channels, threads: int = 1, fine: bool = True
-) -> Iterator[Image]:
-    """The pixels of pictures, one after the other; frames of one video that follow one another cost one reading.
-
-    Args:
-        pictures: each with its place; frames of a video in the order of time.
-        channels: "rgb" (H, W, 3) or "opacity" (H, W, 1).
-        threads, fine: of `Video.frames`.
-
-    Raises:
-        UserError: if one is missing or damaged.
-    """
-
-    def video_of(item: tuple[Picture, str]) -> Video | None:
-        return item[0].video if isinstance(item[0], VideoFrame) else None
-
-    for video, run in itertools.groupby(pictures, video_of):
-        if video is not None:
-            indices = [picture.index for picture, _ in run if isinstance(picture, VideoFrame)]
-            yield from video.frames(indices, channels, threads, fine)
-        else:
-            for picture, place in run:
-                yield picture.rgb(place) if channels == "rgb" else picture.opacity(place)
 
 
 def _size_of(

@@ -32,14 +32,13 @@ from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, read_fact
 from facefolds_core.files.archives import read_npz
 from facefolds_core.files.frame_store import FrameStore
-from facefolds_core.files.reading import check_regular, is_there, remake
+from facefolds_core.files.reading import is_there, remake
 from facefolds_core.files.writing import read_json, write_json
 from facefolds_core.geometry.cameras import Camera, check_camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 
 SCENE_VERSION = 3
-"""Version 1 had lines of text in `left_out`, version 2 no `poses`; both are still read."""
 SPHERE_CENTRE = (-0.25, 0.0, 0.0)
 """The paper's c: 0.25 units behind the scene centre."""
 REACH = 0.45
@@ -234,13 +233,12 @@ def read_scene(folder: str | Path) -> Scene:
     folder = Path(folder)
     path = folder / "scene.json"
     remedy = remake(path)
-    check_regular(path, remedy)
     value: Any = read_json(path, remedy=remedy)
-    if not isinstance(value, dict) or value.get("version") not in range(1, SCENE_VERSION + 1):
+    if not isinstance(value, dict) or value.get("version") != SCENE_VERSION:
         raise UserError(
             "a normalised scene of another version",
             file=path,
-            expected=f"version 1 to {SCENE_VERSION}",
+            expected=f"version {SCENE_VERSION}",
             found=value.get("version") if isinstance(value, dict) else type(value).__name__,
             remedy=remedy,
         )
@@ -259,8 +257,8 @@ def read_scene(folder: str | Path) -> Scene:
             from_capture=Similarity.from_json(value["from_capture"]),
             left_out=tuple(read_fact(one) for one in value["left_out"]),
             folder=folder,
-            poses=_read_poses(value.get("poses")),
-            radius=None if value.get("radius") is None else float(value["radius"]),
+            poses=_read_poses(value["poses"]),
+            radius=None if value["radius"] is None else float(value["radius"]),
         )
         _check(scene)
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:

@@ -19,7 +19,6 @@ COMMANDS = {
     "view": "Play an asset in a browser.",
     "render": "Stills and films of an asset, without a screen.",
     "validate": "Check an asset whole, and say what is wrong with it.",
-    "vectors": "Tiny assets and the pictures that a player must show; compares a player's.",
     "export": "Write an asset as another program can read it.",
     "export-html": "One HTML file that plays an asset by itself.",
     "scores": "Scores, size and place of the assets that were made.",
@@ -31,7 +30,6 @@ COMMANDS = {
 
 
 EXTRAS = {
-    "vectors": "train",
     "scores": "train",
     "report": "report",
     "run": "cluster",

@@ -27,7 +27,7 @@ def named_camera(asset: Asset, name: str) -> Camera:
 
 
 def _from_file(path: Path) -> Camera:
-    remedy = "give one as views.json of `facefolds vectors` has them: K by rows, w2c = (R | t) by rows, width, height"
+    remedy = "give one as an object with K by rows, w2c = (R | t) by rows, width, height"
     value = read_json(path, remedy=remedy)
     try:
         K, w2c = np.array(value["K"], float), np.array(value["w2c"], float)

@@ -9,7 +9,6 @@ import typer
 
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.reading import check_regular
 from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.terminal import result_lines, score_lines
 
@@ -22,7 +21,6 @@ def lines_of(folders: SubjectFolders) -> list[str]:
     Raises:
         UserError: if its metrics.json is missing or garbled.
     """
-    check_regular(folders.metrics, REMEDY)
     metrics: Any = read_json(folders.metrics, remedy=REMEDY)
     try:
         return [*score_lines(metrics), *result_lines(metrics, folders)]

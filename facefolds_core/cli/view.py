@@ -12,8 +12,8 @@ from typing import Annotated
 import typer
 
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
-from facefolds_core.asset.stored import is_folder
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files.reading import is_folder
 from facefolds_core.serving.player import find_player
 from facefolds_core.serving.server import serving
 

@@ -22,6 +22,7 @@ from facefolds_core.cluster.project import CODE
 from facefolds_core.config.params_file import Params
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
+from facefolds_core.files.reading import read_text
 from facefolds_core.files.writing import write_text
 from facefolds_core.sweeps.edit import set_for_subject
 
@@ -57,10 +58,7 @@ def read_grid(path: Path) -> list[dict[str, Any]]:
         UserError: if it is none.
     """
     remedy = "write a line a key, `decimate.resolution: [16, 32, 64]` (docs/guide/sweeps.md)"
-    try:
-        grid = parse_yaml(path.read_text(encoding="utf-8"), path, remedy)
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=remedy) from None
+    grid = parse_yaml(read_text(path, remedy, expected="YAML"), path, remedy)
     wrong = not isinstance(grid, dict) or not grid
     if wrong or not all(isinstance(key, str) and isinstance(values, list) and values for key, values in grid.items()):
         raise UserError(

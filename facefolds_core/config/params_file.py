@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,9 @@ from pydantic import ValidationError
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.paths import check_path_text, check_subject_name
+from facefolds_core.files.reading import is_there, read_text
 from facefolds_core.files.writing import write_json
 from facefolds_core.params import STAGE_SECTIONS, Overrides, Section, Subject, merged, section_of, user_error
-from facefolds_core.params.renamed import remedy_for
 
 
 class Params(Section):
@@ -63,15 +62,8 @@ def load_params(path: str | Path = "params.yaml") -> Params:
             or the key.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UserError(
-            "file not found", file=path, remedy="run the command in the project's root folder, which has params.yaml"
-        ) from None
-    except UnicodeDecodeError as error:
-        place = f"byte {error.start}"
-        raise UserError("garbled YAML", file=path, place=place, expected="UTF-8", remedy="save it as UTF-8") from None
+    here = "run the command in the project's root folder, which has params.yaml"
+    text = read_text(path, here if not is_there(path) else "save it as UTF-8", expected="YAML")
     value = parse_yaml(text, path, "mend it; docs/guide/subjects.md describes the file")
     if not isinstance(value, dict) or not isinstance(value.get("subjects"), dict) or not value["subjects"]:
         raise UserError(
@@ -82,13 +74,12 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         )
     unknown = [name for name in value if name not in ("subjects", *STAGE_SECTIONS)]
     if unknown:
-        known = [f"`{name}`: {remedy}" for name in unknown if (remedy := remedy_for(str(name))) is not None]
         raise UserError(
             "unknown sections",
             file=path,
             place=brief(", ".join(brief(name) for name in unknown), 200),
             expected=", ".join(["subjects", *STAGE_SECTIONS]),
-            remedy="; ".join(known) or "remove or rename them",
+            remedy="remove or rename them",
         )
     sections = {name: value.get(name) or {} for name in STAGE_SECTIONS}
     for name, section in sections.items():
@@ -115,37 +106,6 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         for stage in STAGE_SECTIONS:
             params.stage(stage, name)
     return params
-
-
-def idle_keys(params: Params) -> list[str]:
-    """Keys of sections that no subject uses, since every one overrides them: a line for each."""
-    lines = []
-    for stage, section in params.sections.items():
-        for key, value in _leaves(section, stage):
-            if all(_has(subject.model_dump(), key) for subject in params.subjects.values()):
-                others = ", ".join(f"subjects.{name}.{key}" for name in list(params.subjects)[:3])
-                more = ", ..." if len(params.subjects) > 3 else ""
-                lines.append(f"{key}: {brief(value, 30)} is used by no subject: overridden by {others}{more}")
-    return lines
-
-
-def _leaves(value: Any, name: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict) and value:
-        for key, entry in value.items():
-            yield from _leaves(entry, f"{name}.{key}")
-    elif "." in name:
-        yield name, value
-
-
-def _has(overrides: Any, name: str) -> bool:
-    """Whether "texture.resolution" is given; a value that is no mapping replaces all that is deeper."""
-    for part in name.split("."):
-        if not isinstance(overrides, dict):
-            return True
-        if part not in overrides:
-            return False
-        overrides = overrides[part]
-    return True
 
 
 def write_configs(params: Params, subject: str, folder: Path) -> list[Path]:

@@ -21,8 +21,7 @@ from PIL import Image
 from facefolds_core.asset.manifest import REMEDY
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
-from facefolds_core.engines._picture import rgb_picture
-from facefolds_core.errors import UserError
+from facefolds_core.engines._folder import refuse_other_content, rgb_picture
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import window_to_window
@@ -55,15 +54,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
     Raises:
         UserError: if the folder holds anything else than an earlier export, or the asset's video is damaged.
     """
-    if folder.is_file():
-        raise UserError("a file stands where the folder is to be", file=folder, remedy="name another folder")
-    if folder.exists() and any(folder.iterdir()) and not (folder / CONTENTS).is_file():
-        raise UserError(
-            "the folder is not empty, and holds no earlier export",
-            file=folder,
-            expected=f"no such folder, or one with {CONTENTS}",
-            remedy="name another folder",
-        )
+    refuse_other_content(folder, CONTENTS)
     texture = level.entry.texture
     with atomic_folder(folder) as out:
         layers: list[dict[str, Any]] = []

@@ -25,7 +25,7 @@ from PIL import Image
 from facefolds_core.asset.glb import back_to_front
 from facefolds_core.asset.manifest import Texture
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.engines._picture import rgb_picture
+from facefolds_core.engines._folder import refuse_other_content, rgb_picture
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import atomic_file, atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
@@ -58,7 +58,7 @@ def write_usd(out: Path, level: AssetLevel, subject: str) -> int:
             write_files(pxr, Path(parts), level, subject)
             pack(pxr, Path(parts), temporary)
         return out.stat().st_size
-    refuse_other_content(out)
+    refuse_other_content(out, STAGE)
     with atomic_folder(out) as place:
         write_files(pxr, place, level, subject)
         return sum(path.stat().st_size for path in place.rglob("*") if path.is_file())
@@ -97,19 +97,6 @@ def _load() -> Any:
     except ModuleNotFoundError:
         raise UserError("the package usd-core is not installed", remedy="pip install 'facefolds[usd]'") from None
     return SimpleNamespace(Gf=Gf, Sdf=Sdf, Usd=Usd, UsdGeom=UsdGeom, UsdShade=UsdShade, Vt=Vt)
-
-
-def refuse_other_content(folder: Path) -> None:
-    """Raise UserError unless the folder may be replaced."""
-    if folder.is_file():
-        raise UserError("a file stands where the folder is to be", file=folder, remedy="name another folder")
-    if folder.exists() and any(folder.iterdir()) and not (folder / STAGE).is_file():
-        raise UserError(
-            "the folder is not empty, and holds no earlier export",
-            file=folder,
-            expected=f"no such folder, or one with {STAGE}",
-            remedy="name another folder",
-        )
 
 
 def write_stage(pxr: Any, path: Path, level: AssetLevel, subject: str) -> None:

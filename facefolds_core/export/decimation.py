@@ -8,16 +8,12 @@ with its border kept misses the bound on the vertices and errs more at the same 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Literal
 
 import fast_simplification
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from trimesh import Trimesh
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from facefolds_core.errors import UserError
 from facefolds_core.export.poisson import compact, largest_component
@@ -34,25 +30,7 @@ AGGRESSIVENESS = (3, 5, 7)
 FLAT = 1e-7
 """A face is degenerate if twice its area is not above this times its longest edge squared."""
 
-CROSSING_TOLERANCE = 1e-5
-"""Two layers cross where the inner one is farther out by more than this, units: ray casting is in float32."""
-
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Order:
-    """Neighbouring layers compared along the chart's rays through the vertices of both.
-
-    Attributes:
-        compared: vertices whose ray meets the other layer.
-        crossed: those of the inner layer that lie beyond the outer one, and of the outer one that lie below the inner.
-        deepest: by how much at most, units.
-    """
-
-    compared: int
-    crossed: int
-    deepest: float
 
 
 def decimate_layers(
@@ -147,23 +125,3 @@ def exact_st(vertices: NDArray[np.float32], window: Window, chart: Chart) -> NDA
     """Texture coordinates by their definition, the chart's; beyond the window they stop at its edge."""
     uv, _ = chart.uv(vertices.astype(np.float64))
     return np.asarray(uv_to_st(uv, window).clip(0, 1), np.float32)
-
-
-def layer_order(meshes: Sequence[Surface], chart: Chart) -> Order:
-    """Count the vertices of each layer that lie on the wrong side of a neighbouring layer."""
-    compared, crossed, deepest = 0, 0, 0.0
-    for outer, inner in pairwise(meshes):
-        for beyond in (_heights(inner, outer, chart), -_heights(outer, inner, chart)):
-            compared += len(beyond)
-            crossed += int((beyond > CROSSING_TOLERANCE).sum())
-            deepest = max(deepest, float(beyond.max(initial=0.0)))
-    return Order(compared, crossed, deepest)
-
-
-def _heights(mesh: Surface, other: Surface, chart: Chart) -> Array:
-    """By how much the vertices of `mesh` lie farther out than `other`, of those whose ray meets it."""
-    uv, radius = chart.uv(mesh.vertices.astype(np.float64))
-    origins = chart.origins(uv)
-    caster = RayMeshIntersector(Trimesh(other.vertices, other.faces, process=False))
-    _, ray, points = caster.intersects_id(origins, chart.directions(uv), multiple_hits=False, return_locations=True)
-    return np.asarray(radius[ray] - np.linalg.norm(points - origins[ray], axis=-1))

@@ -5,8 +5,8 @@ pixels. For each channel of each texel, over the frames,
 
     1/2 W sum_k (x_k - y_k)^2 + price sum_k |x_k - x_(k-1)|
 
-is made least. y are the codes (of 255) as they were baked; W says how much the texel shows: the mean over the training
-cameras of the sum over the pixels of (dC/dx)^2, so that the first term is an error summed over the pixels of a picture.
+is made least. y are the model's codes (of 255); W says how much the texel shows: the mean over the training cameras of
+the sum over the pixels of (dC/dx)^2, so that the first term is an error summed over the pixels of a picture.
 What shows follows its frames; what does not stays constant, and what lies between moves in few steps.
 
 A long take is held in overlapping windows. At once, a frame that is trained again would change a texel or two of all
@@ -23,12 +23,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.config.source_code import digest_of_packages
-from facefolds_core.export.bake import MIN_LIGHT
 from facefolds_core.export.hold_kernel import add_weights, hold
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.files.frame_store import FrameStore
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.kernels.hit_codes import before, encode
 from facefolds_core.progress import progress as progress_bar
+from facefolds_core.rendering.raster import cast_mesh
 from facefolds_core.spacing import spread
+
+MIN_LIGHT = 0.001
+"""Layers behind less transmittance are left out."""
 
 LOOKED_AT = 6
 """Frames in which it is looked how much a texel shows, evenly spread; the greatest counts."""
@@ -40,11 +46,38 @@ MEMORY = 32 << 20
 """For a window's frames of one layer, bytes; larger ones go through a file."""
 
 
+def shown_rays(
+    cameras: Sequence[Camera], meshes: Sequence[TexturedMesh], opacity: NDArray[np.uint8], progress: bool = True
+) -> NDArray[np.uint16]:
+    """(P, N, 2): where rays through pixel centres meet the layers (kernels/hit_codes.py); those that may show anything.
+
+    Args:
+        opacity: (N, R, R), no frame's alpha is larger.
+    """
+    some = opacity > 0
+    some[:, :-1] |= some[:, 1:]  # any of the four texels around a place
+    some[:, :, :-1] |= some[:, :, 1:]
+    found = []
+    for camera in progress_bar(cameras, desc="rays", unit="camera", disable=not progress):
+        codes = np.zeros((camera.height * camera.width, len(meshes), 2), np.uint16)
+        shows = np.zeros(len(codes), bool)
+        for layer, mesh in enumerate(meshes):
+            hit = np.zeros((camera.height, camera.width), bool)
+            st = np.zeros((camera.height, camera.width, 2), np.float32)
+            cast_mesh(camera, mesh, hit, st)
+            own = np.flatnonzero(hit)
+            codes[own, layer] = encode(st[hit])
+            column, row = before(codes[own, layer], opacity.shape[1]).T
+            shows[own] |= some[layer, row, column]
+        found.append(codes[shows])
+    return np.concatenate(found)
+
+
 def texel_weights(codes: NDArray[np.uint16], textures: FrameStore, cameras: int) -> NDArray[np.float32]:
     """(N, S, S, 2): W of colour and of alpha.
 
     Args:
-        codes: (P, N, 2) rays of all training cameras (`bake.Rays.shipped`).
+        codes: (P, N, 2) of `shown_rays`.
         textures: layered frame store.
         cameras: how many those are.
     """

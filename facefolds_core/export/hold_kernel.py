@@ -7,12 +7,19 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from facefolds_core.export.bake_kernel import _tap
 from facefolds_core.kernels.hit_codes import corner
 from facefolds_core.kernels.jit import compiled, inlined, kernel
 from facefolds_core.kernels.scatter import BLOCK, CHUNK, scatter_of, spread
 
 _scatter = scatter_of(2)
+
+
+@inlined
+def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
+    one = np.float32(1.0)
+    top = texture[n, i, j, q] * (one - b) + texture[n, i, j + 1, q] * b
+    bottom = texture[n, i + 1, j, q] * (one - b) + texture[n, i + 1, j + 1, q] * b
+    return top * (one - a) + bottom * a
 
 
 @kernel(parallel=True)

@@ -55,22 +55,7 @@ class Samples:
     spacing: Array
 
 
-@dataclass(frozen=True)
-class Reconstruction:
-    """A trimmed surface and how well it fits.
-
-    Attributes:
-        surface: the mesh.
-        error: mean distance of its vertices from the nearest samples' tangent planes, in local sample spacings.
-        boundaries: boundary loops; 1 unless the layer has holes.
-    """
-
-    surface: Surface
-    error: float
-    boundaries: int
-
-
-def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool = True) -> list[Reconstruction]:
+def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool = True) -> list[Surface]:
     """All layers, outermost first, on as many processes as there are processors (at most one a layer).
 
     Raises:
@@ -85,12 +70,12 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool =
             return [_advance(bar, result) for result in pool.map(_reconstruct_job, jobs)]
 
 
-def _advance(bar: Any, result: Reconstruction) -> Reconstruction:
+def _advance(bar: Any, result: Surface) -> Surface:
     bar.update()
     return result
 
 
-def _reconstruct_job(job: tuple[Samples, ReconstructParams, int]) -> Reconstruction:
+def _reconstruct_job(job: tuple[Samples, ReconstructParams, int]) -> Surface:
     return reconstruct(*job)
 
 
@@ -132,7 +117,7 @@ def _spacing(p: Array, valid: NDArray[np.bool_], step: int, strides: NDArray[np.
     return largest
 
 
-def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Reconstruction:
+def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Surface:
     """Poisson, trimming, largest component.
 
     Args:
@@ -163,11 +148,7 @@ def reconstruct(samples: Samples, params: ReconstructParams, layer: int) -> Reco
             remedy="raise reconstruct.depth, or look at the layer's samples in samples/grids.npz",
         )
     faces = _outward(vertices, faces, samples)
-    distance, nearest = cKDTree(samples.points).query(vertices)
-    offset = np.abs(((vertices - samples.points[nearest]) * samples.normals[nearest]).sum(-1))
-    near = distance <= samples.spacing[nearest]  # the rim's overhang has no sample to be compared with
-    error = float((offset[near] / np.maximum(samples.spacing[nearest][near], 1e-12)).mean()) if near.any() else 0.0
-    return Reconstruction(Surface(vertices.astype(np.float32), faces.astype(np.int32)), error, boundary_loops(faces))
+    return Surface(vertices.astype(np.float32), faces.astype(np.int32))
 
 
 def screened_poisson(points: Array, normals: Array, depth: int) -> tuple[Array, NDArray[np.intp]]:
@@ -243,17 +224,3 @@ def _outward(vertices: Array, faces: NDArray[np.intp], samples: Samples) -> NDAr
     _, nearest = cKDTree(samples.points).query(corners.mean(1))
     agrees = (normal * samples.normals[nearest]).sum()
     return faces if agrees >= 0 else faces[:, ::-1]
-
-
-def boundary_loops(faces: NDArray[Any]) -> int:
-    """Number of connected chains of boundary edges (edges of exactly one face) of a mesh (F, 3)."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), 1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    border = unique[count == 1]
-    if len(border) == 0:
-        return 0
-    _, index = np.unique(border, return_inverse=True)
-    index = index.reshape(-1, 2)
-    size = int(index.max()) + 1
-    links = coo_matrix((np.ones(len(index), np.int8), (index[:, 0], index[:, 1])), shape=(size, size))
-    return int(connected_components(links, directed=False)[0])

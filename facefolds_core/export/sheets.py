@@ -12,8 +12,6 @@ shares b only: a layer's point is the outer layer's, moved by sum_k b_k (rho_k -
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
@@ -25,22 +23,7 @@ from facefolds_core.geometry.sphere_uv import st_to_uv, texel_uv, uv_to_st
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Gridded:
-    """Sheets, and what had to be mended.
-
-    Attributes:
-        sheets: of all layers.
-        crossed: samples that lay beyond the layer around them, and were moved onto it.
-        deepest: by how much at most, units.
-    """
-
-    sheets: Sheets
-    crossed: int
-    deepest: float
-
-
-def grid_sheets(grids: Grids, resolution: int | None) -> Gridded:
+def grid_sheets(grids: Grids, resolution: int | None) -> Sheets:
     """The samples themselves as vertices.
 
     Where a layer has no point its radius is that of the nearest direction in which it has one; no face of it lies
@@ -59,17 +42,13 @@ def grid_sheets(grids: Grids, resolution: int | None) -> Gridded:
     for layer, known in enumerate(valid):
         nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
         radii[layer] = radii[layer][tuple(nearest)]
-    beyond = np.zeros_like(radii)
-    beyond[1:] = radii[1:] - np.minimum.accumulate(radii, 0)[:-1]
-    beyond[1:][~(valid[1:] & valid[:-1])] = 0
     radii = np.minimum.accumulate(radii, 0)
     falling = np.abs(radii[:, :-1, :-1] - radii[:, 1:, 1:]).sum(0) <= np.abs(radii[:, :-1, 1:] - radii[:, 1:, :-1]).sum(
         0
     )
     window = grids.window(0)
     st = uv_to_st(texel_uv(grids.resolution, grids.resolution, window), window)[thin[1:]]
-    sheets = Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
-    return Gridded(sheets, int((beyond > 0).sum()), float(beyond.max(initial=0.0)))
+    return Sheets(st, radii.astype(np.float32), valid, grids.opacity[thin], falling, grids.windows[0], grids.chart)
 
 
 def vertex_uv(sheets: Sheets) -> Array:

@@ -10,29 +10,21 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
-from facefolds_core.export.bake import Baker, Codes, baked_frame, gather_rays
 from facefolds_core.export.choosing import MESHES, choose_meshes, choose_texels
 from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
-from facefolds_core.export.hold import held_rows, texel_weights
-from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
-from facefolds_core.export.poisson import Reconstruction, reconstruct_layers
-from facefolds_core.export.sheets import Gridded, grid_sheets
+from facefolds_core.export.hold import held_rows, shown_rays, texel_weights
+from facefolds_core.export.kept import KeptFrames
 from facefolds_core.export.stores import Grids, Sheets
 from facefolds_core.facts import Fact
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
-from facefolds_core.params import BakeParams, DecimateParams, ReconstructParams, SampleParams, TextureParams
-from facefolds_core.progress import progress
+from facefolds_core.params import BakeParams, DecimateParams, SampleParams, TextureParams
 
 if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
@@ -44,7 +36,7 @@ SAMPLED_VIEWS = 3
 """Frames of each training camera that the window is looked for in, where the head turns."""
 
 BAKED_VIEWS = 2
-"""Poses that each training camera is given to fit the textures to, where the head turns."""
+"""Poses in which each training camera sees what shows, where the head turns."""
 
 Surfaces = Sheets | list[Surface]
 """Of all layers, outermost first: the sampled grids themselves, or triangle surfaces."""
@@ -86,11 +78,6 @@ def sample_model(
     grids = sample_grids(model, r, window)
     opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
-
-
-def reconstruct(grids: Grids, params: ReconstructParams) -> Gridded | list[Reconstruction]:
-    """Surfaces of the layers, with what is to be said of them."""
-    return grid_sheets(grids, params.resolution) if params.method == "grid" else reconstruct_layers(grids, params)
 
 
 @dataclass(frozen=True)
@@ -146,99 +133,41 @@ def bake(
     cameras: Sequence[Camera],
     grids: Grids,
     meshes: Sequence[TexturedMesh],
-    samples: Path,
     textures: Path,
     params: BakeParams,
     folder: Path,
     kept: Path | None = None,
 ) -> int:
-    """Textures fitted to the meshes that ship, into `folder`/textures.arrow.
+    """Textures that ship: held where a change would not show, into `folder`/textures.arrow.
 
     Args:
         cameras: for training.
-        samples, textures: frame stores of the textures as they were sampled, and at the size that ships. They are let
-            go before the texels are held.
-        kept: folder of what an earlier run made, from which frames are taken over that would be the same, and beside it
-            what was held; or None.
+        textures: frame store of the textures at the size that ships.
+        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
 
     Returns:
-        of how many rays they are a fit; 0 if they were left as they are.
+        rays by which it was seen what shows; 0 if the textures were left as they are.
 
     Raises:
-        UserError: if meshes, samples and textures are not of the same layers and frames.
+        UserError: if meshes and textures are not of the same layers.
     """
-    path = folder / TEXTURES
-    if params.iterations == 0:
-        shutil.copyfile(textures, path)
-        return 0
-    common = digest_of_input(cameras, grids, meshes, params)
-    rays = _fit(cameras, grids, meshes, FrameStore(samples), FrameStore(textures), params, path, common, kept)
-    baked = FrameStore(path)
-    if params.hold > 0 and any(frame > 0 for _, frame in baked):
-        baked = FrameStore(path.rename(folder / "baked.arrow"))
-        weights = texel_weights(rays, baked, len(cameras))
-        earlier = KeptFrames(None if kept is None else kept.with_name(f"{kept.name}_held"))
-        rows = held_rows(baked, weights, params.hold, folder, kept=earlier)
-        write_frames(path, (baked.height, baked.width, 4), rows, packed=True)
-        earlier.keep(path)
-        baked.path.unlink()
-    return len(rays)
-
-
-def _fit(
-    cameras: Sequence[Camera],
-    grids: Grids,
-    meshes: Sequence[TexturedMesh],
-    samples: FrameStore,
-    textures: FrameStore,
-    params: BakeParams,
-    path: Path,
-    common: bytes,
-    kept: Path | None,
-) -> Codes:
-    """Write the fitted textures; the rays on the meshes that ship. What else was gathered is let go."""
-    sheets = grid_sheets(grids, None).sheets
-    _check_match(meshes, sheets, textures, samples)
-    rays = gather_rays(cameras, meshes, sheets)
-    baker = Baker(meshes, sheets, rays, textures.height)
-    shape = (textures.height, textures.width, 4)
-    frames = sorted({frame for _, frame in textures})
-    with progress(total=len(frames), desc="bake", unit="frame") as bar:
-
-        def make(frame: int) -> NDArray[np.uint8]:
-            return baked_frame(baker, textures, samples, frame, params.iterations)
-
-        def digest(frame: int) -> str:
-            layers = range(len(meshes))
-            return digest_of_frame(common, (store.image(n, frame) for store in (textures, samples) for n in layers))
-
-        earlier = KeptFrames(kept)
-        rows = earlier.rows(frames, len(meshes), digest, make, lambda: bar.update())
-        write_frames(path, shape, rows, packed=True)
-    earlier.keep(path)
-    return rays.shipped
-
-
-def digest_of_input(
-    cameras: Sequence[Camera], grids: Grids, meshes: Sequence[TexturedMesh], params: BakeParams
-) -> bytes:
-    """Of all that every frame is fitted with, and of the code that does it."""
-    parts: dict[str, Any] = {"iterations": params.iterations}
-    parts |= {f"grids {name}": value for name, value in vars(grids).items() if isinstance(value, np.ndarray)}
-    for i, mesh in enumerate(meshes):
-        parts |= {f"mesh {i} {name}": value for name, value in vars(mesh).items()}
-    for i, camera in enumerate(cameras):
-        parts[f"camera {i}"] = (camera.K.tobytes(), camera.w2c.tobytes(), camera.width, camera.height)
-    return digest_of({**parts, "code": digest_of_packages("export", "rendering", "geometry")})
-
-
-def _check_match(meshes: Sequence[TexturedMesh], sheets: Sheets, textures: FrameStore, samples: FrameStore) -> None:
-    layers = {len(meshes), sheets.num_layers, 1 + max(layer for layer, _ in textures.keys())}  # noqa: SIM118
-    if len(layers) > 1 or textures.keys() != samples.keys():
+    path, store = folder / TEXTURES, FrameStore(textures)
+    layers = {len(meshes), grids.num_layers, 1 + max(layer for layer, _ in store)}
+    if len(layers) > 1:
         raise UserError(
             "meshes, samples and textures do not belong together",
-            file=textures.path,
-            expected="as many layers and frames in each",
-            found=f"{sorted(layers)} layers, {len(textures.keys())} textures of {len(samples.keys())} samples",
+            file=textures,
+            expected="as many layers in each",
+            found=sorted(layers),
             remedy="run `dvc repro`, which makes them again",
         )
+    if params.hold == 0 or not any(frame > 0 for _, frame in store):
+        shutil.copyfile(textures, path)
+        return 0
+    rays = shown_rays(cameras, meshes, grids.opacity)
+    weights = texel_weights(rays, store, len(cameras))
+    earlier = KeptFrames(kept)
+    rows = held_rows(store, weights, params.hold, folder, kept=earlier)
+    write_frames(path, (store.height, store.width, 4), rows, packed=True)
+    earlier.keep(path)
+    return len(rays)

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.inputs import check_textures
 from facefolds_core.config.source_code import digest_of_packages
-from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.files.frame_store import FrameStore, write_frames
@@ -130,23 +130,8 @@ def resample_store(
         UserError: if the source is missing, damaged, or not a complete set of square RGBA images.
     """
     store = FrameStore(source)
-    _check_complete(store)
+    check_textures(store)
     earlier = KeptFrames(kept)
     write_frames(target, (size, size, 4), texture_rows(store, size, earlier, progress), packed=True)
     earlier.keep(target)
     return store
-
-
-def _check_complete(store: FrameStore) -> None:
-    keys = store.keys()
-    layers, frames = {layer for layer, _ in keys}, {frame for _, frame in keys}
-    complete = len(keys) == len(layers) * len(frames) and layers == set(range(len(layers)))
-    if keys and complete and frames == set(range(len(frames))) and store.height == store.width and store.channels == 4:
-        return
-    raise UserError(
-        "texture samples are incomplete",
-        file=store.path,
-        expected="square RGBA images, one for each layer and frame",
-        found=f"{len(keys)} images of {store.height} x {store.width} x {store.channels} for {len(layers)} layers",
-        remedy="delete the file and run `dvc repro`, which samples the model again",
-    )

@@ -68,16 +68,6 @@ def visible_window(
     return float(u0), float(u1), float(v0), float(v1)
 
 
-def removed_weight(
-    model: RadianceManifolds, camera: Camera, stride: int, frame: int, window: Window
-) -> NDArray[np.float64]:
-    """(rays,) weight that each ray of a lattice loses outside `window`: the bound on its change of colour."""
-    uv, weights, hit, _ = _crossings(model, camera, stride, [frame])
-    u0, u1, v0, v1 = window
-    outside = (uv[..., 0] < u0) | (uv[..., 0] > u1) | (uv[..., 1] < v0) | (uv[..., 1] > v1)
-    return np.asarray(np.where(outside & hit, weights, 0).sum(-1))
-
-
 def _seen_uv(
     model: RadianceManifolds, camera: Camera, stride: int, frames: Sequence[int]
 ) -> tuple[NDArray[np.float64], float]:

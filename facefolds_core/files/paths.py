@@ -180,28 +180,19 @@ def check_path_text(path: str, name: str, file: str | Path, key: str = "path") -
         )
 
 
-def check_capture_place(path: str, folders: SubjectFolders) -> Path:
-    """The place of a subject's capture, if the stages may read it.
+OWN = {"path": "a capture", "mattes": "mattes of your own", "start": "Gaussians of your own"}
+"""Key of a subject that names a path -> what lies there."""
+
+
+def check_place(path: str, folders: SubjectFolders, key: str) -> Path:
+    """The place that a key of a subject names, if the stages may read it.
 
     Raises:
         UserError: if it is no path of this machine, or leads (through links, too) into the subject's own folder or to
             one that holds it: there the stages would replace what they are to read.
     """
-    return _check_place(path, folders, "path", "a capture")
-
-
-def check_mattes_place(path: str, folders: SubjectFolders) -> Path:
-    """The same of the folder of mattes that a subject names: DVC deletes a stage's outputs before the stage runs."""
-    return _check_place(path, folders, "mattes", "mattes of your own")
-
-
-def check_start_place(path: str, folders: SubjectFolders) -> Path:
-    """The same of the file of Gaussians that a subject names."""
-    return _check_place(path, folders, "start", "Gaussians of your own")
-
-
-def _check_place(path: str, folders: SubjectFolders, key: str, what: str) -> Path:
     check_path_text(path, folders.root.name, "params.yaml", key)
+    what = OWN[key]
     place = f"subjects.{folders.root.name}.{key} in params.yaml"
     try:
         there = Path(path).resolve()

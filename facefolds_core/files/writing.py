@@ -24,6 +24,7 @@ from typing import Any
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import parse_json
+from facefolds_core.files.reading import read_text
 from facefolds_core.system.locks import Lock, try_lock
 
 PREFIX = ".facefolds-temporary-"
@@ -214,18 +215,9 @@ def read_json(path: str | Path, remedy: str = "make the file again, or restore i
     """Parse a JSON file, with or without a byte order mark.
 
     Raises:
-        UserError: if the file is missing, is not UTF-8 or is not JSON (parsing.py); names the line and column.
+        UserError: if it is missing, no regular file, not UTF-8 or not JSON (parsing.py); names the line and column.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise UserError("file not found", file=path, remedy=remedy) from None
-    except UnicodeDecodeError as error:
-        raise UserError(
-            "not a text file", file=path, place=f"byte {error.start}", expected="JSON in UTF-8", remedy=remedy
-        ) from None
-    return parse_json(text, path, remedy)
+    return parse_json(read_text(Path(path), remedy, expected="JSON"), path, remedy)
 
 
 def file_sha256(path: Path) -> str:

@@ -50,26 +50,26 @@ def regions_of(content: LevelContent, cameras: Sequence[Camera], params: Attenti
     if params.strength == 0 or not cameras:
         return nowhere
     known = dict[tuple[int, ...], tuple[Region, ...]]()
-    views = list[_View]()
+    views = list[View]()
 
     def of(frames: range) -> Sequence[Region]:
         chosen = tuple(spread(range(content.frames), FRAMES))
         if params.of == "segment" and content.part_frames:
             chosen = (frames[len(frames) // 2],)
         if not views:
-            views.extend(_views(content, cameras))
+            views.extend(views_of(content, cameras))
         if chosen not in known:
-            known[chosen] = tuple(merged(offsets(_block_weights(content, views, chosen), params.strength)))
+            known[chosen] = tuple(merged(offsets(block_weights(content, views, chosen), params.strength)))
         return known[chosen]
 
     return of
 
 
-_View = tuple[Hits, float]
+View = tuple[Hits, float]
 """Where chosen rays of a camera hit the layers, and how many pixels that do stand for each."""
 
 
-def _views(content: LevelContent, cameras: Sequence[Camera]) -> list[_View]:
+def views_of(content: LevelContent, cameras: Sequence[Camera]) -> list[View]:
     chosen = spread(cameras, CAMERAS)
     meshes, rng, views = [layer.mesh for layer in content.layers], np.random.default_rng(0), []
     for camera in chosen:
@@ -79,12 +79,8 @@ def _views(content: LevelContent, cameras: Sequence[Camera]) -> list[_View]:
     return views
 
 
-def block_weights(content: LevelContent, cameras: Sequence[Camera]) -> Weights:
-    """W of each macroblock: the greatest over some frames, of the sum over the pixels of some cameras."""
-    return _block_weights(content, _views(content, cameras), spread(range(content.frames), FRAMES))
-
-
-def _block_weights(content: LevelContent, views: Sequence[_View], frames: Sequence[int]) -> Weights:
+def block_weights(content: LevelContent, views: Sequence[View], frames: Sequence[int]) -> Weights:
+    """W of each macroblock: the greatest over some frames, of the sum over the pixels of some views."""
     layout = content.layout
     blocks = np.zeros((layout.height // MACROBLOCK, layout.width // MACROBLOCK))
     for frame in frames:

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.manifest import Level, Quality
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.regions import Regions, nowhere
+from facefolds_core.asset.regions import Regions
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
@@ -46,8 +46,8 @@ def coded_level(
     """
     setting = setting.fitted(content.layers, cameras)
     video, crfs = setting.video, None
-    regions = nowhere if video.lossless else regions_of(content, cameras, setting.attention)
-    if meter is not None and video.target_psnr is not None and not video.lossless:
+    regions = regions_of(content, cameras, setting.attention)
+    if meter is not None and video.target_psnr is not None:
         target = video.target_psnr
         crfs = {codec: _crf(folder, content, regions, CODECS[codec], video, meter, target) for codec in video.codec}
     level = write_level(folder, name, content, setting, crfs, shared, regions)

@@ -16,6 +16,6 @@ def codec_warning(reached: float | None, video: VideoCodec) -> Fact | None:
         reached: dB to what went in, None if unknown.
     """
     target = video.target_psnr
-    if reached is None or target is None or video.lossless or reached > target - NOTICED:
+    if reached is None or target is None or reached > target - NOTICED:
         return None
     return fact("codec_misses", reached=reached, target=target)

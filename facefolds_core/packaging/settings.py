@@ -28,7 +28,6 @@ class VideoSetting:
     codec: tuple[CodecName, ...]
     crf: int
     target_psnr: float | None
-    lossless: bool
     preset: str
     keyframe_interval: int
 
@@ -50,7 +49,7 @@ class LevelSetting:
 
     @classmethod
     def of(cls, params: CompressParams, level: LevelParams | None = None, interval: int | None = None) -> LevelSetting:
-        """Of the full level, or of a coarser one, which has a constant rate factor of its own and is never lossless.
+        """Of the full level, or of a coarser one, which has a constant rate factor of its own.
 
         Args:
             interval: frames between the key frames of a stream, which has one a segment.
@@ -65,7 +64,6 @@ class LevelSetting:
                 codec=video.codec,
                 crf=video.crf if level is None else level.crf,
                 target_psnr=video.target_psnr if level is None else None,
-                lossless=video.lossless and level is None,
                 preset=video.preset,
                 keyframe_interval=video.keyframe_interval if interval is None else interval,
             ),

@@ -4,7 +4,7 @@
 needs to change is a constant beside the code that uses it, with its reason.
 """
 
-from facefolds_core.params.base import Section, merged, nested, value_at
+from facefolds_core.params.base import Section, merged, nested
 from facefolds_core.params.capture import CaptureParams, NormalizeParams
 from facefolds_core.params.compress import (
     AttentionParams,
@@ -85,5 +85,4 @@ __all__ = [
     "section_of",
     "train_params",
     "user_error",
-    "value_at",
 ]

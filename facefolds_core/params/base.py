@@ -76,14 +76,6 @@ def merged(base: Mapping[str, Any], override: Mapping[str, Any]) -> dict[str, An
     return result
 
 
-def value_at(section: Section, path: str) -> Any:
-    """The value of a key within sections: "textures.learning_rate"."""
-    value: Any = section
-    for name in path.split("."):
-        value = getattr(value, name)
-    return value
-
-
 def nested(path: str, value: Any) -> dict[str, Any]:
     """ "textures.learning_rate" and 0.1 -> {"textures": {"learning_rate": 0.1}}."""
     first, _, rest = path.partition(".")

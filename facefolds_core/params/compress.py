@@ -51,9 +51,6 @@ class VideoCodec(Section):
     """Quality of rendered training views against those of the uncoded textures, dB; takes the place of the full
     level's `crf`, which is searched for."""
 
-    lossless: bool = False
-    """No loss in the full level beyond 8 bits and 4:2:0. Few hardware decoders know H.264's profile for it."""
-
     preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow"] = (
         "veryslow"
     )

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from facefolds_core.params.base import Natural, Section, TextureSide, Weight
+from facefolds_core.params.base import Section, TextureSide, Weight
 
 
 class SampleParams(Section):
@@ -60,10 +60,7 @@ class TextureParams(Section):
 
 
 class BakeParams(Section):
-    """Textures are fitted to the meshes that ship."""
-
-    iterations: Natural = 2
-    """Passes over the training cameras' rays, in each frame; 0 leaves the textures as `texture` made them."""
+    """Texels keep still where a change would not show."""
 
     hold: Weight = 0.008
     """Price of a texel's change from frame to frame, against the error of keeping still. Larger values make smaller

@@ -1,4 +1,4 @@
-"""Texture frames fitted to the meshes that ship: data/<subject>/textures."""
+"""Texture frames that ship, held where a change would not show: data/<subject>/textures."""
 
 from __future__ import annotations
 
@@ -12,18 +12,16 @@ from facefolds_core.params import BakeParams
 
 
 def bake(folders: SubjectFolders) -> str:
-    params = read_stage(BakeParams, folders.config)
     with atomic_folder(folders.textures) as temporary:
         rays = steps.bake(
             read_scene(folders.scene).views_of("train", steps.BAKED_VIEWS),
             read_grids(folders.samples / "grids.npz"),
             read_meshes(folders.meshes / "meshes.npz"),
-            folders.samples / steps.TEXTURES,
             folders.resampled / steps.TEXTURES,
-            params,
+            read_stage(BakeParams, folders.config),
             temporary,
-            folders.checkpoints / "baked",
+            folders.checkpoints / "held",
         )
     if rays == 0:
         return f"textures as they were resampled, in {folders.textures}"
-    return f"textures fitted to {rays} rays, in {folders.textures}"
+    return f"texels held by what shows along {rays} rays, in {folders.textures}"

@@ -8,7 +8,7 @@ from facefolds_core.captures.actor import write_capture
 from facefolds_core.captures.generated import is_generated
 from facefolds_core.config.stages import read_stage, read_subject
 from facefolds_core.errors import UserError
-from facefolds_core.files.paths import SubjectFolders, check_capture_place
+from facefolds_core.files.paths import SubjectFolders, check_place
 from facefolds_core.files.reading import is_folder, is_regular
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.params import CaptureParams, Subject
@@ -19,7 +19,7 @@ def capture(folders: SubjectFolders) -> str:
     subject = read_subject(folders.config)
     if is_generated(subject.source):
         return _generate(folders, subject, read_stage(CaptureParams, folders.config))
-    path = check_capture_place(subject.path, folders)
+    path = check_place(subject.path, folders, "path")
     if not (is_folder(path) or is_regular(path)):
         raise UserError(
             "the capture is not there",

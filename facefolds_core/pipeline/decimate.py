@@ -5,7 +5,6 @@ from __future__ import annotations
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_level_resolutions, read_stage
 from facefolds_core.export import steps
-from facefolds_core.export.decimation import layer_order
 from facefolds_core.export.stores import holds_sheets, read_grids, read_sheets, read_surfaces, write_meshes
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import atomic_folder
@@ -23,7 +22,6 @@ def decimate(folders: SubjectFolders) -> str:
         surfaces, grids, read_scene(folders.scene), folders.samples / steps.TEXTURES, params, levels
     )
     meshes = made.meshes
-    order = layer_order(meshes, grids.chart)
     with atomic_folder(folders.meshes) as temporary:
         write_meshes(temporary / "meshes.npz", meshes)
         for resolution, coarser in made.coarser.items():
@@ -31,8 +29,4 @@ def decimate(folders: SubjectFolders) -> str:
         why = write_choice(temporary, made.why)
     vertices, triangles = sum(len(m.vertices) for m in meshes), sum(len(m.faces) for m in meshes)
     coarse = "".join(f"; R^m {r}: {sum(len(m.faces) for m in found)} triangles" for r, found in made.coarser.items())
-    return (
-        f"{len(meshes)} meshes, {vertices} vertices, {triangles} triangles; {order.crossed} of {order.compared} "
-        f"vertices lie on the wrong side of a neighbouring layer, by {order.deepest:.1e} at most{coarse}; "
-        f"in {folders.meshes}{why}"
-    )
+    return f"{len(meshes)} meshes, {vertices} vertices, {triangles} triangles{coarse}; in {folders.meshes}{why}"

@@ -18,25 +18,17 @@ def reconstruct(folders: SubjectFolders) -> str:
 
 
 def with_grid(grids: Grids, params: ReconstructParams, folders: SubjectFolders) -> str:
-    made = grid_sheets(grids, params.resolution)
+    sheets = grid_sheets(grids, params.resolution)
     with atomic_folder(folders.surfaces) as temporary:
-        write_sheets(temporary / "surfaces.npz", made.sheets)
-    n = len(made.sheets.st)
-    return (
-        f"{made.sheets.num_layers} sheets of {n} x {n} vertices, {made.sheets.valid.mean():.1%} of them on the "
-        f"surface; {made.crossed} lay beyond the layer outside, by {made.deepest:.1e} at most, and were moved onto it; "
-        f"in {folders.surfaces}"
-    )
+        write_sheets(temporary / "surfaces.npz", sheets)
+    n = len(sheets.st)
+    on = f"{sheets.valid.mean():.1%} of them on the surface"
+    return f"{sheets.num_layers} sheets of {n} x {n} vertices, {on}; in {folders.surfaces}"
 
 
 def with_poisson(grids: Grids, params: ReconstructParams, folders: SubjectFolders) -> str:
-    results = reconstruct_layers(grids, params)
+    surfaces = reconstruct_layers(grids, params)
     with atomic_folder(folders.surfaces) as temporary:
-        write_surfaces(temporary / "surfaces.npz", [result.surface for result in results])
-    errors = ", ".join(f"{result.error:.3f}" for result in results)
-    triangles = sum(len(result.surface.faces) for result in results)
-    return (
-        f"{len(results)} surfaces of {triangles} triangles and "
-        f"{', '.join(str(result.boundaries) for result in results)} boundary loops, "
-        f"mean distance from the samples in sample spacings, outermost first: {errors}; in {folders.surfaces}"
-    )
+        write_surfaces(temporary / "surfaces.npz", surfaces)
+    triangles = sum(len(surface.faces) for surface in surfaces)
+    return f"{len(surfaces)} surfaces of {triangles} triangles; in {folders.surfaces}"

@@ -156,7 +156,6 @@ def read_mapping(path: Path) -> dict[str, Any] | None:
     """
     if not is_there(path):
         return None
-    check_regular(path, REMEDY)
     value = read_json(path, remedy=REMEDY)
     if not isinstance(value, dict):
         found = type(value).__name__

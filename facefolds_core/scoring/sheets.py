@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from facefolds_core.files.writing import atomic_file
 from facefolds_core.scoring.metrics import Array
@@ -25,63 +23,9 @@ MAX_ERROR = 0.25
 """The same end of the error scale on every sheet, so that sheets can be compared."""
 
 COLUMNS = ("truth", "model", "asset", "error")
-CELL_HEIGHT, CELL_WIDTH = 300, 380
-"""Box that a panel's image is scaled to fit into, pixels."""
-GAP, CAPTION, FRAME_LABEL, BLOCK_HEAD = 6, 24, 26, 52
-"""Pixels: between panels, below each for its scores, left of each row for the frame, above each camera's block."""
-MARGIN, TITLE, FOOTER = 28, 74, 66
-ASPECT = 1.5
-"""Width to height that the arrangement of the cameras' blocks comes nearest to."""
-
-DPI = 100
-INK, FAINT, PAPER = "#1c2126", "#68717a", "#ffffff"
 ERROR_COLOURS = "magma"
-
-
-@dataclass(frozen=True)
-class SheetLayout:
-    """Places on the sheet, pixels from the top left corner.
-
-    Attributes:
-        cell: (width, height) of a panel's image.
-        cameras, rows: number of blocks, and of rows (frames) in each.
-        across: blocks side by side.
-    """
-
-    cell: tuple[int, int]
-    cameras: int
-    rows: int
-    across: int
-
-    @property
-    def block(self) -> tuple[int, int]:
-        """(width, height) of one camera's block."""
-        width = FRAME_LABEL + len(COLUMNS) * self.cell[0] + (len(COLUMNS) - 1) * GAP
-        return width, BLOCK_HEAD + self.rows * (self.cell[1] + CAPTION)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height) of the sheet."""
-        down = -(-self.cameras // self.across)
-        width = 2 * MARGIN + self.across * self.block[0] + (self.across - 1) * MARGIN
-        return width, TITLE + down * self.block[1] + FOOTER
-
-    def corner(self, camera: int) -> tuple[int, int]:
-        """Top left corner of a block."""
-        row, column = divmod(camera, self.across)
-        return MARGIN + column * (self.block[0] + MARGIN), TITLE + row * self.block[1]
-
-
-def plan(width: int, height: int, cameras: int, rows: int) -> SheetLayout:
-    """Arrange `cameras` blocks of `rows` rows of panels of images of `width` x `height`."""
-    scale = min(CELL_WIDTH / width, CELL_HEIGHT / height)
-    cell = (round(width * scale), round(height * scale))
-
-    def distance(across: int) -> float:
-        w, h = SheetLayout(cell, cameras, rows, across).size
-        return abs(math.log(w / h / ASPECT))
-
-    return SheetLayout(cell, cameras, rows, min(range(1, cameras + 1), key=distance))
+CELL, CAPTION, HEAD = 3.0, 0.3, 1.2
+"""Inches: longer side of a picture, below each for its scores, above all for the heading."""
 
 
 def error_image(image: Array, truth: Array, mask: Array | None = None) -> tuple[Array, float]:
@@ -104,45 +48,51 @@ def write_contact_sheet(path: Path, subject: str, panels: Sequence[Panel], metri
         panels: of all held-out cameras, frames in order.
         metrics: content of metrics.json, for the heading.
     """
-    cameras = list(dict.fromkeys(p.camera for p in panels))
-    blocks = [[p for p in panels if p.camera == camera] for camera in cameras]
-    height, width = panels[0].truth.shape[:2]
-    layout = plan(width, height, len(cameras), max(map(len, blocks)))
-    sheet = _Sheet(layout)
-    sheet.text(MARGIN, 26, subject, size=19, weight="bold")
-    sheet.text(MARGIN, 54, _summary(metrics), size=10.5, colour=FAINT)
-    for i, (camera, block) in enumerate(zip(cameras, blocks, strict=True)):
-        _draw_block(sheet, layout.corner(i), camera, block)
-    sheet.colour_bar()
+    blocks = [[p for p in panels if p.camera == camera] for camera in dict.fromkeys(p.camera for p in panels)]
+    rows, across = max(map(len, blocks)), math.ceil(math.sqrt(len(blocks)))
+    down = math.ceil(len(blocks) / across)
+    height, width = (CELL * side / max(panels[0].truth.shape[:2]) for side in panels[0].truth.shape[:2])
+    block_width, block_height = len(COLUMNS) * width + 0.6, rows * (height + CAPTION) + 0.7
+    figure = Figure((max(across * block_width, 8.0), down * block_height + HEAD), dpi=100)
+    head, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(HEAD, down * block_height)).flat
+    head.text(0.02, 0.8, subject, fontsize=19, fontweight="bold", va="center")
+    head.text(0.02, 0.45, _summary(metrics), fontsize=10, va="center")
+    scale = ScalarMappable(Normalize(0, MAX_ERROR), ERROR_COLOURS)
+    head.colorbar(scale, cax=head.add_axes((0.02, 0.15, 0.3, 0.1)), orientation="horizontal").ax.tick_params(
+        labelsize=8
+    )
+    head.text(0.35, 0.2, "error: |asset - truth|, mean of R, G, B; of the subject alone where it is known", fontsize=9)
+    for part, block in zip(body.subfigures(down, across, squeeze=False).flat, blocks, strict=False):
+        part.suptitle(f"camera {block[0].camera}", fontsize=12, fontweight="bold", y=1 - 0.15 / block_height)
+        grid = part.subplots(rows, len(COLUMNS), squeeze=False)
+        left, bottom, top = 0.5 / block_width, 0.3 / block_height, 1 - 0.5 / block_height
+        part.subplots_adjust(left, bottom, 0.99, top, 0.02, CAPTION / height)
+        for axes in grid.flat:
+            axes.set_axis_off()
+        for name, axes in zip(COLUMNS, grid[0], strict=True):
+            axes.set_title(name, fontsize=10)
+        for panel, line in zip(block, grid, strict=False):
+            _draw(line, panel)
     with atomic_file(path) as temporary:
-        sheet.save(temporary)
+        figure.savefig(temporary)
+
+
+def _draw(line: Sequence[Any], panel: Panel) -> None:
+    """One row: the pictures of a camera in a frame, and what is said of them."""
+    error, mean_error = error_image(panel.asset, panel.truth, panel.mask)
+    of = "" if panel.mask is None else "subject: "
+    captions = ("", _caption(panel.model_score), _caption(panel.asset_score), f"{of}mean {mean_error:.4f}")
+    for axes, image, caption in zip(line, (panel.truth, panel.model, panel.asset, error), captions, strict=True):
+        axes.imshow(np.clip(image, 0, 1))
+        axes.text(0.5, -0.03, caption, transform=axes.transAxes, ha="center", va="top", fontsize=8)
+    turned = {"transform": line[0].transAxes, "rotation": 90, "ha": "right", "va": "center"}
+    line[0].text(-0.03, 0.5, f"frame {panel.frame}", fontsize=8, **turned)
 
 
 def _summary(metrics: dict[str, Any]) -> str:
-    names = {"model": "model", "diffuse": "model without view branch", "asset": "asset"}
-    parts, key = [], headline(metrics)
-    for variant, name in names.items():
-        values = metrics[variant]
-        parts.append(f"{name} {values[key]:.2f} dB")
+    key, names = headline(metrics), {"model": "model", "diffuse": "model without view branch", "asset": "asset"}
+    parts = [f"{name} {metrics[variant][key]:.2f} dB" for variant, name in names.items()]
     return f"Held-out cameras, mean PSNR {HEADLINE_WORDS[key]}:   " + "   ·   ".join(parts)
-
-
-def _draw_block(sheet: _Sheet, corner: tuple[int, int], camera: str, block: Sequence[Panel]) -> None:
-    left, top = corner
-    width, height = sheet.layout.cell
-    sheet.text(left + FRAME_LABEL, top + 12, f"camera {camera}", size=12, weight="bold")
-    for column, name in enumerate(COLUMNS):
-        sheet.text(left + FRAME_LABEL + column * (width + GAP) + width / 2, top + 38, name, size=10.5, centred=True)
-    for row, panel in enumerate(block):
-        y = top + BLOCK_HEAD + row * (height + CAPTION)
-        error, mean_error = error_image(panel.asset, panel.truth, panel.mask)
-        of = "" if panel.mask is None else "subject: "
-        captions = ("", _caption(panel.model_score), _caption(panel.asset_score), f"{of}mean {mean_error:.4f}")
-        sheet.text(left + 10, y + height / 2, f"frame {panel.frame}", size=8.5, colour=FAINT, centred=True, rotation=90)
-        for column, image in enumerate((panel.truth, panel.model, panel.asset, error)):
-            x = left + FRAME_LABEL + column * (width + GAP)
-            sheet.image(x, y, image)
-            sheet.text(x + width / 2, y + height + CAPTION / 2 - 1, captions[column], size=8.5, centred=True)
 
 
 def _caption(score: ImageScore) -> str:
@@ -152,65 +102,3 @@ def _caption(score: ImageScore) -> str:
     if within is None or key == "psnr_subject":
         return f"{score.values[key]:.2f} dB {HEADLINE_WORDS[key]}"
     return f"{score.values[key]:.2f} dB, subject {within:.2f}"
-
-
-class _Sheet:
-    """A figure on which one unit is one pixel, y down."""
-
-    def __init__(self, layout: SheetLayout) -> None:
-        self.layout = layout
-        self.width, self.height = layout.size
-        self._figure = Figure((self.width / DPI, self.height / DPI), dpi=DPI, facecolor=PAPER)
-        FigureCanvasAgg(self._figure)
-
-    def text(
-        self,
-        x: float,
-        y: float,
-        text: str,
-        size: float,
-        colour: str = INK,
-        weight: str = "normal",
-        centred: bool = False,
-        rotation: float = 0,
-    ) -> None:
-        """Text at (x, y): its left end's (or its own) middle."""
-        self._figure.text(
-            x / self.width,
-            1 - y / self.height,
-            text,
-            fontsize=size,
-            color=colour,
-            fontweight=weight,
-            ha="center" if centred else "left",
-            va="center",
-            rotation=rotation,
-        )
-
-    def image(self, x: int, y: int, image: Array) -> None:
-        """An image with its top left corner at (x, y), scaled to the layout's cell."""
-        width, height = self.layout.cell
-        method = cv2.INTER_AREA if width <= image.shape[1] else cv2.INTER_CUBIC
-        scaled = np.clip(cv2.resize(np.asarray(image, np.float32), (width, height), interpolation=method), 0, 1)
-        pixels: NDArray[np.uint8] = np.round(scaled * 255).astype(np.uint8)
-        self._figure.figimage(pixels, x, self.height - y - height, origin="upper")
-
-    def colour_bar(self) -> None:
-        """The error's scale, at the foot of the sheet."""
-        width = min(420, self.width - 2 * MARGIN)
-        box = (MARGIN / self.width, 34 / self.height, width / self.width, 12 / self.height)
-        axes = self._figure.add_axes(box)
-        axes.imshow(np.linspace(0, 1, 256)[None], cmap=ERROR_COLOURS, aspect="auto", extent=(0, MAX_ERROR, 0, 1))
-        axes.set_yticks([])
-        axes.set_xticks(np.linspace(0, MAX_ERROR, 6))
-        axes.tick_params(labelsize=8, colors=FAINT, length=3)
-        for edge in axes.spines.values():
-            edge.set_visible(False)
-        label = "error: |asset − truth|, mean of R, G, B in [0, 1]; of the subject alone where its mask is known"
-        if self.width > MARGIN + width + 640:
-            self.text(MARGIN + width + 16, self.height - 40, label, size=9, colour=FAINT)
-        else:
-            self.text(MARGIN, self.height - 56, label, size=9, colour=FAINT)
-
-    def save(self, path: Path) -> None:
-        self._figure.savefig(path, dpi=DPI, facecolor=PAPER)

@@ -13,9 +13,6 @@ from facefolds_core.params import ScoreWarningParams
 from facefolds_core.scoring.temporal import Change
 from facefolds_core.scoring.truths import MatteKind
 
-DOUBLED = {"front_guessed": "front_is_guessed"}
-"""What a scene notes -> what a training says of the same."""
-
 
 def stands_still(changes: Mapping[str, Change], frames: int, params: ScoreWarningParams) -> list[Fact]:
     """A fact where little of what changes from frame to frame is shown.
@@ -55,6 +52,4 @@ def training_events(fit: Path) -> list[Fact]:
 
 def warnings_among(facts: Sequence[Fact]) -> tuple[Fact, ...]:
     """Those that ask for something to be done, each once."""
-    kinds = {one.kind for one in facts}
-    kept = {str(one): one for one in facts if one.kind in WARNINGS and DOUBLED.get(one.kind) not in kinds}
-    return tuple(kept.values())
+    return tuple({str(one): one for one in facts if one.kind in WARNINGS}.values())

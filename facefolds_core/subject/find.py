@@ -101,6 +101,7 @@ def find_subject(
         assert begun is not None
         splats = begun
     splats = splats.part(joined(splats, scene))
+    mattes.alone = splats
     fit, psnr = judged(scene, splats, views)
     return FoundSubject(splats, psnr, fit), mattes
 

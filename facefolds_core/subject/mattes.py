@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.cut_out import Array, Bool, EdgeParams, agreement, cut_out, grown, pixels, softened
+from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.found import background, near_enough, opacity_of, subject_of
 from facefolds_core.subject.plates import from_plate
 from facefolds_core.subject.splats import Splats
@@ -48,10 +49,23 @@ class Mattes:
         scene: whose own mattes count.
         named: (H, W, 1) by picture, that the user has corrected; they come first.
         body: by which others are found; None while it is not known.
+        edge: how their outlines are found.
+
+    Attributes:
+        alone: Gaussians that were trained with the subject cut out, once they are known. They are whole where room of
+            the first fit hangs before the subject; but what really stands before it does not cover them. So they are
+            asked where a picture contradicts the first fit.
     """
 
-    def __init__(self, scene: Scene, named: Mapping[Key, Image] | None = None, body: Body | None = None) -> None:
-        self.scene, self.named, self.body, self.edge = scene, dict(named or {}), body, EdgeParams()
+    def __init__(
+        self,
+        scene: Scene,
+        named: Mapping[Key, Image] | None = None,
+        body: Body | None = None,
+        edge: EdgeParams | None = None,
+    ) -> None:
+        self.scene, self.named, self.body, self.edge = scene, dict(named or {}), body, edge or EdgeParams()
+        self.alone: Splats | None = None
         self._frames, self._plates, self._given = scene.open_frames(), scene.open_plates(), scene.open_mattes()
         self._drawn: tuple[Key, tuple[Array, Array]] | None = None
 
@@ -73,6 +87,10 @@ class Mattes:
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
         cut = cut_out(picture, start, camera, self.edge)
         share = agreement(cut, start > 0.5)
+        if share < self.edge.agreeing and self.alone is not None:
+            start = np.asarray(1 - draw(self.alone.values, view_of(camera)).picture()[1])
+            cut = cut_out(picture, start, camera, self.edge)
+            share = agreement(cut, start > 0.5)
         if share < self.edge.agreeing:
             return Matte(_bytes(start), "gaussians", share)
         return Matte(_bytes(softened(picture, cut, start, behind, camera, self.edge)), "picture", share)

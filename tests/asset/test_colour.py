@@ -61,14 +61,6 @@ def test_chroma_is_read_by_a_linear_look_up_as_graphics_cards_do_it() -> None:
     assert np.abs(yuv420_to_rgb(grey, neutral, cr)[..., 0] - red).max() <= 0.51
 
 
-def test_chroma_of_older_assets_lies_on_even_columns() -> None:
-    codes = np.broadcast_to(np.arange(100, 156, dtype=np.uint8), (4, 56))
-    luma, neutral = np.full((8, 112), 126, np.uint8), np.full(codes.shape, 128, np.uint8)
-    red = yuv420_to_rgb(luma, neutral, codes, "left")[..., 0].astype(float)
-    on_samples = 255 * ((126 - 16) / 219 + 1.5748 * (codes - 128.0) / 224)
-    assert np.abs(red[::2, ::2] - on_samples).max() <= 0.51
-
-
 def test_fine_texture_keeps_48_db() -> None:
     y, x = np.mgrid[:256, :256] / 256
     waves = [0.5 + 0.4 * np.sin(20 * x + 9 * y), 0.45 + 0.3 * np.cos(33 * y + 30 * x), 0.4 + 0.3 * np.sin(25 * (x - y))]

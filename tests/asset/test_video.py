@@ -110,18 +110,6 @@ def test_any_rate_keeps_frame_numbers(tmp_path: Path, fps: Fraction) -> None:
         assert number_of(unpack_picture(first, LAYOUT), 0) == start
 
 
-@pytest.mark.parametrize("codec", CODECS)
-def test_lossless(tmp_path: Path, codec: str) -> None:
-    path = tmp_path / f"texture.{CODECS[codec].container}"
-    layout = AtlasLayout.pack([(60, 40), (50, 70)])
-    noise = np.random.default_rng(0).integers(0, 256, (3, 70, 60, 4), dtype=np.uint8)
-    pictures = [pack_frame([frame[:40], frame[:, :50]], layout) for frame in noise]
-    size = (layout.width, layout.height)
-    encode(path, pictures, size, codec=codec, lossless=True)
-    for found, given in zip(decode_video(path, size, 30.0), pictures, strict=True):
-        np.testing.assert_array_equal(found, given)
-
-
 def test_level_and_codec_string_of_vp9() -> None:
     # 2064 x 3104 at 30 frames a second: 192 M samples a second, 6.4 M a picture: level 5.
     level, mime = CODECS["vp9"].level_and_mime(Stream(b"", (2064, 3104), Fraction(30), 5e6))

@@ -234,5 +234,5 @@ def test_notes_are_said_before_lists_of_what_is_missing(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
     scene = plan_multiface(tmp_path / "c").scene
     missing = [fact("culled", camera=str(i), elevation=60.0, azimuth=0.0) for i in range(9)]
-    lines = left_out(replace(scene, left_out=(*missing, fact("front_guessed"))))
+    lines = left_out(replace(scene, left_out=(*missing, fact("front_found", camera="1", share=0.9))))
     assert lines[1].startswith("  note: no `front`")

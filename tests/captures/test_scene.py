@@ -30,7 +30,7 @@ def scene(folder: Path) -> Scene:
         times=np.array([0, 1 / 30]),
         fps=30.0,
         from_capture=Similarity(1 / 3, np.eye(3), np.array([1.0, 2, 3])),
-        left_out=(fact("culled", camera="d", elevation=70.25, azimuth=-3.0), fact("front_guessed")),
+        left_out=(fact("culled", camera="d", elevation=70.25, azimuth=-3.0), fact("no_mesh", folder="here")),
         folder=folder,
     )
 
@@ -117,12 +117,3 @@ def test_a_garbled_scene_is_refused(tmp_path: Path, change: dict[str, Any], mess
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     with pytest.raises(UserError, match=message):
         read_scene(tmp_path)
-
-
-def test_a_scene_of_version_1_has_its_lines(tmp_path: Path) -> None:
-    write_scene(scene(tmp_path), tmp_path)
-    value = json.loads((tmp_path / "scene.json").read_text())
-    words = [one["words"] for one in value["left_out"]]
-    assert words[0] == "camera d: culled, elevation 70.2, azimuth -3.0 degrees"
-    (tmp_path / "scene.json").write_text(json.dumps({**value, "version": 1, "left_out": words}))
-    assert [str(one) for one in read_scene(tmp_path).left_out] == words

@@ -14,10 +14,13 @@ import pytest
 from av.video.reformatter import ColorRange, Colorspace, Interpolation
 
 from facefolds_core.captures import videos
-from facefolds_core.captures.developing import _in_turn
-from facefolds_core.captures.picture import VideoFrame, decoded
+from facefolds_core.captures.capture import Capture, View
+from facefolds_core.captures.developing import Negative, photos
+from facefolds_core.captures.picture import VideoFrame
 from facefolds_core.captures.videos import Video, check_together
 from facefolds_core.errors import UserError
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import NormalizeParams
 
 FRAMES = np.random.default_rng(0).integers(0, 256, (12, 16, 24, 3), dtype=np.uint8)
 """Of 24 x 16 pixels."""
@@ -71,9 +74,12 @@ def test_one_run_opens_the_video_once(tmp_path: Path, monkeypatch: pytest.Monkey
     opened: list[object] = []
     real = av.open
     monkeypatch.setattr(videos.av, "open", lambda *a, **k: opened.append(a) or real(*a, **k))
-    found = list(decoded([(VideoFrame(source, k), "") for k in range(12)], "rgb"))
-    np.testing.assert_array_equal(found, FRAMES)
-    assert len(opened) == 1
+    camera = Camera("c7", np.array([[20.0, 0, 12], [0, 20, 8], [0, 0, 1]]), np.eye(4)[:3], 24, 16)
+    capture = Capture(tmp_path, (View(camera),), tuple("abcdefghijkl"), 25.0, {}, {}, None, ())
+    negatives = [Negative((0, k), 0, VideoFrame(source, k), "") for k in range(12)]
+    found = list(photos(capture, negatives, 24, 16, NormalizeParams()))
+    assert [row[:2] for row in found] == [(0, k) for k in range(12)] and len(opened) == 1
+    np.testing.assert_array_equal([row[2] for row in found], FRAMES)
 
 
 def test_opacity_is_one_channel(tmp_path: Path) -> None:
@@ -200,15 +206,3 @@ def test_one_that_does_not_is_named(tmp_path: Path, odd: dict[str, Any], words: 
 def test_the_frames_that_all_have_may_be_used(tmp_path: Path) -> None:
     made = several(tmp_path, {}, {"frames": FRAMES[:10]}, {})
     assert check_together(made, most=8) == (10, 25)
-
-
-def test_lanes_take_turns_and_stop_when_one_fails() -> None:
-    def lane(name: str, count: int, fails: bool = False):  # type: ignore[no-untyped-def]
-        for k in range(count):
-            yield f"{name}{k}"
-        if fails:
-            raise UserError("broken")
-
-    assert list(_in_turn([lane("a", 3), lane("b", 1), lane("c", 2)])) == ["a0", "b0", "c0", "a1", "c1", "a2"]
-    with pytest.raises(UserError, match="broken"):
-        list(_in_turn([lane("a", 1000), lane("b", 2, fails=True)]))

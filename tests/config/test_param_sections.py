@@ -23,7 +23,7 @@ from facefolds_core.params import (
     section_of,
     train_params,
 )
-from facefolds_core.params.renamed import FIXED, GONE, RENAMED
+from facefolds_core.params.renamed import GONE, RENAMED
 
 MINIMAL = "subjects:\n  a: {source: actor, path: x}\n"
 OLD = {old.partition(".")[2] for old in RENAMED}
@@ -117,8 +117,8 @@ def test_a_renamed_key_names_the_new_one_which_exists(old: str, new: str) -> Non
     assert dict(leaves(train_params(nested(path, 0.01))))[path] == 0.01
 
 
-@pytest.mark.parametrize("path", [path for path in (*FIXED, *GONE) if "." in path])
-def test_a_key_that_is_no_more_is_refused_with_what_took_its_place(path: str, project_root: Path) -> None:
+@pytest.mark.parametrize("path", GONE)
+def test_a_key_that_is_no_more_is_refused_with_what_took_its_place(path: str) -> None:
     stage, _, key = path.partition(".")
     models = ({"preset": preset} for preset in ("fast", "paper")) if stage == "train" else iter([{}])
     remedies = []
@@ -126,8 +126,7 @@ def test_a_key_that_is_no_more_is_refused_with_what_took_its_place(path: str, pr
         with pytest.raises(UserError) as caught:
             section_of(stage, {**given, **nested(key, 1)})
         remedies.append(str(caught.value.remedy))
-    assert any(FIXED.get(path, GONE.get(path)) in remedy for remedy in remedies), remedies  # type: ignore[operator]
-    assert path not in FIXED or (project_root / "facefolds_core" / FIXED[path]).exists()
+    assert any(GONE[path] in remedy for remedy in remedies), remedies
 
 
 def test_an_unknown_key_of_a_nested_section_lists_those_there_are() -> None:

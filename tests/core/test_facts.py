@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from facefolds_core.facts import TEXT, WORDS, fact, read_fact, worded
+from facefolds_core.facts import WORDS, fact, read_fact
 
 
 def test_words_and_back() -> None:
@@ -25,14 +25,19 @@ def test_words_and_back() -> None:
     assert read_fact(value) == made and made.camera is None and fact("culled", camera="a").camera == "a"
 
 
-def test_a_line_of_an_older_version() -> None:
-    assert read_fact("level 3: diverged {again}").kind == TEXT
-    assert worded("level 3: diverged {again}") == "level 3: diverged {again}"
-
-
 @pytest.mark.parametrize(
     "value",
-    [None, 3, [], {}, {"kind": "rumour"}, {"kind": []}, {"kind": "culled"}, {"kind": "gains", "r": 1, "g": 2, "b": 3}],
+    [
+        None,
+        3,
+        "a",
+        [],
+        {},
+        {"kind": "rumour"},
+        {"kind": []},
+        {"kind": "culled"},
+        {"kind": "gains", "r": 1, "g": 2, "b": 3},
+    ],
 )
 def test_what_is_no_fact(value: Any) -> None:
     with pytest.raises(ValueError, match="fact"):
@@ -41,13 +46,12 @@ def test_what_is_no_fact(value: Any) -> None:
 
 def test_every_kind_is_used_and_every_use_is_a_kind(project_root: Path) -> None:
     """A typing error would show only when the fact is worded."""
-    used = {TEXT}
+    used: set[object] = set()
     for path in (project_root / "facefolds_core").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "fact":
                 used |= {c.value for c in ast.walk(node.args[0]) if isinstance(c, ast.Constant)}
-    in_old_scenes = {"front_guessed"}
-    assert used | {"krt_is_scaled", "krt_is_of_full_size"} | in_old_scenes == set(WORDS)
+    assert used | {"krt_is_scaled", "krt_is_of_full_size"} == set(WORDS)
 
 
 def test_what_words_name_is_given_by_every_use(project_root: Path) -> None:

@@ -10,10 +10,8 @@ import pytest
 from facefolds_core.errors import UserError
 from facefolds_core.files.paths import (
     SubjectFolders,
-    check_capture_place,
-    check_mattes_place,
     check_path_text,
-    check_start_place,
+    check_place,
     check_subject_name,
     subject_folders,
     subject_of_dvc_stage,
@@ -113,12 +111,12 @@ def test_what_a_user_names_is_never_a_stage_s_own(place: str, tmp_path: Path) ->
     folders = subject_folders(tmp_path / "data", "anna")
     folders.subject.mkdir(parents=True)
     (tmp_path / "link").symlink_to(folders.subject)
-    for key, check in (("mattes", check_mattes_place), ("start", check_start_place)):
+    for key in ("mattes", "start"):
         with pytest.raises(UserError, match=rf"subjects\.anna\.{key}") as caught:
-            check(str(tmp_path / place), folders)
+            check_place(str(tmp_path / place), folders, key)
         assert "where the stages write" in str(caught.value)
         for other in ("mine", "data/actor/subject"):
-            assert check(str(tmp_path / other), folders) == tmp_path / other
+            assert check_place(str(tmp_path / other), folders, key) == tmp_path / other
 
 
 @pytest.mark.parametrize("key", ["mattes", "start"])
@@ -132,10 +130,10 @@ def test_configure_looks_at_them(key: str, tmp_path: Path, monkeypatch: pytest.M
 def test_a_capture_of_another_subject_may_be_read(tmp_path: Path) -> None:
     folders = SubjectFolders(tmp_path / "data" / "anna")
     other = tmp_path / "data" / "actor" / "capture"
-    assert check_capture_place(str(other), folders) == other
+    assert check_place(str(other), folders, "path") == other
 
 
 def test_a_link_to_itself_is_said(tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(UserError, match="cannot be followed"):
-        check_capture_place(str(tmp_path / "loop" / "x"), SubjectFolders(tmp_path / "data" / "anna"))
+        check_place(str(tmp_path / "loop" / "x"), SubjectFolders(tmp_path / "data" / "anna"), "path")

@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.engines._picture import rgb_picture
+from facefolds_core.engines._folder import rgb_picture
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.track import Track, rotation
 from facefolds_core.rendering import AssetCaster, composite

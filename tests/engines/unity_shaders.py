@@ -13,7 +13,7 @@ from PIL import Image
 
 from facefolds_core.asset.manifest import Reflection
 from facefolds_core.asset.reader import AssetLevel
-from facefolds_core.engines._picture import rgb_picture
+from facefolds_core.engines._folder import rgb_picture
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.reflections import window_to_window
 from tests.engines.unity_checks import SHADERS, run, spirv

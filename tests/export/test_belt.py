@@ -15,9 +15,8 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.bake import reprojection
 from facefolds_core.export.collapse import decimate_sheets
-from facefolds_core.export.decimation import decimate, exact_st, layer_order, upright_faces
+from facefolds_core.export.decimation import decimate, exact_st, upright_faces
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.refit import radial_cosines, refit_radii
 from facefolds_core.export.sampling import sample_grids
@@ -39,6 +38,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec, build_model
 from facefolds_core.params import ReconstructParams
+from tests.export.order import layer_order
 
 CHART = Chart((-0.25, 0.0, 0.05), Belt(0.2, 0.3))
 WINDOW: Window = (-1.0, 0.7, -1.3, 1.3)
@@ -68,12 +68,12 @@ def grids() -> Grids:
 
 @pytest.fixture(scope="module")
 def sheets(grids: Grids) -> Sheets:
-    return grid_sheets(grids, None).sheets
+    return grid_sheets(grids, None)
 
 
 @pytest.fixture(scope="module")
 def bumpy() -> Sheets:
-    return grid_sheets(sample_grids(model(0.02), N, WINDOW, progress=False), None).sheets
+    return grid_sheets(sample_grids(model(0.02), N, WINDOW, progress=False), None)
 
 
 def off(points: NDArray[np.float32], radius: float) -> NDArray[np.float64]:
@@ -176,7 +176,7 @@ def test_cosines_of_a_cone_are_those_of_its_normals() -> None:
 
 
 def test_poisson_surfaces_are_decimated_upright(grids: Grids) -> None:
-    dense = reconstruct(gather_samples(grids, 0, None), ReconstructParams(depth=6), 0).surface
+    dense = reconstruct(gather_samples(grids, 0, None), ReconstructParams(depth=6), 0)
     assert len(dense.faces) > 2000
     coarse = decimate(dense, 20**2, CHART)
     assert 0.9 * 20**2 < len(coarse.vertices) <= 20**2
@@ -186,20 +186,6 @@ def test_poisson_surfaces_are_decimated_upright(grids: Grids) -> None:
     assert layer_order([coarse, inner], CHART).crossed == 0
     turned = layer_order([inner, coarse], CHART)
     assert turned.crossed == turned.compared > 500
-
-
-def test_reprojection_finds_the_point_where_a_texel_lies(sheets: Sheets) -> None:
-    mesh = decimate_sheets(sheets, 36)[0]
-    share = np.array([0.2, 0.3, 0.5])
-    uv, _ = CHART.uv((share @ mesh.vertices[mesh.faces]).astype(np.float64))
-    below = CHART.below(CHART.uv(mesh.vertices[mesh.faces].astype(np.float64))[0]).all(1)
-    true, at = uv_to_st(uv, WINDOW) * N - 0.5, share @ mesh.st[mesh.faces].astype(np.float64) * N - 0.5
-    worst = int(np.where(below, np.abs(true - at).max(-1), 0).argmax())
-    column, row = np.rint(at[worst]).astype(int)
-    found = reprojection(mesh, sheets, N)[row, column] - (column, row)
-    # Positions are smooth inside a triangle: compared through the difference to the texel's own place.
-    assert found == pytest.approx(true[worst] - at[worst], abs=0.05)
-    assert np.abs(true - at)[worst].max() > 0.2
 
 
 def test_grids_and_sheets_keep_the_chart(tmp_path: Path, grids: Grids, sheets: Sheets) -> None:

@@ -61,9 +61,9 @@ def stripes(period: float) -> NDArray[np.uint8]:
 def surfaces(grids: Grids, method: str) -> steps.Surfaces:
     """Those of `reconstruct`; Poisson's one after the other, as processes of their own take seconds to begin."""
     if method == "grid":
-        return grid_sheets(grids, None).sheets
+        return grid_sheets(grids, None)
     params = ReconstructParams(depth=5)
-    return [reconstruct(gather_samples(grids, i, None), params, i).surface for i in range(grids.num_layers)]
+    return [reconstruct(gather_samples(grids, i, None), params, i) for i in range(grids.num_layers)]
 
 
 def matte(reflection: ReflectionMaps | None = None) -> Grids:

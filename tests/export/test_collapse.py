@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.export.collapse import contribution, decimate_sheets, decimated_ladder
-from facefolds_core.export.decimation import exact_st, layer_order
-from facefolds_core.export.poisson import boundary_loops
+from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.refit import radial_cosines
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.sheets import grid_sheets, vertex_uv
@@ -17,6 +16,7 @@ from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from tests.ellipsoids import Ellipsoids
+from tests.export.order import boundary_loops, layer_order
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 N = 64
@@ -25,7 +25,7 @@ CENTRE = np.array(Ellipsoids().chart.centre)
 
 @pytest.fixture(scope="module")
 def sheets() -> Sheets:
-    return grid_sheets(sample_grids(Ellipsoids(), N, WINDOW, progress=False), None).sheets
+    return grid_sheets(sample_grids(Ellipsoids(), N, WINDOW, progress=False), None)
 
 
 def rough(sheets: Sheets, seed: int) -> Sheets:

@@ -10,17 +10,17 @@ from facefolds_core.export.decimation import (
     decimate,
     decimate_layers,
     exact_st,
-    layer_order,
     nearest_st,
     upright_faces,
 )
-from facefolds_core.export.poisson import boundary_loops, gather_samples, reconstruct
+from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids
 from facefolds_core.export.stores import Grids
 from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import Window, uv_to_st
 from facefolds_core.params import DecimateParams, ReconstructParams
 from tests.ellipsoids import Ellipsoids
+from tests.export.order import boundary_loops, layer_order
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 CHART = Ellipsoids().chart
@@ -35,7 +35,7 @@ def grids() -> Grids:
 @pytest.fixture(scope="module")
 def surfaces(grids: Grids) -> list[Surface]:
     params = ReconstructParams(depth=6)
-    return [reconstruct(gather_samples(grids, i, None), params, i).surface for i in range(grids.num_layers)]
+    return [reconstruct(gather_samples(grids, i, None), params, i) for i in range(grids.num_layers)]
 
 
 @pytest.mark.parametrize("resolution", [8, 16, 32])

@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from scipy.optimize import lsq_linear
 
-from facefolds_core.export.bake_kernel import render
-from facefolds_core.export.hold import held_rows, parts, texel_weights
+from facefolds_core.export.hold import held_rows, parts, shown_rays, texel_weights
 from facefolds_core.export.hold_kernel import add_weights, hold, steady
 from facefolds_core.export.kept import KeptFrames
 from facefolds_core.files.frame_store import FrameStore, write_frames
+from facefolds_core.geometry.meshes import TexturedMesh
+from facefolds_core.kernels.hit_codes import SCALE
+from tests.export.rays_reference import composite, look_up
+from tests.scenes import look_at_origin
 
 
 def kept(y: np.ndarray, price: float) -> np.ndarray:
@@ -44,7 +48,7 @@ def test_a_step_loses_the_price_at_both_sides() -> None:
 
 
 def test_weights_are_squared_derivatives() -> None:
-    """One ray in the middle of a texel of each of three layers: its share is 1, the derivatives those of `render`."""
+    """One ray in the middle of a texel of each of three layers: its share is 1, the derivatives a picture's."""
     rng = np.random.default_rng(1)
     texture = rng.uniform(30, 200, (3, 5, 5, 4)).astype(np.float32)
     codes = np.full((1, 3, 2), round(1 + 65534 * 0.5), np.uint16)
@@ -53,15 +57,29 @@ def test_weights_are_squared_derivatives() -> None:
     weights = sums
 
     def colour(layer: int, channel: int, change: float) -> np.ndarray:
-        moved, out = texture.copy(), np.empty((1, 4), np.float32)
+        moved = texture.copy()
         moved[layer, :, :, channel] += change
-        render(codes, moved, out)
-        return out[0, :3] * 255
+        seen = composite(look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved / 255)))
+        return seen[0, :3].numpy() * 255
 
     for layer in range(3):
         by_red, by_alpha = ((colour(layer, q, 10) - colour(layer, q, -10)) / 20 for q in (0, 3))
         assert weights[layer, 2, 2, 0] == pytest.approx(by_red[0] ** 2, rel=2e-2)
         assert weights[layer, 2, 2, 1] == pytest.approx((by_alpha**2).mean(), rel=2e-2)
+
+
+def test_rays_that_may_show_anything_are_kept() -> None:
+    """A square before the camera, opaque in its left half: codes say where rays meet it."""
+    square = np.array([[0, -0.1, 0.1], [0, 0.1, 0.1], [0, 0.1, -0.1], [0, -0.1, -0.1]], np.float32)
+    st = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    mesh = TexturedMesh(square, np.array([[0, 2, 1], [0, 3, 2]], np.int32), st)
+    opacity = np.zeros((1, 64, 64), np.uint8)
+    opacity[:, :, :32] = 255
+    codes = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], opacity, progress=False)
+    places = (codes[:, 0].astype(float) - 1) / SCALE
+    assert len(codes) > 50 and 0.45 < places[:, 0].max() < 0.53 and places[:, 1].max() > 0.9
+    nothing = shown_rays([look_at_origin("front", 0, 0, 64)], [mesh], np.zeros_like(opacity), progress=False)
+    assert nothing.shape == (0, 1, 2)
 
 
 @pytest.mark.parametrize("memory", [1 << 20, 8 * 16 * 4 * 3, 1])

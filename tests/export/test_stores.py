@@ -60,7 +60,7 @@ def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_pat
 
 
 def test_sheets_round_trip_and_are_told_from_surfaces(tmp_path: Path, grids: Grids) -> None:
-    sheets = grid_sheets(grids, None).sheets
+    sheets = grid_sheets(grids, None)
     write_sheets(tmp_path / "sheets.npz", sheets)
     write_surfaces(tmp_path / "surfaces.npz", [Surface(TRIANGLE.vertices, TRIANGLE.faces)])
     back = read_sheets(tmp_path / "sheets.npz")
@@ -146,7 +146,7 @@ def test_wrong_grids_are_errors(tmp_path: Path, grids: Grids, change: dict[str, 
     ],
 )
 def test_wrong_sheets_are_errors(tmp_path: Path, grids: Grids, change: dict[str, Any], place: str) -> None:
-    write_sheets(tmp_path / "surfaces.npz", replace(grid_sheets(grids, None).sheets, **change))
+    write_sheets(tmp_path / "surfaces.npz", replace(grid_sheets(grids, None), **change))
     with pytest.raises(UserError, match=place):
         read_sheets(tmp_path / "surfaces.npz")
 

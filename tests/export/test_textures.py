@@ -102,7 +102,7 @@ def test_the_store_keeps_layers_and_frames(tmp_path: Path) -> None:
 
 def test_a_missing_image_is_an_error(tmp_path: Path) -> None:
     write(tmp_path / "in.arrow", [(0, 0), (1, 0), (0, 1)])
-    with pytest.raises(UserError, match="incomplete"):
+    with pytest.raises(UserError, match="not complete"):
         resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
 
 

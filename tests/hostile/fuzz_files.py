@@ -181,7 +181,7 @@ def make(root: Path) -> None:
     grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5), progress=False)
     grids = replace(grids, chart=Chart(grids.chart.centre, Belt(0.8, 0.3)))
     write_grids(root / "samples" / "grids.npz", grids)
-    write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None).sheets)
+    write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None))
     mesh = TexturedMesh(vertices[0], faces, random.random((5, 2)).astype(np.float32))
     write_surfaces(root / "surfaces" / "surfaces.npz", [mesh, mesh])
     write_meshes(root / "meshes" / "meshes.npz", [mesh, mesh])

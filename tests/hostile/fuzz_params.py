@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from facefolds_core.config.params_file import idle_keys, load_params, write_configs
+from facefolds_core.config.params_file import load_params, write_configs
 from facefolds_core.config.stages import read_stage, read_subject, read_train
-from facefolds_core.files.paths import SubjectFolders, check_capture_place, subject_folders
+from facefolds_core.files.paths import SubjectFolders, check_place, subject_folders
 from facefolds_core.params import SECTIONS, STAGE_SECTIONS
 from tests.hostile.damage import MUTATIONS, Counts, fingerprint, outcome
 
@@ -35,7 +35,7 @@ SOUND: dict[str, Any] = {
     "reconstruct": {"method": "grid"},
     "decimate": {"resolution": 64},
     "texture": {"resolution": 512},
-    "bake": {"iterations": 2},
+    "bake": {"hold": 0.01},
     "compress": {"video": {"codec": "h264", "crf": 20}, "levels": [LEVEL]},
     "evaluate": {"background": [0, 0, 0]},
 }
@@ -118,9 +118,8 @@ def _configure(path: Path) -> None:
     data = path.parent / "data"
     for name, subject in params.subjects.items():
         folders = subject_folders(data, name)
-        check_capture_place(subject.path, folders)
+        check_place(subject.path, folders, "path")
         write_configs(params, name, folders.config)
-    idle_keys(params)
 
 
 def _read_damaged_config(folder: Path, random: np.random.Generator) -> None:

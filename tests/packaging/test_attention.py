@@ -15,10 +15,10 @@ from facefolds_core.asset.packing import MACROBLOCK, AtlasLayout
 from facefolds_core.asset.regions import Region, nowhere
 from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
 from facefolds_core.asset.writer import LevelContent
-from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of
-from facefolds_core.packaging.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
+from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of, views_of
 from facefolds_core.params import AttentionParams, VideoCodec
 from facefolds_core.rendering import AssetCaster, composite
+from tests.vectors import FRAMES, LAYERS, RATE, TEXELS, WINDOW, Waves, cameras, sheet
 
 USUAL = AttentionParams(strength=2.0)
 
@@ -69,7 +69,7 @@ def test_weights_are_squared_derivatives_of_pictures(layer: int, alpha: bool, mo
     x, y = layout.rects[layer][0] + 28 - crop[0], layout.rects[layer][1] + 28 - crop[1]
     y += layout.alpha_rect[1] if alpha else 0
     monkeypatch.setattr("facefolds_core.packaging.attention.RAYS_PER_CAMERA", 10**6)
-    weights = np.kron(block_weights(full, [camera]), np.ones((MACROBLOCK, MACROBLOCK)))
+    weights = np.kron(block_weights(full, views_of(full, [camera]), [0]), np.ones((MACROBLOCK, MACROBLOCK)))
     # Blocks lie across the square's border, and the reference shares a pixel among four texels. Seen: 1.01 to 1.05.
     assert weights[y : y + 16, x : x + 16].sum() == pytest.approx(squares, rel=0.15)
 

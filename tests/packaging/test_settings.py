@@ -9,7 +9,7 @@ from tests.scenes import look_at_origin
 
 PARAMS = CompressParams(
     mesh=MeshCodec(max_error_pixels=0.1, quantization_bits=11, texture_coordinate_bits=9, compression_level=3),
-    video=VideoCodec(crf=20, target_psnr=40.0, lossless=True, keyframe_interval=12),
+    video=VideoCodec(crf=20, target_psnr=40.0, keyframe_interval=12),
 )
 COARSE = LevelParams(name="small", mesh_resolution=16, texture_resolution=64, crf=31)
 
@@ -23,7 +23,7 @@ def test_the_full_level_is_coded_as_configured() -> None:
 
 def test_a_coarser_level_has_a_rate_and_an_error_of_its_own() -> None:
     found = LevelSetting.of(PARAMS, COARSE)
-    assert (found.video.crf, found.video.target_psnr, found.video.lossless) == (31, None, False)
+    assert (found.video.crf, found.video.target_psnr) == (31, None)
     assert (found.video.keyframe_interval, found.max_error_pixels, found.mesh.compression_level) == (12, 0.1, 3)
     assert LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).max_error_pixels == 0.5
 

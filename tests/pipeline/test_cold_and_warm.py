@@ -50,27 +50,21 @@ SCRIPTS = {
         from tests.ellipsoids import Ellipsoids
 
         grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
-        for mesh in decimate_sheets(grid_sheets(grids, None).sheets, 64):
+        for mesh in decimate_sheets(grid_sheets(grids, None), 64):
             show(mesh.vertices, mesh.faces, mesh.st)
     """,
     "bake": """
-        from facefolds_core.export.bake_kernel import accumulate, render, update
         from facefolds_core.export.hold_kernel import add_weights, hold
 
         rng = np.random.default_rng(0)
         codes = rng.integers(1, 65536, (70_000, 3, 2)).astype(np.uint16)
         codes[rng.random((70_000, 3)) < 0.2] = 0
         texture = rng.random((3, 32, 32, 4), np.float32)
-        target = np.empty((70_000, 4), np.float32)
-        render(codes, texture * 200, target)
-        sums, shown = np.zeros((3, 32, 32, 6), np.float32), texture.copy()
-        show(target, np.float64(accumulate(codes, target, texture, sums, 0.001)), sums)
-        update(texture.reshape(-1, 4), sums.reshape(-1, 6), 0.05, shown.reshape(-1, 4))
         weights = np.zeros((3, 32, 32, 2), np.float32)
         add_weights(codes, texture * 255, weights, 0.001)
         images = rng.integers(90, 110, (6, 32, 32, 4)).astype(np.uint8)
         hold(images, weights[0], 0.5)
-        show(texture, shown, weights, images)
+        show(weights, images)
     """,
 }
 """By stage; `show` adds arrays to the digest, `folder` is empty."""

@@ -12,6 +12,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import rotation
+from facefolds_core.subject.cut_out import EdgeParams, agreement
 from facefolds_core.subject.drawing import render
 from facefolds_core.subject.find import fit_room, pictures_of
 from facefolds_core.subject.fit import fit_pictures
@@ -122,6 +123,18 @@ def test_a_picture_that_contradicts_the_others_is_not_believed(scene: Scene, spl
     found = Mattes(scene, body=nobody).of((HELD, 0))
     assert found.agreement is not None
     assert (found.source == "gaussians") == (found.agreement < 0.65)
+
+
+def test_a_picture_that_contradicts_the_first_fit_is_asked_of_the_subject_alone(scene: Scene, splats: Splats) -> None:
+    masks = scene.open_masks()
+    assert masks is not None
+    true = masks.image(HELD, 0)[..., 0] > 127
+    mattes = Mattes(scene, body=body_among(scene, splats, 0), edge=EdgeParams(agreeing=1.01))  # none agrees
+    before, (colours, opacities) = mattes.of((HELD, 0)), cut_outs(scene)
+    mattes.alone = fit_pictures(scene.cameras, colours, PARAMS, 0, opacities)
+    found = mattes.of((HELD, 0))
+    assert before.source == found.source == "gaussians"
+    assert agreement(before.opacity > 127, true) < agreement(found.opacity > 127, true) > 0.93
 
 
 def cut_outs(scene: Scene) -> tuple[list[np.ndarray], list[np.ndarray]]:

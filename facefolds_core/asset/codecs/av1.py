@@ -16,9 +16,8 @@ SVT_PRESET = "6"
 
 
 def _options(params: VideoSettings, crf: int) -> dict[str, str]:
-    fixed = {**SVT_FIXED, **({"lossless": 1} if params.lossless else {})}
-    quality = {} if params.lossless else {"crf": str(crf)}
-    return {"preset": SVT_PRESET, "g": str(params.keyframe_interval), **quality, "svtav1-params": joined(**fixed)}
+    fixed = joined(**SVT_FIXED)
+    return {"preset": SVT_PRESET, "g": str(params.keyframe_interval), "crf": str(crf), "svtav1-params": fixed}
 
 
 def _level_and_mime(stream: Stream) -> tuple[str, str]:

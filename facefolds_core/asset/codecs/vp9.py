@@ -41,8 +41,7 @@ VP9_LEVELS = (
 
 def _options(params: VideoSettings, crf: int) -> dict[str, str]:
     interval = str(params.keyframe_interval)
-    quality = {"lossless": "1"} if params.lossless else {"crf": str(crf)}
-    return {**VP9_FIXED, **quality, "g": interval, "keyint_min": interval}
+    return {**VP9_FIXED, "crf": str(crf), "g": interval, "keyint_min": interval}
 
 
 def _level_and_mime(stream: Stream) -> tuple[str, str]:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.generated import is_generated
 from facefolds_core.captures.looking import check_layout
-from facefolds_core.files.paths import SubjectFolders, check_capture_place
+from facefolds_core.files.paths import SubjectFolders, check_place
 from facefolds_core.params import CaptureParams, Subject
 from facefolds_core.registry import SOURCES
 
@@ -33,7 +33,7 @@ def read_capture(subject: Subject, folders: SubjectFolders, params: CaptureParam
     if is_generated(subject.source):
         place = folders.capture
     else:
-        place = check_capture_place(subject.path, folders)
+        place = check_place(subject.path, folders, "path")
         check_layout(subject.source, place)
     capture: Capture = SOURCES[subject.source].read(place, subject, params)
     return capture

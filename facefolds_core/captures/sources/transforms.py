@@ -28,7 +28,7 @@ from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.facts import fact, shorten
-from facefolds_core.files.reading import LARGEST, check_regular, is_folder, is_regular, is_there
+from facefolds_core.files.reading import is_folder, is_regular, is_there
 from facefolds_core.files.writing import read_json
 from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 from facefolds_core.params import CaptureParams, Subject
@@ -104,7 +104,6 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     """
     path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
     remedy = "point `path` at the folder that holds transforms.json, or make the file again"
-    check_regular(path, remedy, largest=LARGEST)
     value = read_json(path, remedy=remedy)
     if not isinstance(value, dict) or not isinstance(value.get("frames"), list) or not value["frames"]:
         raise wrong(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)

@@ -1,5 +1,7 @@
 """Conformance vectors: tiny assets, cameras and the pictures that a player must show; and how near somebody's come.
 
+`python -m tests.vectors FOLDER`, then `... FOLDER --check PICTURES` (docs/reference/asset-format.md).
+
 Made, not kept: the same on every machine, but for what float32 rounds. They have what players get wrong: sheets that
 fold before the eye (only the nearest crossing counts), half-transparent layers, texels unlike their neighbours, pixels
 that hold several texels, rectangles anywhere in the picture, two levels, a head that moves, a frame rate that is no
@@ -8,9 +10,10 @@ whole number, and the same take once more as a stream in segments.
 
 from __future__ import annotations
 
+import argparse
 import json
+import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +27,6 @@ from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import Asset, read_asset
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of, write_level
-from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import open_picture
 from facefolds_core.files.writing import atomic_folder, write_json
 from facefolds_core.geometry.cameras import Camera
@@ -50,6 +52,8 @@ WINDOW: Window = (-0.5, 0.5, -0.45, 0.45)
 LAYERS, FRAMES, TEXELS, SIDE = 3, 6, 64, 128
 RATE = 30000 / 1001
 BACKGROUND = (64 / 255, 128 / 255, 192 / 255)
+LEAST = 40.0
+"""dB that a player should reach. 8 bits after each layer's blending leave 50 and more, chroma placed otherwise 40."""
 
 
 class Waves:
@@ -119,7 +123,7 @@ def cameras() -> list[Camera]:
 def write_vectors(folder: Path) -> int:
     """Write the assets, `views.json` and the pictures of both filters, whole or not at all; returns how many views."""
     if folder.exists() and any(folder.iterdir()) and not (folder / VIEWS).is_file():
-        raise UserError("the folder is not empty, and holds no vectors", file=folder, remedy="name another folder")
+        raise SystemExit(f"{folder} is not empty, and holds no vectors: name another folder")
     with atomic_folder(folder) as out:
         _write_short(out / "short")
         write_layered(out / EXAMPLE, read_asset(out / "short").full, "vectors")
@@ -192,48 +196,41 @@ def _picture(asset: Asset, view: dict[str, Any], filtered: str) -> NDArray[np.ui
     return np.asarray(np.rint(255 * np.clip(rgb, 0, 1)), np.uint8)
 
 
-@dataclass(frozen=True)
-class Agreement:
-    """How near a picture comes to the reference.
-
-    Attributes:
-        file: its name.
-        psnr: dB; None where there is no such picture, or it is of another size.
-        points: dB to what one ray through each pixel's centre sees.
-    """
-
-    file: str
-    psnr: float | None
-    points: float | None
-
-    def reaches(self, least: float, points: bool = False) -> bool:
-        """Whether it comes as near as that (dB); with `points`, to either."""
-        return max(self.psnr or 0, (self.points or 0) if points else 0) >= least and self.psnr is not None
+def compare(folder: Path, pictures: Path) -> dict[str, tuple[float, float]]:
+    """Somebody's pictures against those of the vectors in `folder`: name in `views.json` -> dB to what must be shown,
+    and to what one ray through each pixel's centre sees; 0 where there is no such picture, or one of another size."""
+    files = [view["file"] for view in json.loads((folder / VIEWS).read_text())["views"]]
+    return {
+        file: (_psnr(folder / REFERENCE / file, pictures / file), _psnr(folder / POINTS / file, pictures / file))
+        for file in files
+    }
 
 
-def compare(folder: Path, pictures: Path) -> list[Agreement]:
-    """Somebody's pictures, named as in `views.json`, against those of the vectors in `folder`.
-
-    Raises:
-        UserError: if there are no vectors in the folder.
-    """
-    try:
-        views = json.loads((folder / VIEWS).read_text())["views"]
-        next((folder / POINTS).iterdir())  # vectors made before there were two filters have none
-    except (OSError, ValueError, KeyError, StopIteration):
-        remedy = "make them: `facefolds vectors FOLDER`"
-        raise UserError("no conformance vectors", file=folder / VIEWS, remedy=remedy) from None
-    return [
-        Agreement(file, *(_psnr(folder / filtered / file, pictures / file) for filtered in (REFERENCE, POINTS)))
-        for file in (view["file"] for view in views)
-    ]
-
-
-def _psnr(reference: Path, found: Path) -> float | None:
+def _psnr(reference: Path, found: Path) -> float:
     if not found.is_file():
-        return None
+        return 0.0
     pair = [np.asarray(open_picture(path).convert("RGB"), float) for path in (reference, found)]
     if pair[0].shape != pair[1].shape:
-        return None
+        return 0.0
     error = float(((pair[0] - pair[1]) ** 2).mean())
     return 99.0 if error == 0 else min(99.0, 10 * float(np.log10(255**2 / error)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="where the vectors are, or are to be")
+    parser.add_argument("--check", type=Path, help="folder of a player's pictures, named as in views.json")
+    given = parser.parse_args()
+    if given.check is None:
+        print(f"{write_vectors(given.folder)} pictures of two assets in {given.folder}")
+        return
+    found = compare(given.folder, given.check)
+    for file, (means, points) in found.items():
+        print(f"{file}: {means:.1f} dB; to one ray a pixel {points:.1f} dB")
+    reached = sum(means >= LEAST for means, _ in found.values())
+    print(f"{reached} of {len(found)} reach {LEAST:g} dB")
+    sys.exit(reached < len(found))
+
+
+if __name__ == "__main__":
+    main()
