@@ -47,7 +47,7 @@ WORDS = {
     "sound_does_not_fit": "{file}: the frames in use are not evenly spaced, so no sound fits them",
     "colours_corrected": "note: colours of {count} cameras are corrected by {file}",
     # of a training: why it chose as it did
-    "centre_chosen": "chart: of the candidates that lose least of the visible surface, within {tie:.0%}, "
+    "centre_chosen": "chart: of the candidates that lose least of the visible surface, within {tie:.1%}, "
     "the one farthest back (it loses {lost:.1%})",
     "window_chosen": "window: directions in which the subject is at least {opacity:.0%} opaque (and the tracked mesh, "
     "where there is one), and {margin} on each side",

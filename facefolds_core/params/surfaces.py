@@ -18,11 +18,11 @@ class StartParams(Section):
     )
     """Candidates for x of the sphere centre c = (x, 0, 0), units. The paper's is -0.25."""
 
-    belts: Annotated[Many[Annotated[float, Field(ge=0, le=80)]], Field(max_length=100)] = (10.0,)
+    belts: Annotated[Many[Annotated[float, Field(ge=0, le=80)]], Field(max_length=100)] = (10.0, 30.0)
     """Candidates for a belt, degrees below level, tried with each centre beside the plain sphere. Below it rays start
     lower on the neck's axis."""
 
-    centre_tie: ClassVar[float] = 0.01
+    centre_tie: ClassVar[float] = 0.005
     """Of the charts within this of the least loss of visible surface, the one farthest back wins."""
 
     centre_nodes: ClassVar[int] = 96
