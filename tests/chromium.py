@@ -73,7 +73,8 @@ class Chromium:
         if self.kills >= ALLOWED_KILLS:
             pytest.fail(f"Chromium hung and was killed {self.kills} times: it is not tried again")
         if self._browser is None or not self._browser.is_connected():
-            flags, env = [*FLAGS, *THRIFTY, self._mark], {**os.environ, "LP_NUM_THREADS": "0"}  # llvmpipe's
+            flags = [*FLAGS, *THRIFTY, self._mark]
+            env: dict[str, str | float | bool] = {**os.environ, "LP_NUM_THREADS": "0"}  # llvmpipe's
             self._browser = self.playwright.chromium.launch(executable_path=self.path, args=flags, env=env)
             self._shared = None
         return self._browser

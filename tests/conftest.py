@@ -24,9 +24,9 @@ RUN_ONCE = ("tests/pipeline/test_end_to_end.py", "tests/pipeline/test_commands.p
 """Tests of one project that DVC has run."""
 COMPILED = ("tests/captures/test_actor_pictures.py",)
 """The actor's renderer: in a fresh clone it is compiled for 40 s, which one worker should do before others need it."""
-LONGEST = (*COMPILED, *BROWSER, *RUN_ONCE, "tests/pipeline/", "tests/training/", "tests/hostile/")
-"""What several workers begin with. Of two, one compiles the actor's renderer and runs the project; the other has
-the browser meanwhile, which needs no kernel of a training: none is compiled twice."""
+LONGEST = (*COMPILED, *RUN_ONCE, *BROWSER, "tests/pipeline/", "tests/training/", "tests/hostile/")
+"""What several workers begin with. Of two, one compiles the actor's renderer, the other runs the project; who is done
+goes on with the browser, which needs no kernel of a training: none is compiled twice."""
 
 
 @pytest.fixture(scope="session")
@@ -90,13 +90,12 @@ def _rank(nodeid: str) -> int:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
-    """With `-n`: a worker gets whole files, so that what they share is made once; one has the browser, one the run."""
+    """With `-n`: a worker gets whole files, so that what they share is made once; one has the run."""
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
-            together = {"browser": BROWSER, "run once": RUN_ONCE}
-            return next((name for name, files in together.items() if nodeid.startswith(files)), nodeid.split("::")[0])
+            return "run once" if nodeid.startswith(RUN_ONCE) else nodeid.split("::")[0]
 
     config.option.loadscopereorder = False
     return ByFile(config, log)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from playwright.sync_api import Page
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
+from facefolds_core.system.locks import holding
 from tests.viewer.captured import captured
 from tests.viewer.fixtures import rich_asset
 
@@ -23,15 +25,21 @@ ELEMENT = "document.querySelector('facefolds-player')"
 
 
 @pytest.fixture(scope="session")
-def player_folder(project_root: Path) -> Path:
-    """The player, built from what stands in the work tree."""
+def player_folder(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The player, built from what stands in the work tree: by one of several workers."""
     npm, source = shutil.which("npm"), project_root / "viewer"
     if npm is None:
         pytest.skip("no npm: the web player cannot be built (apt-get install nodejs npm)")
-    installed = source / "node_modules" / ".package-lock.json"
-    if not installed.is_file() or installed.stat().st_mtime < (source / "package-lock.json").stat().st_mtime:
-        subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=source, check=True)
-    subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
+    run = tmp_path_factory.getbasetemp()
+    done = (run.parent if "PYTEST_XDIST_WORKER" in os.environ else run) / "player-built"  # the workers' common folder
+    with holding(done.with_suffix(".lock"), 600) as free:
+        assert free, "another worker builds the player, and does not end"
+        if not done.exists():
+            installed = source / "node_modules" / ".package-lock.json"
+            if not installed.is_file() or installed.stat().st_mtime < (source / "package-lock.json").stat().st_mtime:
+                subprocess.run([npm, "ci", "--no-audit", "--no-fund", "--loglevel=error"], cwd=source, check=True)
+            subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
+            done.touch()
     return source / "dist"
 
 

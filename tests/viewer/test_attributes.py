@@ -185,7 +185,11 @@ def test_time_and_sound(new_player: NewPlayer, rich: Path) -> None:
     assert player.run("return e.currentTime") == pytest.approx(3 / fps)
 
 
-@pytest.mark.parametrize("script", ["", "delete globalThis.VideoDecoder"], ids=["WebCodecs", "video element"])
+@pytest.mark.parametrize(
+    "script",
+    ["", pytest.param("delete globalThis.VideoDecoder", marks=pytest.mark.nightly)],
+    ids=["WebCodecs", "video element"],
+)
 def test_events(new_player: NewPlayer, rich: Path, script: str) -> None:
     listen = """window.seen = {}; for (const name of ['load', 'progress', 'camera-change', 'ended', 'pause'])
         addEventListener(name, ({ type, detail }) => (seen[type] ??= []).push(detail?.totalProgress), true);"""

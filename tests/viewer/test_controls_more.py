@@ -170,7 +170,7 @@ def test_the_bar_goes_while_it_plays_and_comes_back(player: Player) -> None:
     assert not player.run("return e.shadowRoot.querySelector('.stage').classList.contains('idle')")
 
 
-@pytest.mark.parametrize("size", [(280, 160), (240, 320)])
+@pytest.mark.parametrize("size", [pytest.param((280, 160), marks=pytest.mark.nightly), (240, 320)])
 def test_a_small_player_has_what_it_needs_in_one_line(new_player: NewPlayer, rich: Path, size: tuple[int, int]) -> None:
     player = new_player({"asset": rich}, viewport={"width": size[0], "height": size[1]})
     player.open("asset")

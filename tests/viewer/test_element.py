@@ -32,8 +32,8 @@ def opened(new_player: NewPlayer, asset: Path, body: str, script: str = "", **op
 @pytest.mark.parametrize(
     ("colour", "seen"),
     [
-        ("#fff", (255, 255, 255, 255)),
-        ("rebeccapurple", (0x66, 0x33, 0x99, 255)),
+        pytest.param("#fff", (255, 255, 255, 255), marks=pytest.mark.nightly),
+        pytest.param("rebeccapurple", (0x66, 0x33, 0x99, 255), marks=pytest.mark.nightly),
         ("rgb(0 200 100 / 50%)", (0, 100, 50, 128)),  # premultiplied
         ("var(--mine)", (1, 2, 3, 255)),
     ],

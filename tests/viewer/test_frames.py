@@ -117,6 +117,17 @@ def test_without_loop_it_stops_at_the_end_and_starts_again(new_player: NewPlayer
     player.wait("e.playing && e.frame < 4")
 
 
+def test_a_last_frame_that_is_decoded_late_is_shown(new_player: NewPlayer, rich: Path) -> None:
+    player = opened(new_player({"asset": rich}))
+    player.run(
+        """const { source } = e.player.level; const peek = source.peek.bind(source);
+        e.loop = false; e.speed = 100; await e.seek(3);
+        source.peek = (k) => (k === 5 && !e.playing ? ((source.peek = peek), null) : peek(k));
+        e.play();"""
+    )
+    player.wait("!e.playing && e.frame === 5")
+
+
 def test_a_still_asset_has_one_frame(new_player: NewPlayer, tmp_path: Path) -> None:
     make_asset(tmp_path / "asset", layers=1, frames=1, resolution=32)
     player = new_player({"asset": tmp_path / "asset"})

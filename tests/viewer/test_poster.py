@@ -53,7 +53,9 @@ def waiting(new_player: NewPlayer, asset: Path, view: str, **options: object) ->
     return player, held
 
 
-@pytest.mark.parametrize("size", [(900, 600), (390, 844), (360, 240)])
+@pytest.mark.parametrize(
+    "size", [(390, 844), *(pytest.param(size, marks=pytest.mark.nightly) for size in ((900, 600), (360, 240)))]
+)
 def test_the_first_picture_is_the_poster(new_player: NewPlayer, asset: Path, size: tuple[int, int]) -> None:
     viewport = {"width": size[0], "height": size[1]}
     player, held = waiting(new_player, asset, "frame=0", viewport=viewport)
@@ -67,7 +69,14 @@ def test_the_first_picture_is_the_poster(new_player: NewPlayer, asset: Path, siz
     assert psnr(before, after) >= AGREE
 
 
-@pytest.mark.parametrize("view", ["view=30,0,1.2,0,0,0", "background=ffffff", "mode=alpha", "hidden=1"])
+@pytest.mark.parametrize(
+    "view",
+    [
+        "view=30,0,1.2,0,0,0",
+        "hidden=1",
+        *(pytest.param(view, marks=pytest.mark.nightly) for view in ("background=ffffff", "mode=alpha")),
+    ],
+)
 def test_a_poster_that_shows_something_else_is_not_shown(new_player: NewPlayer, asset: Path, view: str) -> None:
     player, held = waiting(new_player, asset, view)
     player.page.wait_for_timeout(300)

@@ -35,6 +35,10 @@ return found;
 """
 
 
+DARK, WHITE = (0, 0, 0), (255, 255, 255)
+NEIGHBOURS = (("#16181d", DARK), ("#ffffff", WHITE), ("transparent", WHITE))
+
+
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player({"asset": rich}, viewport={"width": 900, "height": 700})
@@ -43,8 +47,15 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
     return player
 
 
-@pytest.mark.parametrize("behind", [(0, 0, 0), (255, 255, 255)], ids=["dark picture", "white picture"])
-@pytest.mark.parametrize("ground", ["#16181d", "#ffffff", "transparent"])
+@pytest.mark.parametrize(
+    ("ground", "behind"),
+    [
+        ("#16181d", WHITE),
+        ("#ffffff", DARK),
+        ("transparent", DARK),
+        *(pytest.param(*cell, marks=pytest.mark.nightly) for cell in NEIGHBOURS),
+    ],
+)
 def test_all_words_have_the_contrast_that_wcag_asks_for(
     player: Player, behind: tuple[int, int, int], ground: str
 ) -> None:
@@ -87,8 +98,17 @@ def test_the_controls_have_the_colours_of_what_is_behind(
     player.wait(f"e.shadowRoot.querySelector('.stage').classList.contains('light') === {str(changed).lower()}")
 
 
-@pytest.mark.parametrize("how", ["settings", "property", "before it is there"])
-@pytest.mark.parametrize("size", [(900, 700), (390, 700)])
+@pytest.mark.parametrize(
+    ("size", "how"),
+    [
+        ((900, 700), "settings"),
+        ((390, 700), "property"),
+        ((390, 700), "before it is there"),
+        pytest.param((900, 700), "property", marks=pytest.mark.nightly),
+        pytest.param((900, 700), "before it is there", marks=pytest.mark.nightly),
+        pytest.param((390, 700), "settings", marks=pytest.mark.nightly),
+    ],
+)
 def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
     new_player: NewPlayer, rich: Path, how: str, size: tuple[int, int]
 ) -> None:

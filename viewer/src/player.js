@@ -335,7 +335,9 @@ export class Player extends EventTarget {
     source.want(playback.frame, seconds * playback.fps * playback.speed);
     this.#showIfThere(playback.frame);
     this.detail.measure(seconds, there);
-    if (ended) this.#end();
+    if (!ended) return;
+    if (this.shown !== playback.frame) this.seek(playback.frame); // decoded only after playing has stopped
+    this.#end();
   }
 
   /** A video element keeps its own time; the clock goes by it. */
