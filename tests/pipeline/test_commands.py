@@ -32,7 +32,7 @@ def facefolds(*words: str | Path) -> str:
     return done.output
 
 
-ELSEWHERE = ["vectors", "export-html", "run"]
+ELSEWHERE = ["export-html", "run"]
 
 
 def test_all_commands_are_here() -> None:
