@@ -75,10 +75,10 @@ def test_weights_bound_what_errors_of_all_layers_do() -> None:
         moved = texture.copy()
         moved[layer, :, :, channel] += change
         seen = composite(look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved / 255)))
-        return seen[0, :3].numpy() * 255
+        return np.asarray(seen[0, :3]) * 255
 
     def derivative(layer: int, channel: int) -> np.ndarray:
-        return (colour(layer, channel, 10) - colour(layer, channel, -10)) / 20
+        return np.asarray(colour(layer, channel, 10) - colour(layer, channel, -10)) / 20
 
     by_red = np.array([derivative(layer, 0)[0] for layer in range(3)])
     by_alpha = np.array([np.sqrt((derivative(layer, 3) ** 2).mean()) for layer in range(3)])
