@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -12,6 +13,7 @@ from markupsafe import Markup
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.captures.sketch import sketch
 from facefolds_core.facts import worded
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
@@ -137,18 +139,15 @@ def context(subject: Subject) -> dict[str, Any]:
         "comparisons": compared,
         "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
         "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
-        "camera_map": camera_map(scene) if scene else None,
-        "validating": scene is not None and "validate" in scene.splits,
-        "cameras": tables.cameras(scene, facts.images, key) if scene else [],
+        "camera_map": Markup(sketch(scene)) if scene else None,
         "worst": next((one for one in compared if one["worst"]), None),
         "patch": patch(subject),
         "textures": textures(subject),
-        "curves": curves(facts),
+        "curves": [(words.curve_name(name), charts.line_chart(of)) for name, of in facts.curves.items()],
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
-        "config": tables.configuration(facts.config),
-        "versions": facts.versions,
+        "config": {name: json.dumps(value, indent=2) for name, value in facts.config.items()},
     }
 
 
@@ -172,15 +171,11 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
         ("Triangles", cost.get("triangles"), words.count, f"{words.count(subject.asset.num_layers)} layers"),
         ("Training", cost.get("train_seconds"), words.duration, str(cost.get("device") or "")),
     ]
-    found = [(name, value, number_unit(value, "dB"), note) for name, value, note in decibels]
+    found = [(name, value, f"{words.number(value)}\u00a0dB", note) for name, value, note in decibels]
     found += [(name, value, form(value), note) for name, value, form, note in others]
     return [
         {"name": name, "value": text, "note": note} for name, value, text, note in found if finite(value) is not None
     ]
-
-
-def number_unit(value: Any, unit: str) -> str:
-    return f"{words.number(value)}\u00a0{unit}"
 
 
 def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
@@ -188,8 +183,8 @@ def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[
     result: list[dict[str, Any]] = []
     for view in subject.views:
         shown = view.asset if view.over is None else view.over
-        known = [name for name in HEADLINES if getattr(view, name) is not None]
-        values = [f"{words.number(getattr(view, name))} dB {HEADLINE_WORDS[name]}" for name in known]
+        known = {name: value for name in HEADLINES if (value := view.values[name]) is not None}
+        values = [f"{words.number(value)} dB {HEADLINE_WORDS[name]}" for name, value in known.items()]
         values += place_words(places.get(view.camera))
         label = words.frame_label(subject.scene.frame_ids if subject.scene else (), view.frame)
         worst = subject.record is not None and view is subject.record.views[subject.record.worst]
@@ -266,24 +261,10 @@ def place_words(place: tables.Place | None) -> list[str]:
     return [f"{place.angle:.0f}° from front"] if place else []
 
 
-def curves(facts: Facts) -> list[dict[str, Any]]:
-    named = [(words.curve_name(curve.name), curve.points) for curve in facts.curves]
-    return [{"name": name, "svg": charts.line_chart(points, name, "step")} for name, points in named]
-
-
 def error_stops() -> str:
     """The error's colours as the stops of a CSS gradient."""
     return ", ".join(
         f"rgb({red:.0f} {green:.0f} {blue:.0f})" for red, green, blue in (255 * pictures.error_colours(9)).tolist()
-    )
-
-
-def camera_map(scene: Scene) -> Markup:
-    return charts.camera_map(
-        [
-            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split)
-            for camera, split in zip(scene.cameras, scene.splits, strict=True)
-        ]
     )
 
 

@@ -35,12 +35,12 @@ SCRIPTS = {
     """,
     "train": """
         from facefolds_core.params import ExplicitParams
-        from facefolds_core.training.explicit.loop import train_explicit
+        from facefolds_core.training.explicit.loop import fit_explicit
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius, mattes=True)
         params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183})
-        train_explicit(scene, params, folder / "model", folder / "log")
+        fit_explicit(scene, params, folder / "log").save(folder / "model")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,
     "decimate": """

@@ -22,7 +22,6 @@ PANELS = [
     "What ships",
     "Time and bytes by stage",
     "Configuration",
-    "Versions",
 ]
 
 Open = Callable[..., Page]

@@ -8,7 +8,6 @@ import pytest
 
 from facefolds_core.subject.cameras import CameraFit, CameraParams, camera_errors, camera_gains
 from facefolds_core.training.explicit.cameras import choose_cameras
-from facefolds_core.training.explicit.views import Images
 from tests.scenes import OPAQUE, make_scene
 
 COUNT, EACH = 6, 400
@@ -89,15 +88,4 @@ def test_cameras_alike_change_nothing(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
     choice = choose_cameras(scene, CameraFit.alike(COUNT))
     assert choice.scene.splits == scene.splits and choice.notes == ()
-    assert Images(scene, choice.gains).tables is None
-
-
-def test_images_without_gains(tmp_path: Path) -> None:
-    scene = make_scene(tmp_path / "scene", OPAQUE, size=12)
-    plain = Images(scene).frame(1)
-    gains = np.ones((6, 3))
-    gains[2] = (2.0, 0.5, 1.0)
-    corrected = Images(scene, gains).frame(1)
-    assert np.array_equal(np.delete(corrected, 2, 0), np.delete(plain, 2, 0))
-    expected = np.rint((plain[2] / gains[2]).clip(0, 255))
-    assert np.array_equal(corrected[2], expected)
+    assert (choice.gains == 1).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.explicit.targets import KEPT_BYTES
-from facefolds_core.training.patience import check_space
 
 TEXEL_BYTES = 300.0
 """A texel of one frame takes so many in a training at once."""
@@ -142,3 +142,25 @@ def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) 
         )
     if place is not None:
         check_space(place, found.disk)
+
+
+def check_space(folder: Path, needed: int) -> None:
+    """Refuse to train what could not be written.
+
+    Args:
+        folder: of the model.
+        needed: bytes.
+
+    Raises:
+        UserError: if there is less space on the disk.
+    """
+    there = next(path for path in folder.absolute().parents if path.exists())
+    free = shutil.disk_usage(there).free
+    if free < needed:
+        raise UserError(
+            "the trained model would not fit on the disk",
+            file=folder,
+            expected=f"{needed / 1e6:.0f} MB of free space",
+            found=f"{free / 1e6:.0f} MB",
+            remedy="free some space and run the same command again; finished stages are kept",
+        )
