@@ -93,14 +93,8 @@ def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     return {"groups": groups, "names": names, "rows": rows}
 
 
-def heat_map(
-    images: Sequence[ImageScores], key: str, pairs: dict[tuple[str, str], int], places: dict[str, Place]
-) -> Row:
-    """PSNR of every held-out camera and frame.
-
-    Args:
-        pairs: index of the comparison of (camera, frame), where the page shows one.
-    """
+def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, Place]) -> Row:
+    """PSNR of every held-out camera and frame."""
     values = {(image.camera, image.frame): getattr(image, key) for image in images}
     known = [value for value in values.values() if value is not None]
     low, high = (min(known), max(known)) if known else (0.0, 0.0)
@@ -118,7 +112,6 @@ def heat_map(
                     "value": number(value, 1),
                     "colour": None if where is None else heat_colour(where),
                     "ink": None if where is None else ink_on(where),
-                    "pair": pairs.get((camera, frame)),
                 }
             )
         place = places.get(camera)

@@ -14,8 +14,6 @@ from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, tables, words
 from facefolds_core.reporting.facts import ImageScores, read_curves, read_facts, read_images
-from facefolds_core.reporting.pictures import as_scored
-from facefolds_core.scoring.record import View
 from facefolds_core.scoring.report import write_per_image
 from tests.reporting.tiny import FRAMES, make_subject, scores
 from tests.scenes import look_at_origin
@@ -109,10 +107,9 @@ def test_a_heat_map_with_gaps() -> None:
         ImageScores("b", "0", 21.0, None),
     ]
     images[1] = replace(images[1], psnr=None)
-    heat = tables.heat_map(images, "psnr", {("a", "0"): 4}, {})
+    heat = tables.heat_map(images, "psnr", {})
     assert heat["frames"] == ["0", "1"]
     assert (heat["low"], heat["high"]) == ("19.0", "22.0")  # at least 3 dB, about the middle
-    assert [cell["pair"] for cell in heat["rows"][0]["cells"]] == [4, None]
     assert [cell["value"] for cell in heat["rows"][1]["cells"]] == ["21.0", "–"]
 
 
@@ -130,13 +127,3 @@ def test_the_place_of_a_camera() -> None:
     found = tables.place_of(look_at_origin("left", 30, 20, 8))
     expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
     assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
-
-
-def test_the_asset_is_held_against_the_photo_where_it_is_scored() -> None:
-    truth, asset = np.full((2, 2, 3), 0.8), np.full((2, 2, 3), 0.2)
-    mask = np.array([[1.0, 0.5], [0.0, 0.0]])
-    plain = View("a", "0", {}, truth, asset)
-    np.testing.assert_allclose(as_scored(replace(plain, mask=mask))[..., 0], [[0.2, 0.5], [0.8, 0.8]])
-    np.testing.assert_array_equal(as_scored(plain), asset)
-    over = np.full((2, 2, 3), 0.4)
-    np.testing.assert_array_equal(as_scored(replace(plain, mask=mask, over=over)), over)
