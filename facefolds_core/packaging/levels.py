@@ -57,4 +57,4 @@ def coarse_content(
     size = min(level.texture_resolution, 3 * full.textures.image(0, 0).shape[0] // 4)
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
-    return LevelContent(layers, textures, full.frames, full.fps, parts=full.parts, originals=full.textures)
+    return LevelContent(layers, textures, full.frames, full.fps)

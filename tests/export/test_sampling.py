@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.export import sampling
-from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.sampling import grid_normals, sample_grids, samples_for, texture_rows, write_textures
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.chart import Chart
@@ -162,43 +160,3 @@ def test_samples_are_no_coarser_than_the_models_texels(monkeypatch: pytest.Monke
     assert [samples_for(Fine(), window) for window in (whole, upper, narrow)] == [704, 384, 448]
     monkeypatch.setattr(sampling, "LEAST", 1024)
     assert samples_for(Fine(), whole) == samples_for(Ellipsoids(), whole) == 1024
-
-
-def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    grids = sample_grids(OfTexels(), 16, WINDOW, progress=False)
-    made, project = list[int](), Projection.__call__
-
-    def counted(self: Projection, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        made.append(1)
-        return project(self, image)
-
-    monkeypatch.setattr(Projection, "__call__", counted)
-    for name, model in (("first", OfTexels()), ("again", OfTexels()), ("changed", OfTexels(changed=2))):
-        write_textures(tmp_path / name, model, grids, tmp_path / "kept", progress=False)
-        assert len(made) == {"first": 8, "again": 0, "changed": 2}[name]  # of 4 frames of 2 layers
-        made.clear()
-    opacity = write_textures(tmp_path / "whole", OfTexels(changed=2), grids, progress=False)
-    assert (tmp_path / "changed").read_bytes() == (tmp_path / "whole").read_bytes()
-    kept = write_textures(tmp_path / "changed", OfTexels(changed=2), grids, tmp_path / "kept", progress=False)
-    assert np.array_equal(kept, opacity)
-
-
-class Flashing(OfTexels):
-    """More opaque in one frame."""
-
-    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
-        rgb, alpha = super().texture(uv, layer, time)
-        return rgb, alpha * (1.0 if time == self.changed else 0.5)
-
-
-def test_a_layer_shows_where_the_frames_asked_for_do(tmp_path: Path) -> None:
-    model = Flashing(changed=2)
-    grids = sample_grids(model, 8, WINDOW, progress=False)
-    by_all, by_others, by_one = (
-        write_textures(tmp_path / "t.arrow", model, grids, among=among, progress=False)
-        for among in (None, [0, 1, 3], [2])
-    )
-    without = write_textures(tmp_path / "t.arrow", Flashing(), grids, progress=False)
-    assert np.array_equal(by_others, without)
-    assert np.array_equal(by_one, by_all)
-    assert not np.array_equal(by_others, by_all)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.export import textures
-from facefolds_core.export.textures import Image, resample, resample_store
+from facefolds_core.export.textures import resample, resample_store
 from facefolds_core.files.frame_store import FrameStore, write_frames
 
 
@@ -113,22 +112,3 @@ def test_a_truncated_store_is_an_error_and_leaves_nothing(tmp_path: Path) -> Non
     with pytest.raises(UserError, match="damaged"):
         resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
     assert [p.name for p in tmp_path.iterdir()] == ["in.arrow"]
-
-
-def test_frames_that_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = list[int]()
-
-    def counted(image: Image, size: int) -> Image:
-        made.append(size)
-        return resample(image, size)
-
-    monkeypatch.setattr(textures, "resample", counted)
-    for changed, size, count in ((-1, 4, 6), (-1, 4, 0), (1, 4, 2), (1, 5, 6)):
-        rows = ((n, k, noise(8, 10 * n + k + 100 * (k == changed))) for k in range(3) for n in range(2))
-        write_frames(tmp_path / "in.arrow", (8, 8, 4), rows)
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", size, tmp_path / "kept", progress=False)
-        assert len(made) == count
-        made.clear()
-        resample_store(tmp_path / "in.arrow", tmp_path / "anew.arrow", size, progress=False)
-        assert (tmp_path / "out.arrow").read_bytes() == (tmp_path / "anew.arrow").read_bytes()
-        made.clear()

@@ -67,7 +67,7 @@ def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> F
     most = int(segments.memory_megabytes * 1e6 / (TEXEL_BYTES * texels))
     frames = scene.num_frames
     at_once = frames <= min(segments.joint_frames, most) and left is None
-    keys = frames if at_once else min(max(1, most), frames, len(segments.named) or segments.key_frames)
+    keys = frames if at_once else min(max(1, most), frames, segments.key_frames)
     trained = keys if left is None else 1
     rays = len(scene.indices("train")) * scene.width * scene.height
     cut_outs = min(KEPT_BYTES, trained * 4 * rays)

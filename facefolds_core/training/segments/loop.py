@@ -190,7 +190,7 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
         if any(other.is_dir() for other in folder.glob("base-*")):
             tqdm.write(
                 "train: it is another one than before (other key frames, pictures, parameters or code), and all frames "
-                "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
+                "are fitted anew"
             )
         train_base(scene, list(plan.keys), params, place, log)
     shutil.rmtree(log, ignore_errors=True)
