@@ -20,8 +20,6 @@ WORDS = {
     "{common[1]}",
     "k_is_scaled": "note: K is for larger or smaller pictures than {size[0]} x {size[1]}; scaled ({cameras})",
     "masks_chosen": "note: masks are those of the folder {chosen}; {others} are not read",
-    "calibration_varies": "note: the pictures of {cameras} cameras were calibrated one by one; the mean of each camera "
-    "is used (farthest from it: {pixels:.2f} pixels on the subject, camera {worst})",
     "other_models": "note: sparse/0 is read; COLMAP's other models ({others}) do not hang together with it",
     "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
     "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
