@@ -21,7 +21,7 @@ from facefolds_core.export.stores import Grids
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 
 if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
@@ -45,14 +45,13 @@ def samples_for(model: RadianceManifolds, window: Window) -> int:
     return max(LEAST, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
 
 
-def sample_grids(model: RadianceManifolds, resolution: int, window: Window, progress: bool = True) -> Grids:
+def sample_grids(model: RadianceManifolds, resolution: int, window: Window) -> Grids:
     """N grids of R x R points at the texel centres of `window`, with normals.
 
     Args:
         model: asked for its `surface_points`.
         resolution: R.
         window: (u0, u1, v0, v1), the same for all layers.
-        progress: show a progress bar.
 
     Raises:
         UserError: if the model gives a point that is not finite, or a layer has no point at all.
@@ -65,7 +64,7 @@ def sample_grids(model: RadianceManifolds, resolution: int, window: Window, prog
     points = np.zeros((model.num_layers, resolution, resolution, 3), np.float32)
     valid = np.zeros((model.num_layers, resolution, resolution), bool)
     flat_points, flat_valid = points.reshape(model.num_layers, -1, 3), valid.reshape(model.num_layers, -1)
-    with torch.no_grad(), progress_bar(total=len(uv), desc="points", unit="direction", disable=not progress) as bar:
+    with torch.no_grad(), progress(total=len(uv), desc="points", unit="direction") as bar:
         for start in range(0, len(uv), DIRECTIONS_AT_ONCE):
             stop = start + DIRECTIONS_AT_ONCE
             found, hit = model.surface_points(uv[start:stop])
@@ -137,9 +136,7 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], chart: C
     return np.where((normal * outward).sum(-1, keepdims=True) < 0, -normal, normal)
 
 
-def texture_rows(
-    model: RadianceManifolds, grids: Grids, progress: bool = True
-) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+def texture_rows(model: RadianceManifolds, grids: Grids) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """Texture images: frame by frame, in each the layers from the outermost in.
 
     Yields:
@@ -149,7 +146,7 @@ def texture_rows(
         UserError: if the model gives a colour or an alpha that is not finite.
     """
     sheets = [_Sheet(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
-    for frame in progress_bar(range(model.num_frames), desc="textures", unit="frame", disable=not progress):
+    for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
         for layer, sheet in enumerate(sheets):
             yield layer, frame, sheet.image(frame)
 
@@ -205,7 +202,7 @@ def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> NDA
     return np.asarray(rgba.clamp(0, 1).cpu().numpy(), np.float32)
 
 
-def write_textures(path: Path, model: RadianceManifolds, grids: Grids, progress: bool = True) -> NDArray[np.uint8]:
+def write_textures(path: Path, model: RadianceManifolds, grids: Grids) -> NDArray[np.uint8]:
     """Write all texture images to a layered frame store (camera := layer), holding one frame's in memory.
 
     Returns:
@@ -214,7 +211,7 @@ def write_textures(path: Path, model: RadianceManifolds, grids: Grids, progress:
     opacity = np.zeros(grids.valid.shape, np.uint8)
 
     def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-        for layer, frame, image in texture_rows(model, grids, progress):
+        for layer, frame, image in texture_rows(model, grids):
             np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
             yield layer, frame, image
 

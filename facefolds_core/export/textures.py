@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.asset.inputs import check_textures
 from facefolds_core.export.bilinear import Projection
 from facefolds_core.files.frame_store import FrameStore, write_frames
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 
 Float = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -90,19 +90,19 @@ def fill_colour(premultiplied: Float, shown: NDArray[np.bool_]) -> Float:
     return np.asarray(colour, np.float32)
 
 
-def texture_rows(store: FrameStore, size: int, progress: bool = True) -> Iterator[tuple[int, int, Image]]:
+def texture_rows(store: FrameStore, size: int) -> Iterator[tuple[int, int, Image]]:
     """All textures of a complete layered store, resampled: frame by frame, layers from the outermost in.
 
     Yields:
         (layer, frame, (size, size, 4) uint8).
     """
     last = store.keys()[-1]
-    for frame in progress_bar(range(last[1] + 1), desc="textures", unit="frame", disable=not progress):
+    for frame in progress(range(last[1] + 1), desc="textures", unit="frame"):
         for layer in range(last[0] + 1):
             yield layer, frame, resample(store.image(layer, frame), size)
 
 
-def resample_store(source: Path, target: Path, size: int, progress: bool = True) -> FrameStore:
+def resample_store(source: Path, target: Path, size: int) -> FrameStore:
     """Resample a layered frame store (camera := layer) to `size` x `size`; returns the source.
 
     Raises:
@@ -110,5 +110,5 @@ def resample_store(source: Path, target: Path, size: int, progress: bool = True)
     """
     store = FrameStore(source)
     check_textures(store)
-    write_frames(target, (size, size, 4), texture_rows(store, size, progress), packed=True)
+    write_frames(target, (size, size, 4), texture_rows(store, size), packed=True)
     return store

@@ -26,7 +26,7 @@ WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
 def test_points_lie_on_the_layers_at_the_grids_uv(window: Window) -> None:
     model = Ellipsoids(axes=SPHERES)
-    grids = sample_grids(model, 24, window, progress=False)
+    grids = sample_grids(model, 24, window)
     uv, radius = points_to_uv(grids.points.astype(np.float64), model.centre.numpy())
     assert np.abs(uv - texel_uv(24, 24, window)).max() < 1e-5
     assert np.abs(radius - np.array([0.35, 0.30])[:, None, None]).max() < 1e-6
@@ -35,7 +35,7 @@ def test_points_lie_on_the_layers_at_the_grids_uv(window: Window) -> None:
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
 def test_normals_of_an_ellipsoid(window: Window) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 96, window, progress=False)
+    grids = sample_grids(model, 96, window)
     for points, normals, axes in zip(grids.points, grids.normals, model.axes, strict=True):
         true = (points - model.centre.numpy()) / np.array(axes) ** 2
         true /= np.linalg.norm(true, axis=-1, keepdims=True)
@@ -45,7 +45,7 @@ def test_normals_of_an_ellipsoid(window: Window) -> None:
 
 def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
     model = Ellipsoids(axes=SPHERES)
-    grids = sample_grids(model, 128, FULL_WINDOW, progress=False)
+    grids = sample_grids(model, 128, FULL_WINDOW)
     outward = grids.points[0] - model.centre.numpy()
     outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
     noisy = grids.points[0] * (1 + 1e-5 * np.random.default_rng(0).standard_normal((128, 128, 1)))
@@ -55,8 +55,8 @@ def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
 
 def test_invalid_neighbours_do_not_bend_the_normals() -> None:
     model = Ellipsoids(hole=0.15)
-    grids = sample_grids(model, 64, WINDOW, progress=False)
-    whole = sample_grids(Ellipsoids(), 64, WINDOW, progress=False)
+    grids = sample_grids(model, 64, WINDOW)
+    whole = sample_grids(Ellipsoids(), 64, WINDOW)
     assert not grids.valid.all()
     cosine = (grids.normals * whole.normals).sum(-1)[grids.valid]
     assert cosine.min() > 0.999
@@ -80,8 +80,8 @@ def test_rows_near_the_poles_span_more_columns() -> None:
 
 def test_textures_are_the_models(tmp_path: Path) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 16, WINDOW, progress=False)
-    write_textures(tmp_path / "textures.arrow", model, grids, progress=False)
+    grids = sample_grids(model, 16, WINDOW)
+    write_textures(tmp_path / "textures.arrow", model, grids)
     store = FrameStore(tmp_path / "textures.arrow")
     rgb, alpha = model.texture(torch.as_tensor(texel_uv(16, 16, WINDOW).reshape(-1, 2)), 0, 1.0)
     expected = torch.cat([rgb, alpha[:, None]], 1).reshape(16, 16, 4).numpy()
@@ -91,15 +91,15 @@ def test_textures_are_the_models(tmp_path: Path) -> None:
 
 def test_textures_are_transparent_where_the_layer_is_missing() -> None:
     model = Ellipsoids(hole=0.15)
-    grids = sample_grids(model, 32, WINDOW, progress=False)
-    _, _, image = next(texture_rows(model, grids, progress=False))
+    grids = sample_grids(model, 32, WINDOW)
+    _, _, image = next(texture_rows(model, grids))
     assert (image[~grids.valid[0]] == 0).all()
     assert (image[grids.valid[0], 3] > 0).all()
 
 
 def test_a_layer_without_any_point_is_named() -> None:
     with pytest.raises(UserError, match="layer 0"):
-        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW, progress=False)
+        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW)
 
 
 @dataclass(frozen=True)
@@ -122,13 +122,13 @@ class Broken(Ellipsoids):
 
 def test_nan_in_the_surface_is_caught() -> None:
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 1"):
-        sample_grids(Broken(), 16, WINDOW, progress=False)
+        sample_grids(Broken(), 16, WINDOW)
 
 
 def test_nan_in_a_texture_is_caught() -> None:
-    grids = sample_grids(Ellipsoids(), 16, WINDOW, progress=False)
+    grids = sample_grids(Ellipsoids(), 16, WINDOW)
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 0, frame 0"):
-        next(texture_rows(Broken(), grids, progress=False))
+        next(texture_rows(Broken(), grids))
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def write(path: Path, keys: list[tuple[int, int]], size: int = 8) -> None:
 
 def test_the_store_keeps_layers_and_frames(tmp_path: Path) -> None:
     write(tmp_path / "in.arrow", [(layer, frame) for frame in range(3) for layer in range(2)])
-    resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+    resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
     out = FrameStore(tmp_path / "out.arrow")
     assert out.keys() == [(layer, frame) for layer in range(2) for frame in range(3)]
     assert np.array_equal(out.image(1, 2), resample(noise(8, 12), 4))
@@ -102,7 +102,7 @@ def test_the_store_keeps_layers_and_frames(tmp_path: Path) -> None:
 def test_a_missing_image_is_an_error(tmp_path: Path) -> None:
     write(tmp_path / "in.arrow", [(0, 0), (1, 0), (0, 1)])
     with pytest.raises(UserError, match="not complete"):
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
 
 
 def test_a_truncated_store_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
@@ -110,5 +110,5 @@ def test_a_truncated_store_is_an_error_and_leaves_nothing(tmp_path: Path) -> Non
     whole = (tmp_path / "in.arrow").read_bytes()
     (tmp_path / "in.arrow").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(UserError, match="damaged"):
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
     assert [p.name for p in tmp_path.iterdir()] == ["in.arrow"]

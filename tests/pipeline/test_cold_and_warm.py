@@ -49,7 +49,7 @@ SCRIPTS = {
         from facefolds_core.export.sheets import grid_sheets
         from tests.ellipsoids import Ellipsoids
 
-        grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
+        grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4))
         for mesh in decimate_sheets(grid_sheets(grids, None), 64):
             show(mesh.vertices, mesh.faces, mesh.st)
     """,

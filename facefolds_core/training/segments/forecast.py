@@ -55,26 +55,21 @@ class Forecast:
         return f"{how}: about {time}, {self.memory / 1e9:.1f} GB of memory, {self.disk / 1e9:.2f} GB on the disk"
 
 
-def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> Forecast:
-    """Of a scene's training.
-
-    Args:
-        left: frames that are still to be fitted to a base that is there; None where there is none.
-    """
+def forecast(scene: Scene, params: ExplicitParams) -> Forecast:
+    """Of a scene's training."""
     segments = params.segments
     side = params.textures.pixels_per_texel
     texels = round(TEXELS_PER_PIXEL * scene.width * scene.height / side**2)
     most = int(segments.memory_megabytes * 1e6 / (TEXEL_BYTES * texels))
     frames = scene.num_frames
-    at_once = frames <= min(segments.joint_frames, most) and left is None
+    at_once = frames <= min(segments.joint_frames, most)
     keys = frames if at_once else min(max(1, most), frames, segments.key_frames)
-    trained = keys if left is None else 1
     rays = len(scene.indices("train")) * scene.width * scene.height
-    cut_outs = min(KEPT_BYTES, trained * 4 * rays)
-    memory = round(trained * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
-    steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
+    cut_outs = min(KEPT_BYTES, keys * 4 * rays)
+    memory = round(keys * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
+    steps = max(params.iterations, params.textures.steps_per_frame * keys)
     if not at_once:
-        steps += segments.steps * (frames if left is None else left)
+        steps += segments.steps * frames
     seconds = _seconds(params, steps, texels) / numba.get_num_threads()
     base = model_bytes((1, texels), params.layers, keys)
     disk = base if at_once else base + 2 * texels * frames * (3 + params.layers)
