@@ -82,13 +82,12 @@ class GlossFit:
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
         fits, steps = self.params.fits, level.iterations
-        begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
-        return self.on and begun and (step + 1) * fits // steps > step * fits // steps
+        return self.on and self.params.begin == "rounds" and (step + 1) * fits // steps > step * fits // steps
 
     def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: CutOuts) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
-        if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
+        if not self.on or number != (rounds - 1 if self.params.begin == "rounds" else rounds + 1):
             return None
         seen = self.look(state, source, pictures)
         found = self._decide(state, seen)
