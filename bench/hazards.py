@@ -24,7 +24,7 @@ from bench import charts
 from bench.hazard_film import EXTREMES, Film, Shots, of_split, read_shots, shoot, write_shots
 from bench.hazard_rows import CLEAN, FILM, HAZARDS, Hazard
 from bench.results import Cell, Store, commit_name, mean, now
-from bench.run import Project, own_params, score_model, training_of
+from bench.run import Project, own_params, score_model
 from bench.tables import hazard_tables, replace_between
 from facefolds_core.captures.scene import Scene, Split
 from facefolds_core.errors import UserError, report_user_errors
@@ -96,8 +96,8 @@ def run_cell(blank: Cell, data: Path, cache: Path) -> Cell:
         except UserError as error:
             return blank.model_copy(update={**found, "failure": error.message})
         seen = write_shots(truth, Path(folder) / "truth")
-        report = training_of(project.folders)
-        found |= {name: report[name] for name in ("restarts", "iterations", "peak_memory_bytes")}
+        report = read_json(project.folders.model / "training.json")
+        found |= {name: report[name] for name in ("iterations", "peak_memory_bytes")}
         found["seconds"] = report["processor_seconds"]
         return blank.model_copy(update=found | scored(project.folders.model, scene, seen))
 

@@ -88,7 +88,6 @@ class Cell(Entry):
         psnr: of the subject, dB: mean of the held-out cameras (of the film: those inside its rig) and frames.
         views: held-out camera -> dB.
         flat: PSNR of a silhouette of the subject's true shape in one colour, dB: a model below it shows nothing.
-        restarts: times that a level of training diverged and was begun again.
         seconds: processor time of training.
     """
 
@@ -102,7 +101,6 @@ class Cell(Entry):
     views: dict[str, float] = {}
     scores: Means = {}
     flat: float = 0.0
-    restarts: int = 0
     iterations: int = 0
     seconds: float = 0.0
     peak_memory_bytes: int = 0
@@ -110,8 +108,8 @@ class Cell(Entry):
 
     @property
     def converged(self) -> bool:
-        """It ended without an error or a new start, and shows more than a flat silhouette would."""
-        return not self.failure and not self.restarts and self.psnr is not None and self.psnr > self.flat
+        """It ended without an error, and shows more than a flat silhouette would."""
+        return not self.failure and self.psnr is not None and self.psnr > self.flat
 
 
 class Row(Entry):

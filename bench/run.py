@@ -16,9 +16,8 @@ import yaml
 from bench.results import ROOT, Means
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.facts import read_fact
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.writing import read_json, write_text
+from facefolds_core.files.writing import write_text
 from facefolds_core.model import load_model
 from facefolds_core.params import merged
 from facefolds_core.scoring.images import score_images
@@ -81,14 +80,6 @@ def own_params(subject: str, changes: Sections, path: Path = ROOT / "params.yaml
     if entry.get("source") != "actor":
         entry["path"] = str((path.parent / entry["path"]).resolve())
     return {**params, "subjects": {subject: entry}}
-
-
-def training_of(folders: SubjectFolders) -> dict[str, Any]:
-    """training.json, and under "restarts" how often a level diverged and was begun again."""
-    fit = folders.model / "fit.json"
-    events = read_json(fit)["events"] if fit.exists() else []
-    restarts = sum(read_fact(event).kind == "diverged" for event in events)
-    return {**read_json(folders.model / "training.json"), "restarts": restarts}
 
 
 def score_model(

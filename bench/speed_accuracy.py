@@ -16,10 +16,11 @@ import typer
 
 from bench import charts
 from bench.results import Clock, Conditions, Measurement, Scores, Store, commit_name, machine_name, mean, now
-from bench.run import Project, own_params, score_model, training_of
+from bench.run import Project, own_params, score_model
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.config.stages import read_train
 from facefolds_core.errors import UserError, report_user_errors
+from facefolds_core.files.writing import read_json
 from facefolds_core.model.device import device_of, pick_device
 from facefolds_core.scoring.panels import METRICS
 from facefolds_core.scoring.perceptual import find_perceptual
@@ -68,7 +69,7 @@ def measure(project: Project, blank: Measurement) -> Measurement:
     try:
         project.write(own_params(project.subject, {"train": {"preset": blank.preset, "iterations": blank.iterations}}))
         project.run("configure", "train")
-        report = training_of(project.folders)
+        report = read_json(project.folders.model / "training.json")
         processor = report["processor_seconds"] / conditions.threads
         found = {
             "seconds": report["seconds"] if conditions.clock == "wall" else processor,

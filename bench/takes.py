@@ -5,33 +5,25 @@ python -m bench.takes FOLDER [--frames 60,240,960]
 The actor is filmed in small pictures, at a rate at which no two frames of her loop are alike: equal ones are trained
 once. Each stage runs in a process of its own; two more fit segments. Memory is anonymous memory, of the process and its
 children together, at most: pages of mapped files can be taken back at any time, and are not counted. The shortest take
-is made once before, so that nothing is compiled while it is measured. At the end one frame in the middle of the longest
-take is changed, and its stages run once more, with the key frames of the first run (`train.segments.named`): what did
-not change is taken over. Meshes are made by the key frames, and attention is a segment's own, so that the change stays
-where it is.
+is made once before, so that nothing is compiled while it is measured.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import psutil
 import typer
-import yaml
-from PIL import Image
 
 from bench.run import Project
 from bench.tables import markdown
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files.pictures import open_picture
-from facefolds_core.files.writing import read_json, write_json
+from facefolds_core.files.writing import write_json
 from facefolds_core.params import STAGE_SECTIONS, merged
 
 RATE = 40.0618
@@ -44,12 +36,12 @@ PARAMS: dict[str, Any] = {
     "capture": {"cameras": 6, "height": 64, "width": 48},
     "normalize": {},
     "train": {"preset": "fast", "segments": {"key_frames": 16, "processes": 2}},
-    "sample": {"resolution": 128, "opacity": "key_frames"},
+    "sample": {"resolution": 128},
     "reconstruct": {},
     "decimate": {"resolution": 24},
     "texture": {"resolution": 128},
     "bake": {},
-    "compress": {"attention": {"of": "segment"}},
+    "compress": {},
     "evaluate": {},
 }
 """params.yaml but for the subject."""
@@ -111,31 +103,6 @@ def measure(folder: Path, frames: int) -> dict[str, Watched]:
     return found
 
 
-def change_frame(project: Project, keys: Collection[str]) -> str:
-    """Move what all cameras show in one frame, in the middle of the take and not among `keys`, by a pixel; returns its
-    name."""
-    pictures = sorted((project.folders.capture / "images").rglob("*.png"))
-    names = sorted({path.stem for path in pictures})
-    name = next(name for name in names[len(names) // 2 :] if name not in keys)
-    for path in (path for path in pictures if path.stem == name):
-        Image.fromarray(np.roll(np.asarray(open_picture(path)), 1, 1)).save(path)
-    return name
-
-
-def again(folder: Path, frames: int, first: dict[str, Watched]) -> str:
-    """A row a stage: processor time of the first run, and after a frame was changed."""
-    project = Project(folder / f"frames{frames}", "take")
-    keys = read_json(project.folders.model / "fit.json")["key_frames"]
-    params = yaml.safe_load((project.root / "params.yaml").read_text(encoding="utf-8"))
-    project.write(merged(params, {"train": {"segments": {"named": keys}}}))
-    project.run("configure")
-    changed, rows = change_frame(project, keys), []
-    for stage in STAGE_SECTIONS[1:]:
-        seconds = watched(project, stage).processor
-        rows.append([stage, f"{first[stage].processor:.1f}", f"{seconds:.1f}"])
-    return markdown([f"{frames} frames", "s", f"s, after a change of frame {changed}"], rows)
-
-
 def table(found: dict[int, dict[str, Watched]]) -> str:
     """A row a stage: memory and processor time of each length, and how they grow from the shortest to the longest."""
     lengths = sorted(found)
@@ -161,7 +128,6 @@ def main(
         found = {k: measure(folder, k) for k in lengths}
         write_json(folder / "takes.json", {k: {s: vars(w) for s, w in one.items()} for k, one in found.items()})
         typer.echo(table(found))
-        typer.echo(again(folder, max(lengths), found[max(lengths)]))
 
 
 if __name__ == "__main__":

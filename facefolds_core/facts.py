@@ -20,8 +20,6 @@ WORDS = {
     "{common[1]}",
     "k_is_scaled": "note: K is for larger or smaller pictures than {size[0]} x {size[1]}; scaled ({cameras})",
     "masks_chosen": "note: masks are those of the folder {chosen}; {others} are not read",
-    "calibration_varies": "note: the pictures of {cameras} cameras were calibrated one by one; the mean of each camera "
-    "is used (farthest from it: {pixels:.2f} pixels on the subject, camera {worst})",
     "other_models": "note: sparse/0 is read; COLMAP's other models ({others}) do not hang together with it",
     "camera_incomplete": "camera {camera}: has {has} of {of} frames, fewer than half",
     "culled": "camera {camera}: culled, elevation {elevation:.1f}, azimuth {azimuth:.1f} degrees",
@@ -66,7 +64,6 @@ WORDS = {
     "mesh_is_off": "the tracked mesh is left out: in {share:.0%} of the directions it lies over {distance} units "
     "from what the images show (is its scale or its place wrong?)",
     "followed": "frames moved once more, where they did not follow what moves: {share:.1%} of the texels each",
-    "diverged": "level {level}: diverged, begun again with learning rate {rate:.3g}",
     "specks_cleared": "{count} patches of texels beside the subject made transparent, each under {share:.0%} of it "
     "(train.pruning.speck_share)",
     "texels_cleared": "{share:.0%} of all texels cleared: they add less than {least:.5f} to any ray, "
@@ -79,12 +76,11 @@ WORDS = {
     "in_segments": "{frames} frames, trained as {segments} segments over a base of {keys} key frames (fit.json: "
     "key_frames)",
     "start_explains_little": "warning: the subject's Gaussians explain the pictures with {psnr:.1f} dB only (under "
-    "{under:g}): look at fit.png; check the calibration, and subject/sheet.png (docs/guide/subjects.md)",
+    "{under:g}): look at subject/sheet.png, and check the calibration (docs/guide/subjects.md)",
     "surface_without_a_place": "warning: {share:.0%} of the visible surface have no place in the chart around "
-    "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres or train.start.belts, or look at "
-    "fit.png for what is no subject",
+    "x = {x:.2f}: it will be missing or torn; add candidates to train.start.centres or train.start.belts",
     "codec_misses": "warning: the video reaches {reached:.1f} dB of the {target:g} of compress.video.target_psnr: "
-    "finer quantisation gives no more; finer textures (texture.resolution) or fewer specks in them (fit.png) do",
+    "finer quantisation gives no more; finer textures (texture.resolution) do",
     "stands_still": "warning: the asset shows {asset:.0%} of what changes from frame to frame, the model {model:.0%} "
     "(under {under:.0%}): its film stands still where the subject moves. If both are low, train longer "
     "(train.iterations) or on fewer frames; if the asset alone is, lower bake.hold",

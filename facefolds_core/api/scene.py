@@ -9,9 +9,9 @@ from typing import Any, SupportsIndex
 from facefolds_core.api.cameras import camera_named
 from facefolds_core.api.capture import Capture
 from facefolds_core.api.pictures import Picture, check_frame
-from facefolds_core.api.sketch import sketch
 from facefolds_core.api.work import open_folders, run, set_params
 from facefolds_core.captures import scene as scenes
+from facefolds_core.captures.sketch import sketch
 from facefolds_core.errors import UserError
 
 

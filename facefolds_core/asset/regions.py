@@ -6,7 +6,7 @@ know regions pass over them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -32,15 +32,6 @@ class Region:
     width: int
     height: int
     offset: int
-
-
-Regions = Callable[[range], Sequence[Region]]
-"""Of pictures that are encoded together, by their numbers."""
-
-
-def nowhere(frames: range) -> Sequence[Region]:
-    """No regions."""
-    return ()
 
 
 class Marker:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -29,11 +30,11 @@ from facefolds_core.asset.manifest import (
 )
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.packing import AtlasLayout, check_layout
-from facefolds_core.asset.parts import Filmed, Parts, encode_parts
+from facefolds_core.asset.parts import encode_parts
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.regions import Regions, nowhere
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.track_file import write_track
-from facefolds_core.asset.video import encode_video, key_frames, pack_frame, probe_video
+from facefolds_core.asset.video import key_frames, pack_frame, probe_video
 from facefolds_core.files.writing import file_sha256
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
@@ -99,9 +100,7 @@ class LevelContent:
         fps: frames a second; 0 for a static scene.
         unit: the layout can be scaled down by it and its divisors; one of the crops' numbers.
         placed: the layout, where it is not to be chosen.
-        parts: where encoded parts of its videos are kept; None encodes all anew, in one go.
         part_frames: frames that are encoded by themselves, each a group of pictures; 0: all of them at once.
-        originals: what the textures are made of, where they are resampled.
     """
 
     layers: Sequence[CroppedLayer]
@@ -110,9 +109,7 @@ class LevelContent:
     fps: float
     unit: int = 1
     placed: AtlasLayout | None = None
-    parts: Parts | None = None
     part_frames: int = 0
-    originals: Textures | None = None
 
     @cached_property
     def layout(self) -> AtlasLayout:
@@ -142,33 +139,21 @@ class LevelContent:
         params: VideoSettings,
         crf: int,
         frames: int | None = None,
-        regions: Regions = nowhere,
+        regions: Sequence[Region] = (),
     ) -> None:
         """Encode the first `frames` pictures (all by default); `crf` on the encoder's own scale."""
         count, layout = self.frames if frames is None else frames, self.layout
-        regions = regions if codec.regions else nowhere
-        size, options = (layout.width, layout.height), codec.options(params, crf)
-        if self.parts is None:
-            pictures = (pack_frame(self.frame(index), layout) for index in range(count))
-            encode_video(path, pictures, size, self.rate, codec, options, regions(range(count)))
-            return
+        options = codec.options(params, crf)
         step = self.part_frames if self.part_frames and frames is None else count
-        borders = [*range(0, count, step), count]
-        options = codec.of_part(options) if self.part_frames else options
-        encode_parts(path, self._filmed(regions), borders, codec, options, self.parts)
-
-    def _filmed(self, regions: Regions) -> Filmed:
-        layout, textures = self.layout, self.originals or self.textures
-        used = [layer.source for layer in self.layers]
-        side = self.textures.image(used[0], 0).shape[0]
-        made = repr(([layer.crop for layer in self.layers], used, layout.rects, layout.unit, side))
-        return Filmed(
-            picture=lambda k: pack_frame(self.frame(k), layout),
-            sources=lambda k: (textures.image(layer, k) for layer in used),
-            size=(layout.width, layout.height),
-            rate=self.rate,
-            made=made,
-            regions=regions,
+        encode_parts(
+            path,
+            lambda k: pack_frame(self.frame(k), layout),
+            [*range(0, count, step), count],
+            (layout.width, layout.height),
+            self.rate,
+            codec,
+            codec.of_part(options) if self.part_frames else options,
+            regions if codec.regions else (),
         )
 
 
@@ -179,7 +164,8 @@ def write_level(
     params: AssetSettings,
     crfs: Mapping[CodecName, int] | None = None,
     shared: Level | None = None,
-    regions: Regions = nowhere,
+    regions: Sequence[Region] = (),
+    encoded: Mapping[CodecName, Path] | None = None,
 ) -> Level:
     """Write the files of one level into `folder`: NAME_meshes.bin, NAME.mp4 ...; returns its part of the manifest.
 
@@ -187,6 +173,7 @@ def write_level(
         crfs: codec -> factor on the encoder's own scale; by default what `params.video.crf` means for it.
         shared: a level of the same layers whose meshes are this one's, too.
         regions: of the picture, coded finer or coarser.
+        encoded: videos that are made already.
 
     Raises:
         UserError: if the textures do not fit into one video, or an encoder refuses them.
@@ -204,7 +191,10 @@ def write_level(
         # Two codecs may share a container: the first has the plain name.
         path = path if not path.exists() else path.with_name(f"{name}_{codec.name}.{codec.container}")
         crf = codec.crf(params.video.crf) if crfs is None else crfs[codec.name]
-        content.encode(path, codec, params.video, crf, regions=regions)
+        if encoded and codec.name in encoded:
+            shutil.copyfile(encoded[codec.name], path)
+        else:
+            content.encode(path, codec, params.video, crf, regions=regions)
         videos.append(_video_entry(path, codec))
     texture = Texture(
         width=layout.width,

@@ -17,10 +17,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import closest_rotation
 from facefolds_core.captures.gathering import Calibration
-from facefolds_core.captures.normalization import nearest_to_axes
 from facefolds_core.errors import UserError
-from facefolds_core.facts import Fact, fact
-from facefolds_core.geometry.cameras import Camera
 
 Array = NDArray[np.float64]
 
@@ -125,45 +122,12 @@ def mean_calibration(some: Sequence[Calibration]) -> Calibration:
     return replace(first, K=K, w2c=_mean_pose([c.w2c for c in some]), coefficients=coefficients)
 
 
-def jitter(cameras: Sequence[Sequence[Calibration]]) -> list[Fact]:
-    """A note on cameras whose pictures were calibrated one by one: how far these calibrations are from their means.
-
-    It is measured in pixels, on points about the point nearest to all optical axes.
-
-    Args:
-        cameras: the calibrations of each, all for pictures of one size.
-    """
-    sizes = [c[0].size for c in cameras]
-    means = [
-        Camera(m.name, m.K, m.w2c, *(size or (1, 1)))
-        for m, size in zip([mean_calibration(some) for some in cameras], sizes, strict=True)
-    ]
-    target = nearest_to_axes(means)
-    moved = {}
-    for mean, some in zip(means, cameras, strict=True):
-        if len(some) > 1:
-            each = [replace(mean, K=one.K, w2c=one.w2c) for one in some]
-            moved[mean.name] = _shift(each, mean, target)
-    if not moved:
-        return []
-    worst = max(moved, key=lambda name: moved[name])
-    return [fact("calibration_varies", cameras=len(moved), worst=worst, pixels=moved[worst])]
-
-
 def _mean_pose(poses: Sequence[Array]) -> Array:
     """(3, 4): mean centre and mean rotation of poses (3, 4) of one camera."""
     centre = np.mean([-pose[:, :3].T @ pose[:, 3] for pose in poses], axis=0)
     rotation = closest_rotation(np.concatenate([np.mean([p[:, :3] for p in poses], axis=0), np.zeros((3, 1))], 1))
     rotation[:, 3] = -rotation[:, :3] @ centre
     return rotation
-
-
-def _shift(cameras: Sequence[Camera], mean: Camera, target: Array) -> float:
-    """Pixels by which cameras differ from their mean, at most, on points at and around `target` (3,)."""
-    reach = 0.1 * float(np.linalg.norm(mean.centre - target))
-    points = target + reach * np.concatenate([np.zeros((1, 3)), mean.rotation[:2], -mean.rotation[:2]])
-    straight = mean.project(points)[0]
-    return max(float(np.linalg.norm(camera.project(points)[0] - straight, axis=1).max()) for camera in cameras)
 
 
 def _by_pose(shots: Sequence[Shot]) -> list[list[int]]:

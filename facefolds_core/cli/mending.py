@@ -93,22 +93,8 @@ def is_rwlock(path: Path) -> bool:
 
 
 def _move_away(path: Path) -> str:
-    """Delete an empty file; rename another, so that nothing that it holds is lost. What was done, in words."""
-    if not path.read_bytes().strip():
-        path.unlink()
-        done = f"{_name(path)} was empty: deleted"
-    else:
-        aside = _free_name(path)
-        path.rename(aside)
-        done = f"{_name(path)} was damaged: it is {aside.name} now"
+    """Rename a file, so that nothing that it holds is lost. What was done, in words."""
+    aside = path.with_name(f"{path.name}.damaged-{time.time_ns()}")
+    path.rename(aside)
     rest = "; `dvc repro` makes it anew and takes finished stages from its cache" if path.name == "dvc.lock" else ""
-    return f"{done}, as a DVC that was killed leaves it{rest}"
-
-
-def _name(path: Path) -> str:
-    return os.path.relpath(path)
-
-
-def _free_name(path: Path) -> Path:
-    names = (path.with_name(f"{path.name}.damaged{number or ''}") for number in range(1000))
-    return next(name for name in names if not os.path.lexists(name))
+    return f"{os.path.relpath(path)} was damaged, as a DVC that was killed leaves it: it is {aside.name} now{rest}"

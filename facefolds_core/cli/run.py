@@ -14,14 +14,13 @@ from dvc.config import Config
 from facefolds_core.cli.mending import mend
 from facefolds_core.cluster.engine import cluster_of, default_jobs, run_jobs
 from facefolds_core.cluster.job import Job, Outcome
-from facefolds_core.cluster.jobs import how_to_repeat, read_grid, record, subject_jobs, sweep_jobs
+from facefolds_core.cluster.jobs import read_grid, record, subject_jobs, sweep_jobs
 from facefolds_core.config.params_file import load_params
 from facefolds_core.errors import UserError, report_user_errors
 from facefolds_core.files.writing import write_text
 from facefolds_core.sweeps.table import Run, figures_of, write_runs
 
 LOGS = Path(".dvc", "tmp", "jobs", "logs")
-CELLS = LOGS.with_name("cells")
 
 
 def command(
@@ -50,7 +49,7 @@ def command(
             needs = {"memory": float(parse_bytes(memory)), "gpu": float(gpu)}
         except ValueError as error:
             raise UserError("not an amount of memory", place="--memory", found=memory, expected="14GB") from error
-        outcomes = _run_all(root, todo, cells, scheduler, jobs or default_jobs(), needs, remote)
+        outcomes = _run_all(root, todo, scheduler, jobs or default_jobs(), needs, remote)
         if sweep:
             _keep_sweep(out, outcomes, cells)
         else:
@@ -64,7 +63,6 @@ def command(
 def _run_all(
     root: Path,
     todo: Sequence[Job],
-    cells: Mapping[Job, Mapping[str, object]],
     scheduler: str | None,
     jobs: int,
     needs: Mapping[str, float],
@@ -88,8 +86,7 @@ def _run_all(
             typer.echo(f"run: {outcome.job.name}: {outcome.state} after {outcome.seconds:.0f} s")
             if outcome.error:
                 told = outcome.error.replace("\n", "\n  ")
-                again = how_to_repeat(outcome.job, cells.get(outcome.job), CELLS)
-                typer.echo(f"  {told}\n  all of it in {log}; to repeat it: {again}")
+                typer.echo(f"  {told}\n  all of it in {log}; the same command runs only what failed again")
     return [found[job] for job in todo]
 
 

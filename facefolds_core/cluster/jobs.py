@@ -11,9 +11,6 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from zlib import crc32
-
-import yaml
 
 from facefolds_core.cluster.dvc import THEN
 from facefolds_core.cluster.job import RUNNING, Job, Outcome
@@ -23,7 +20,6 @@ from facefolds_core.config.params_file import Params
 from facefolds_core.errors import UserError
 from facefolds_core.files.parsing import brief, parse_yaml
 from facefolds_core.files.reading import read_text
-from facefolds_core.files.writing import write_text
 from facefolds_core.sweeps.edit import set_for_subject
 
 BUSY = "is busy, it is being blocked by"
@@ -88,23 +84,6 @@ def sweep_jobs(
             links = links_of(params, root, subject)
             jobs[Job(name, subject, f"{stage}@{subject}", new, links, locks[subject])] = cell
     return jobs
-
-
-def how_to_repeat(job: Job, cell: Mapping[str, Any] | None, folder: Path) -> str:
-    """The command that runs a failed job again, alone.
-
-    Args:
-        cell: the values of a sweep's job; they go into a file of `folder`, a sweep of this one cell.
-    """
-    if cell is None:
-        return f"dvc repro {job.target}"
-    text = yaml.safe_dump({key: [value] for key, value in cell.items()})
-    # Named by what it says: the repetition, whose only cell has another number, leaves other cells' files alone.
-    path = folder / f"{job.subject}-{crc32(text.encode()):08x}.yaml"
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(path, text)
-    stage = job.target.split("@")[0]
-    return f"facefolds run --subjects {job.subject} --sweep {path} --to {stage} --out {path.with_suffix('.csv')}"
 
 
 def record(root: Path, outcomes: Sequence[Outcome], pull: bool, everybody: bool) -> tuple[list[str], str]:

@@ -54,7 +54,6 @@ def digests_of_stages(root: Path, stages: Iterable[str]) -> dict[str, dict[str, 
 CALLED_BY = {
     "spec": "facefolds_core.model.storage",
     "build": "facefolds_core.model.storage",
-    "fit": "facefolds_core.training.trainers",
     "train": "facefolds_core.training.trainers",
 }
 """Function of a model's module (facefolds_core/training/trainers) -> module that calls it."""

@@ -22,7 +22,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.meshes import Surface, TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window, texel_uv, uv_to_st
 from facefolds_core.params import DecimateParams
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 
 AGGRESSIVENESS = (3, 5, 7)
 """Of the simplification, tried in turn until the target is reached."""
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 
 def decimate_layers(
-    surfaces: Sequence[Surface], grids: Grids, resolution: int, params: DecimateParams, progress: bool = True
+    surfaces: Sequence[Surface], grids: Grids, resolution: int, params: DecimateParams
 ) -> list[TexturedMesh]:
     """Decimate all layers to at most resolution x resolution vertices and give them texture coordinates.
 
@@ -49,7 +49,7 @@ def decimate_layers(
             remedy="run `dvc repro`, which makes both again",
         )
     meshes = []
-    for i, surface in enumerate(progress_bar(surfaces, desc="decimation", unit="layer", disable=not progress)):
+    for i, surface in enumerate(progress(surfaces, desc="decimation", unit="layer")):
         coarse = decimate(surface, resolution**2, grids.chart)
         if len(coarse.faces) == 0:
             raise UserError(

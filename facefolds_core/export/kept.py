@@ -58,32 +58,6 @@ class KeptFrames:
                 self._store = FrameStore(folder / STORE)
                 self._known = {str(digest): int(frame) for digest, frame in known.items()}
 
-    def rows(
-        self,
-        frames: Iterable[int],
-        layers: int,
-        digest: Callable[[int], str],
-        make: Callable[[int], Image],
-        done: Callable[[], object],
-    ) -> Iterator[tuple[int, int, Image]]:
-        """All images, frame by frame.
-
-        Args:
-            frames: in their order.
-            layers: N.
-            digest: of what a frame is made; not asked for where nothing is kept.
-            make: makes a frame's images (N, S, S, 4).
-            done: called after each frame.
-        """
-        for frame in frames:
-            images = None
-            if self.folder is not None:
-                found = self._made[frame] = digest(frame)
-                images = None if found not in self._known else self._images(self._known[found], layers)
-            for layer, image in enumerate(make(frame) if images is None else images):
-                yield layer, frame, image
-            done()
-
     def groups(
         self,
         groups: Iterable[Sequence[int]],
@@ -122,15 +96,8 @@ class KeptFrames:
             return None
         return (store.image(layer, frame) for frame in frames)
 
-    def _images(self, frame: int, layers: int) -> list[Image] | None:
-        assert self._store is not None
-        try:
-            return [self._store.image(layer, frame) for layer in range(layers)]
-        except UserError:
-            return None
-
     def keep(self, store: Path) -> None:
-        """Keep what `rows` gave instead, as it was written; the file is linked where that is possible."""
+        """Keep what `groups` gave instead, as it was written; the file is linked where that is possible."""
         if self.folder is None:
             return
         self._store = None

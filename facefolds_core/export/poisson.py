@@ -23,7 +23,7 @@ from facefolds_core.export.stores import Grids
 from facefolds_core.geometry.meshes import Surface
 from facefolds_core.geometry.sphere_uv import row_strides
 from facefolds_core.params import ReconstructParams
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 from facefolds_core.system.processes import end_with_parent
 
 POINT_WEIGHT = 4.0
@@ -55,7 +55,7 @@ class Samples:
     spacing: Array
 
 
-def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool = True) -> list[Surface]:
+def reconstruct_layers(grids: Grids, params: ReconstructParams) -> list[Surface]:
     """All layers, outermost first, on as many processes as there are processors (at most one a layer).
 
     Raises:
@@ -63,7 +63,7 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams, progress: bool =
     """
     jobs = [(gather_samples(grids, i, params.resolution), params, i) for i in range(grids.num_layers)]
     workers = min(len(jobs), os.cpu_count() or 1)
-    with progress_bar(total=len(jobs), desc="surfaces", unit="layer", disable=not progress) as bar:
+    with progress(total=len(jobs), desc="surfaces", unit="layer") as bar:
         if workers == 1:
             return [_advance(bar, _reconstruct_job(job)) for job in jobs]
         with ProcessPoolExecutor(workers, initializer=end_with_parent) as pool:

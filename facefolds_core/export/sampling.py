@@ -6,7 +6,7 @@ Only the model's own interface is used, so that any model can be exported.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,15 +15,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.bilinear import Projection
-from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.export.stores import Grids
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import Window, row_strides, texel_uv, uv_to_st
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 
 if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
@@ -47,14 +45,13 @@ def samples_for(model: RadianceManifolds, window: Window) -> int:
     return max(LEAST, min(4096, 64 * math.ceil(max(rows * height, columns * width) / 64 - 1e-6)))
 
 
-def sample_grids(model: RadianceManifolds, resolution: int, window: Window, progress: bool = True) -> Grids:
+def sample_grids(model: RadianceManifolds, resolution: int, window: Window) -> Grids:
     """N grids of R x R points at the texel centres of `window`, with normals.
 
     Args:
         model: asked for its `surface_points`.
         resolution: R.
         window: (u0, u1, v0, v1), the same for all layers.
-        progress: show a progress bar.
 
     Raises:
         UserError: if the model gives a point that is not finite, or a layer has no point at all.
@@ -67,7 +64,7 @@ def sample_grids(model: RadianceManifolds, resolution: int, window: Window, prog
     points = np.zeros((model.num_layers, resolution, resolution, 3), np.float32)
     valid = np.zeros((model.num_layers, resolution, resolution), bool)
     flat_points, flat_valid = points.reshape(model.num_layers, -1, 3), valid.reshape(model.num_layers, -1)
-    with torch.no_grad(), progress_bar(total=len(uv), desc="points", unit="direction", disable=not progress) as bar:
+    with torch.no_grad(), progress(total=len(uv), desc="points", unit="direction") as bar:
         for start in range(0, len(uv), DIRECTIONS_AT_ONCE):
             stop = start + DIRECTIONS_AT_ONCE
             found, hit = model.surface_points(uv[start:stop])
@@ -139,13 +136,8 @@ def grid_normals(points: NDArray[np.float32], valid: NDArray[np.bool_], chart: C
     return np.where((normal * outward).sum(-1, keepdims=True) < 0, -normal, normal)
 
 
-def texture_rows(
-    model: RadianceManifolds, grids: Grids, kept: KeptFrames | None = None, progress: bool = True
-) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
+def texture_rows(model: RadianceManifolds, grids: Grids) -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
     """Texture images: frame by frame, in each the layers from the outermost in.
-
-    Args:
-        kept: of an earlier run; frames whose texels are the same are taken over.
 
     Yields:
         (layer, frame, (R, R, 4) uint8 RGBA, straight alpha). Alpha is 0 where the layer has no point.
@@ -154,20 +146,9 @@ def texture_rows(
         UserError: if the model gives a colour or an alpha that is not finite.
     """
     sheets = [_Sheet(model, n, grids.window(n), grids.valid[n]) for n in range(grids.num_layers)]
-    grid = model.texel_grid()
-    shape = None if grid is None else (*grid.shape, *grid.window)
-    parts = {"windows": grids.windows, "valid": grids.valid, "grid": shape, "code": digest_of_packages("export")}
-    common = digest_of(parts)
-
-    def digest(frame: int) -> str:
-        return digest_of_frame(common, (sheet.texels(frame) for sheet in sheets))
-
-    def make(frame: int) -> NDArray[np.uint8]:
-        return np.stack([sheet.image(frame) for sheet in sheets])
-
-    earlier = KeptFrames(None) if kept is None else kept
-    with progress_bar(total=model.num_frames, desc="textures", unit="frame", disable=not progress) as bar:
-        yield from earlier.rows(range(model.num_frames), len(sheets), digest, make, lambda: bar.update())
+    for frame in progress(range(model.num_frames), desc="textures", unit="frame"):
+        for layer, sheet in enumerate(sheets):
+            yield layer, frame, sheet.image(frame)
 
 
 class _Sheet:
@@ -221,33 +202,18 @@ def _texels(model: RadianceManifolds, uv: Tensor, layer: int, frame: int) -> NDA
     return np.asarray(rgba.clamp(0, 1).cpu().numpy(), np.float32)
 
 
-def write_textures(
-    path: Path,
-    model: RadianceManifolds,
-    grids: Grids,
-    kept: Path | None = None,
-    among: Collection[int] | None = None,
-    progress: bool = True,
-) -> NDArray[np.uint8]:
+def write_textures(path: Path, model: RadianceManifolds, grids: Grids) -> NDArray[np.uint8]:
     """Write all texture images to a layered frame store (camera := layer), holding one frame's in memory.
 
-    Args:
-        kept: folder of an earlier run's; of a model without texels of its own nothing is taken over, since to ask it
-            is what takes the time.
-        among: frames whose alpha is looked at; all by default.
-
     Returns:
-        (N, R, R) largest alpha of any of those frames.
+        (N, R, R) largest alpha of any frame.
     """
     opacity = np.zeros(grids.valid.shape, np.uint8)
-    earlier = KeptFrames(None if model.texel_grid() is None else kept)
 
     def rows() -> Iterator[tuple[int, int, NDArray[np.uint8]]]:
-        for layer, frame, image in texture_rows(model, grids, earlier, progress):
-            if among is None or frame in among:
-                np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
+        for layer, frame, image in texture_rows(model, grids):
+            np.maximum(opacity[layer], image[..., 3], out=opacity[layer])
             yield layer, frame, image
 
     write_frames(path, (grids.resolution, grids.resolution, 4), rows(), packed=True)
-    earlier.keep(path)
     return opacity

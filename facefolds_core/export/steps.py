@@ -59,24 +59,19 @@ def sample_model(
     cameras: Sequence[Camera],
     params: SampleParams,
     folder: Path,
-    kept: Path | None = None,
-    keys: Sequence[int] | None = None,
 ) -> Grids:
     """N grids of R x R points and normals; the textures of all frames go to `folder`/textures.arrow.
 
     Args:
         cameras: for training: they decide what the window must hold.
-        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
-        keys: the key frames of a take in segments, for `params.opacity`; None where all frames were trained at once.
     """
     from facefolds_core.export.sampling import sample_grids, samples_for, write_textures
     from facefolds_core.export.window import visible_window
 
-    among = keys if params.opacity == "key_frames" else None
-    window = visible_window(model, cameras, among=among) if params.window == "auto" else model.window
+    window = visible_window(model, cameras) if params.window == "auto" else model.window
     r = samples_for(model, window) if params.resolution == "auto" else params.resolution
     grids = sample_grids(model, r, window)
-    opacity = write_textures(folder / TEXTURES, model, grids, kept, among)
+    opacity = write_textures(folder / TEXTURES, model, grids)
     return replace(grids, opacity=opacity, reflection=model.reflection_maps())
 
 

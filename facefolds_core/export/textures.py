@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.inputs import check_textures
-from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.export.bilinear import Projection
-from facefolds_core.export.kept import KeptFrames, digest_of, digest_of_frame
 from facefolds_core.files.frame_store import FrameStore, write_frames
-from facefolds_core.progress import progress as progress_bar
+from facefolds_core.progress import progress
 
 Float = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -92,46 +90,25 @@ def fill_colour(premultiplied: Float, shown: NDArray[np.bool_]) -> Float:
     return np.asarray(colour, np.float32)
 
 
-def texture_rows(
-    store: FrameStore, size: int, kept: KeptFrames | None = None, progress: bool = True
-) -> Iterator[tuple[int, int, Image]]:
+def texture_rows(store: FrameStore, size: int) -> Iterator[tuple[int, int, Image]]:
     """All textures of a complete layered store, resampled: frame by frame, layers from the outermost in.
-
-    Args:
-        kept: of an earlier run; frames whose images are the same are taken over.
 
     Yields:
         (layer, frame, (size, size, 4) uint8).
     """
     last = store.keys()[-1]
-    layers, frames = range(last[0] + 1), range(last[1] + 1)
-    common = digest_of({"side": store.height, "size": size, "code": digest_of_packages("export")})
-
-    def digest(frame: int) -> str:
-        return digest_of_frame(common, (store.image(layer, frame) for layer in layers))
-
-    def make(frame: int) -> Image:
-        return np.stack([resample(store.image(layer, frame), size) for layer in layers])
-
-    earlier = KeptFrames(None) if kept is None else kept
-    with progress_bar(total=len(frames), desc="textures", unit="frame", disable=not progress) as bar:
-        yield from earlier.rows(frames, len(layers), digest, make, lambda: bar.update())
+    for frame in progress(range(last[1] + 1), desc="textures", unit="frame"):
+        for layer in range(last[0] + 1):
+            yield layer, frame, resample(store.image(layer, frame), size)
 
 
-def resample_store(
-    source: Path, target: Path, size: int, kept: Path | None = None, progress: bool = True
-) -> FrameStore:
+def resample_store(source: Path, target: Path, size: int) -> FrameStore:
     """Resample a layered frame store (camera := layer) to `size` x `size`; returns the source.
-
-    Args:
-        kept: folder of what an earlier run made, from which frames are taken over that would be the same; or None.
 
     Raises:
         UserError: if the source is missing, damaged, or not a complete set of square RGBA images.
     """
     store = FrameStore(source)
     check_textures(store)
-    earlier = KeptFrames(kept)
-    write_frames(target, (size, size, 4), texture_rows(store, size, earlier, progress), packed=True)
-    earlier.keep(target)
+    write_frames(target, (size, size, 4), texture_rows(store, size), packed=True)
     return store

@@ -37,23 +37,17 @@ MARGIN = 2.0
 """Margin on each side, in steps of the lattice of rays on the surface."""
 
 
-def visible_window(
-    model: RadianceManifolds,
-    cameras: Sequence[Camera],
-    among: Sequence[int] | None = None,
-) -> Window:
+def visible_window(model: RadianceManifolds, cameras: Sequence[Camera]) -> Window:
     """Bounding window (u0, u1, v0, v1), with a margin, of all that changes a training ray by more than `MAX_CHANGE`.
 
     Args:
         model: looked at without its view branch, in its first, middle and last frame.
         cameras: the training cameras.
-        among: frames of which those are the first, the middle and the last; all by default.
 
     Returns:
         the window, cut to the model's; the model's if it is transparent everywhere.
     """
-    known = range(model.num_frames) if among is None else sorted(among)
-    frames = spread(known, FRAMES)
+    frames = spread(range(model.num_frames), FRAMES)
     low, high, margin = np.full(2, np.inf), np.full(2, -np.inf), 0.0
     for camera in cameras:
         stride = max(1, math.ceil(math.sqrt(camera.width * camera.height / RAYS_PER_CAMERA)))

@@ -96,7 +96,7 @@ class SubjectFolders:
 
     @property
     def evaluation(self) -> Path:
-        """evaluate: `per_image.parquet`, `contact_sheet.png`, `analysis.json` and its `pictures`."""
+        """evaluate: `per_image.parquet`, `contact_sheet.png`, `worst.png`, films, pictures of bad training views."""
         return self.root / "evaluation"
 
     @property

@@ -139,12 +139,12 @@ def mean_rotation(rotations: Sequence[Array] | Array) -> Array:
     return np.asarray(u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt)
 
 
-def rigid_motion(source: Array, target: Array, rounds: int = 10) -> tuple[Array, Array]:
+def rigid_motion(source: Array, target: Array) -> tuple[Array, Array]:
     """R, t with target = R source + t for points (V, 3), robustly (Procrustes; Cauchy's weights at twice the median
     residual): what moves by itself, as a jaw, counts little."""
     weights = np.ones(len(source))
     R, t = np.eye(3), np.zeros(3)
-    for _ in range(rounds):
+    for _ in range(10):
         a = np.average(source, axis=0, weights=weights)
         b = np.average(target, axis=0, weights=weights)
         u, _, vt = np.linalg.svd((target - b).T @ (weights[:, None] * (source - a)))

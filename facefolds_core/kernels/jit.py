@@ -6,8 +6,8 @@ Freed to reassociate and to contract, LLVM rounds the two differently, and a fir
 IEEE arithmetic every optimisation keeps every bit, so that it also does not matter what a CPU offers.
 
 **The cache's key.** numba's own names the kernel's file, its bytecode, the types of its arguments, numba's version, and
-the CPU with its features. It misses what is built in from other files. Ours adds `fingerprint`: everything that the
-kernel compiles, functions and constants, wherever they come from.
+the CPU with its features. It misses what is built in from other files. Ours adds `fingerprint`: the text of the
+modules that the kernel's functions and constants can come from.
 """
 
 # numba has no types:
@@ -15,13 +15,13 @@ kernel compiles, functions and constants, wherever they come from.
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import sys
-import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
-from types import EllipsisType
 from typing import Any, TypeVar, cast, overload
 
 import llvmlite
@@ -67,88 +67,43 @@ def inlined(function: Code) -> Code:
 
 
 def fingerprint(function: Any) -> str:
-    """SHA-256 of what compiling a kernel builds in: bytecode, constants, options, of itself and of all that it calls.
-
-    Raises:
-        TypeError: if it uses a global of a kind that this function cannot judge.
-    """
-    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
-    for part in _parts(function, (), set()):
-        digest.update(len(part).to_bytes(8, "little") + part)
+    """SHA-256 of what compiling a kernel builds in: its options, and the text of its module and of all that this
+    imports of its own package."""
+    code = function.py_func if isinstance(function, Dispatcher) else function
+    options = sorted(function.targetoptions.items()) if isinstance(function, Dispatcher) else []
+    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {options!r}".encode())
+    for name in sorted(_known(code.__module__)):
+        digest.update(_text(name).encode())
     return digest.hexdigest()
 
 
-def _parts(value: Any, names: tuple[str, ...], seen: set[Any]) -> Iterator[bytes]:
-    """What there is to say of a value that a kernel uses; `names` are the attributes that may be read of a module."""
-    if value is None or isinstance(value, bool | int | float | complex | str | bytes | np.generic | EllipsisType):
-        yield f"{type(value).__name__} {value!r}".encode()
-    elif isinstance(value, tuple | frozenset):
-        items = sorted(value, key=repr) if isinstance(value, frozenset) else value
-        yield f"{type(value).__name__} {len(value)}".encode()
-        for item in items:
-            yield from _parts(item, names, seen)
-    elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
-        yield f"{value.dtype.str} {value.shape}".encode()
-        yield value.tobytes()
-    elif id(value) in seen or (id(value), names) in seen:
-        yield b"seen"
-    elif isinstance(value, Dispatcher):
-        seen.add(id(value))
-        for option in sorted(value.targetoptions):
-            yield f"{option} {value.targetoptions[option]!r}".encode()
-        yield from _parts(value.py_func, names, seen)
-    elif isinstance(value, types.FunctionType) and _ours(value.__module__):
-        seen.add(id(value))
-        yield from _function_parts(value, seen)
-    elif isinstance(value, types.ModuleType):
-        seen.add((id(value), names))
-        yield value.__name__.encode()
-        for name in names:
-            if hasattr(value, name):
-                yield name.encode()
-                yield from _parts(getattr(value, name), names, seen)
-    elif isinstance(value, types.CodeType):
-        yield from _code_parts(value, seen)
-    elif callable(value) and hasattr(value, "__name__"):  # of numpy, numba or Python: their versions are in the key
-        yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
-        if str(value.__module__).startswith(__package__):  # an intrinsic: what it builds, no bytecode says
-            yield Path(str(sys.modules[value.__module__].__file__)).read_bytes()
-    else:
-        raise TypeError(f"a kernel uses a global of type {type(value).__name__}: make it a number, a tuple, an array")
+def _known(module: str) -> set[str]:
+    """The module and those of its package that it imports, directly or not."""
+    found, left = set[str](), [module]
+    while left:
+        name = left.pop()
+        if name not in found and name.split(".")[0] == module.split(".")[0] and _text(name):
+            found.add(name)
+            left += _imported(name)
+    return found
 
 
-def _function_parts(function: types.FunctionType, seen: set[Any]) -> Iterator[bytes]:
-    """Bytecode, defaults and closure of a Python function, and the globals that it names."""
-    code = function.__code__
-    names = tuple(sorted(set(names_of(code))))
-    yield from _code_parts(code, seen)
-    yield from _parts(function.__defaults__ or (), names, seen)
-    for cell in function.__closure__ or ():
-        yield from _parts(cell.cell_contents, names, seen)
-    for name in names:
-        if name in function.__globals__:
-            yield name.encode()
-            yield from _parts(function.__globals__[name], names, seen)
+@cache
+def _text(module: str) -> str:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return Path(file).read_text(encoding="utf-8") if file else ""
 
 
-def _code_parts(code: types.CodeType, seen: set[Any]) -> Iterator[bytes]:
-    yield code.co_code
-    yield repr((code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)).encode()
-    for constant in code.co_consts:
-        yield from _parts(constant, (), seen)
-
-
-def names_of(code: types.CodeType) -> Iterator[str]:
-    """Globals and attributes that a function names, functions inside it included."""
-    yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from names_of(constant)
-
-
-def _ours(module: str | None) -> bool:
-    """Not of a library whose version is in the key, or of Python, whose version names the cache's files."""
-    return (module or "").split(".")[0] not in ("numpy", "numba", "math", "builtins")
+@cache
+def _imported(module: str) -> tuple[str, ...]:
+    """Names of modules that it may import: of `from a import b`, both a and a.b."""
+    found = list[str]()
+    for node in ast.walk(ast.parse(_text(module))):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(found)
 
 
 class _Files(IndexDataCacheFile):

@@ -31,12 +31,8 @@ Spec = BaseModel
 """What is written of a model: its `kind`, and its own fields."""
 
 
-SCALES_1 = {"input_scale": 6.0, "output_scale": 1.0}
-"""Of models of version 1, which do not name them."""
-
-
 class ModelSpec(BaseModel):
-    """Everything that is needed to build a model but its numbers. Version 1 is read as version 2.
+    """Everything that is needed to build a model but its numbers.
 
     Attributes:
         centre: c, units.
@@ -69,13 +65,6 @@ class ModelSpec(BaseModel):
     input_scale: float = 6.0
     output_scale: float = 1.0
     fingerprint: str = ""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_version_1(cls, value: Any) -> Any:
-        if isinstance(value, dict) and value.get("version") == 1 and not SCALES_1.keys() & value.keys():
-            return {**value, "version": 2, **SCALES_1}
-        return value
 
 
 def _sound_belt(belt: Belt | None) -> Belt | None:
@@ -221,14 +210,6 @@ def read_spec(folder: Path) -> Spec:
         ) from None
 
 
-def _describes(description: str, spec: Spec) -> bool:
-    """Whether a description in JSON, of this version or an older one, says the same as `spec`."""
-    try:
-        return _specs().validate_json(description) == spec
-    except ValidationError:
-        return False
-
-
 def load_model(folder: str | Path, device: torch.device | str = "cpu") -> RadianceManifolds:
     """The trained model of a folder, in evaluation mode.
 
@@ -239,7 +220,7 @@ def load_model(folder: str | Path, device: torch.device | str = "cpu") -> Radian
     spec = read_spec(folder)
     path = folder / "model.safetensors"
     tensors, metadata = read_tensors(path, _REMEDY)
-    if not _describes(metadata.get("spec", ""), spec):
+    if metadata.get("spec") != spec.model_dump_json():
         raise UserError(
             "model.safetensors and model.json are of different models",
             file=path,

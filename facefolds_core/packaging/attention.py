@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.asset.packing import MACROBLOCK, AtlasLayout
-from facefolds_core.asset.regions import QUANTISERS, Region, Regions, nowhere
+from facefolds_core.asset.regions import QUANTISERS, Region
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import AttentionParams
@@ -41,28 +41,16 @@ Weights = NDArray[np.float64]
 """(rows, columns), mean W of the texels of each macroblock of the picture."""
 
 
-def regions_of(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Regions:
+def regions_of(content: LevelContent, cameras: Sequence[Camera], params: AttentionParams) -> Sequence[Region]:
     """The regions of a level's pictures; none without cameras, or where all is to be coded alike.
 
     Args:
         cameras: for training, in the head's own frame.
     """
     if params.strength == 0 or not cameras:
-        return nowhere
-    known = dict[tuple[int, ...], tuple[Region, ...]]()
-    views = list[View]()
-
-    def of(frames: range) -> Sequence[Region]:
-        chosen = tuple(spread(range(content.frames), FRAMES))
-        if params.of == "segment" and content.part_frames:
-            chosen = (frames[len(frames) // 2],)
-        if not views:
-            views.extend(views_of(content, cameras))
-        if chosen not in known:
-            known[chosen] = tuple(merged(offsets(block_weights(content, views, chosen), params.strength)))
-        return known[chosen]
-
-    return of
+        return ()
+    weights = block_weights(content, views_of(content, cameras), spread(range(content.frames), FRAMES))
+    return tuple(merged(offsets(weights, params.strength)))
 
 
 View = tuple[Hits, float]

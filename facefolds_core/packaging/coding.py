@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from facefolds_core.asset.codecs import CODECS, Codec
 from facefolds_core.asset.manifest import Level, Quality
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.regions import Regions
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import decode_video, unpack_picture
 from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
@@ -17,6 +17,7 @@ from facefolds_core.packaging import rate
 from facefolds_core.packaging.attention import regions_of
 from facefolds_core.packaging.settings import LevelSetting, VideoSetting
 from facefolds_core.packaging.views import FRAMES, ViewMeter
+from facefolds_core.params import CodecName
 from facefolds_core.spacing import spread
 
 
@@ -45,37 +46,45 @@ def coded_level(
         shared: a level whose meshes are this one's, too.
     """
     setting = setting.fitted(content.layers, cameras)
-    video, crfs = setting.video, None
+    video, crfs, encoded = setting.video, dict[CodecName, int](), dict[CodecName, Path]()
     regions = regions_of(content, cameras, setting.attention)
-    if meter is not None and video.target_psnr is not None:
-        target = video.target_psnr
-        crfs = {codec: _crf(folder, content, regions, CODECS[codec], video, meter, target) for codec in video.codec}
-    level = write_level(folder, name, content, setting, crfs, shared, regions)
+    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
+        if meter is not None and video.target_psnr is not None:
+            for codec in (CODECS[name] for name in video.codec):
+                crf = _crf(Path(scratch), content, regions, codec, video, meter, video.target_psnr)
+                crfs[codec.name] = crf
+                if content.frames <= rate.FRAMES and not content.part_frames:
+                    encoded[codec.name] = _trial(Path(scratch), codec, crf)
+        level = write_level(folder, name, content, setting, crfs or None, shared, regions, encoded)
     if meter is None:
         return level
     shown = read_level(folder, level)
     psnr = meter.psnr(enumerate(shown.frames()), meter.hits(shown.layers))
-    asked = None if crfs is None else video.target_psnr
+    asked = video.target_psnr if crfs else None
     return level.model_copy(update={"quality": Quality(psnr_to_model=round(psnr, 3), target_psnr=asked)})
+
+
+def _trial(folder: Path, codec: Codec, crf: int) -> Path:
+    return folder / f"{codec.name}_{crf}.{codec.container}"
 
 
 def _crf(
     folder: Path,
     content: LevelContent,
-    regions: Regions,
+    regions: Sequence[Region],
     codec: Codec,
     video: VideoSetting,
     meter: ViewMeter,
     target: float,
 ) -> int:
+    """The factor; `folder` has what was tried (`_trial`)."""
     layout = content.layout
-    with TemporaryDirectory(dir=folder) as scratch:  # a killed run leaves nothing elsewhere
-        path = Path(scratch) / f"trial.{codec.container}"
 
-        def quality(crf: int) -> float:
-            content.encode(path, codec, video, crf, min(content.frames, rate.FRAMES), regions)
-            pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
-            wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
-            return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
+    def quality(crf: int) -> float:
+        path = _trial(folder, codec, crf)
+        content.encode(path, codec, video, crf, min(content.frames, rate.FRAMES), regions)
+        pictures = decode_video(path, (layout.width, layout.height), float(content.rate))
+        wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
+        return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
 
-        return rate.search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf
+    return rate.search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from threading import Lock
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,22 +27,15 @@ class Resampled:
     """
 
     def __init__(self, textures: Textures, size: int, most: int = MOST_KEPT) -> None:
-        self._textures, self._size, self._most = textures, size, most
-        self._kept: dict[tuple[int, int], NDArray[np.uint8]] = {}
-        self._lock = Lock()
+        self._textures, self._size = textures, size
+        self._image = lru_cache(most)(self._resampled)
 
     def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
         """(size, size, 4)."""
-        found = self._kept.get((layer, frame))
-        if found is not None:
-            return found
-        found = resample(self._textures.image(layer, frame), self._size)
-        with self._lock:
-            while self._kept and len(self._kept) >= self._most:
-                del self._kept[next(iter(self._kept))]
-            if self._most:
-                self._kept[layer, frame] = found
-        return found
+        return self._image(layer, frame)
+
+    def _resampled(self, layer: int, frame: int) -> NDArray[np.uint8]:
+        return resample(self._textures.image(layer, frame), self._size)
 
 
 def coarse_content(
@@ -57,4 +50,4 @@ def coarse_content(
     size = min(level.texture_resolution, 3 * full.textures.image(0, 0).shape[0] // 4)
     textures = Resampled(full.textures, size)
     layers = crop_layers(meshes, windows, textures, full.frames)
-    return LevelContent(layers, textures, full.frames, full.fps, parts=full.parts, originals=full.textures)
+    return LevelContent(layers, textures, full.frames, full.fps)

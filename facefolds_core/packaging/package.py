@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,6 @@ from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import Level, Manifest
 from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
-from facefolds_core.asset.parts import Parts
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
 from facefolds_core.asset.streams import make_streams
@@ -33,7 +30,6 @@ from facefolds_core.asset.writer import (
     manifest_of,
 )
 from facefolds_core.captures.scene import Scene
-from facefolds_core.config.source_code import digest_of_packages
 from facefolds_core.errors import UserError
 from facefolds_core.export.stores import Grids
 from facefolds_core.files.frame_store import FrameStore
@@ -91,11 +87,8 @@ class Export:
         return cls(meshes, windows, FrameStore(textures), grids.chart.centre, coarser, grids.reflection)
 
 
-def package(folder: Path, export: Export, scene: Scene, params: CompressParams, kept: Path | None = None) -> Manifest:
+def package(folder: Path, export: Export, scene: Scene, params: CompressParams) -> Manifest:
     """Write the folder of an asset, whole or not at all; an older one is replaced.
-
-    Args:
-        kept: folder of what an earlier run encoded, from which is taken over what would be the same; or None.
 
     Raises:
         UserError: if the export cannot be an asset.
@@ -104,11 +97,11 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
     frames = check_inputs(export.meshes, export.windows, export.textures)
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, scene.poses)
     cameras, textures = training_cameras(scene), export.textures
-    with atomic_folder(folder) as temporary, kept_parts(kept, temporary) as parts:
+    with atomic_folder(folder) as temporary:
         streamed = is_streamed(params.stream, frames, source.fps)
         unit = stream_unit(params.levels, textures.image(0, 0).shape[0]) if streamed else 1
         layers = crop_layers(export.meshes, export.windows, textures, frames, unit)
-        full = LevelContent(layers, textures, frames, source.fps, unit, parts=parts)
+        full = LevelContent(layers, textures, frames, source.fps, unit)
         meter = make_meter(full, cameras)
         levels = []
         if streamed:
@@ -129,16 +122,6 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams, 
             made, sound, stream = make_streams(temporary, manifest.levels, manifest.audio)
             manifest = manifest.model_copy(update={"levels": tuple(made), "audio": sound, "stream": stream})
         return write_manifest(manifest, temporary / MANIFEST_NAME)
-
-
-@contextmanager
-def kept_parts(kept: Path | None, scratch: Path) -> Iterator[Parts]:
-    """Encoded parts in `kept`, of which those that this run needs stay; or in a folder of `scratch` that goes."""
-    common = digest_of_packages("asset", "packaging", "export", "spacing").encode()
-    with TemporaryDirectory(dir=scratch, prefix=".parts-") if kept is None else nullcontext(kept) as folder:
-        parts = Parts(Path(folder), common)
-        yield parts
-        parts.tidy()
 
 
 def _check_order(levels: Sequence[LevelParams]) -> None:

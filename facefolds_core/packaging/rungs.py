@@ -69,4 +69,4 @@ def _smaller(full: LevelContent, factor: int, resolution: int) -> LevelContent:
         crop = x // factor, y // factor, width // factor, height // factor
         layers.append(replace(layer, crop=crop))
     placed, unit = full.layout.scaled(factor), full.unit // factor
-    return replace(full, layers=layers, textures=textures, unit=unit, placed=placed, originals=full.textures)
+    return replace(full, layers=layers, textures=textures, unit=unit, placed=placed)

@@ -75,10 +75,6 @@ class AttentionParams(Section):
     """Steps of the quantiser for each halving of what an error does to the pictures; 0 codes all alike (the paper's
     setting)."""
 
-    of: Literal["take", "segment"] = "take"
-    """For segments of a stream: look at frames of the whole take, or at the segment's middle frame. With "segment" a
-    changed frame costs its own segments only."""
-
 
 class StreamParams(Section):
     """Long takes as streams of segments, at the quality that the connection allows."""

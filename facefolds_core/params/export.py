@@ -20,10 +20,6 @@ class SampleParams(Section):
     """ "full" is all that the model has (the paper's hemisphere); "auto" is the part outside of which no training ray
     changes by more than 1/255."""
 
-    opacity: Literal["all", "key_frames"] = "all"
-    """Frames by which it is decided where a layer shows, and so how its mesh is made. With "key_frames", those of a
-    take in segments, a change of another frame leaves the meshes as they are."""
-
 
 class ReconstructParams(Section):
     """A surface from the samples of each layer."""

@@ -15,9 +15,9 @@ class ReflectionParams(Section):
     enabled: bool = True
     """Try a reflection; it is left out all the same where it does not help."""
 
-    begin: Literal["rounds", "full", "end"] = "rounds"
-    """When the reflection is first fitted: in the first round of geometry, at full resolution, or to finished textures.
-    "end" is best for programs that cannot draw it (GLB, OpenUSD)."""
+    begin: Literal["rounds", "end"] = "rounds"
+    """When the reflection is first fitted: in the first round of geometry, or to finished textures. "end" is best for
+    programs that cannot draw it (GLB, OpenUSD)."""
 
     texels: Annotated[int, Field(ge=2, le=256)] = 96
     """Texels of the maps of gloss, offset and normals, along the window's longer side."""

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from facefolds_core.params.base import Count, Many, Natural, Section
+from facefolds_core.params.base import Count, Natural, Section
 
 
 class SegmentParams(Section):
@@ -22,10 +22,6 @@ class SegmentParams(Section):
 
     key_frames: Annotated[int, Field(ge=1, le=10_000)] = 24
     """Frames of which the base is made, at most."""
-
-    named: Many[str] = ()
-    """Key frames by their names in the capture, instead of a choice. With those of fit.json the base stays when the
-    range of frames changes."""
 
     frames: Count = 12
     """Frames of a segment: the most that is lost when a training is killed."""

@@ -29,7 +29,7 @@ def compress(folders: SubjectFolders) -> str:
         coarser={r: read_meshes(folders.meshes / f"level_{r}.npz") for r in resolutions},
         reflection=read_reflection_maps(grids),
     )
-    manifest = package(folders.asset, export, scene, params, folders.checkpoints / "encoded")
+    manifest = package(folders.asset, export, scene, params)
     level = manifest.full
     write_glb(folders.glb, read_level(folders.asset, level), scene.subject, params.glb.frame)
     mesh_bytes = sum(layer.bytes for layer in level.layers)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.found_scene import found_scene
 from facefolds_core.captures.scene import Scene
@@ -15,8 +17,9 @@ from facefolds_core.packaging.notes import codec_warning
 from facefolds_core.params import CompressParams, EvaluateParams
 from facefolds_core.scoring.evaluation import Evaluation
 from facefolds_core.scoring.evaluation import evaluate as score
+from facefolds_core.scoring.films import FILMS
 from facefolds_core.scoring.perceptual import find_perceptual
-from facefolds_core.scoring.record import write_record
+from facefolds_core.scoring.pictures import WORST, write_training_views, write_worst
 from facefolds_core.scoring.report import Circumstances, metrics_json, read_cost, write_per_image
 from facefolds_core.scoring.sheets import write_contact_sheet
 from facefolds_core.scoring.terminal import result_lines, score_lines
@@ -55,15 +58,9 @@ def evaluate(folders: SubjectFolders) -> str:
         metrics = metrics_json(scene.subject, result.scores, cost, about)
         write_per_image(result.scores, temporary / "per_image.parquet")
         write_contact_sheet(temporary / "contact_sheet.png", scene.subject, result.panels, metrics)
-        write_record(
-            temporary,
-            result.panels,
-            result.worst,
-            asset,
-            films=result.films,
-            patch=result.patch,
-            training=bad_views(result.training),
-        )
+        write_worst(temporary / WORST, result.worst, result.patch)
+        write_training_views(temporary / "pictures", bad_views(result.training))
+        write_json(temporary / FILMS, [asdict(film) for film in result.films])
     write_json(folders.metrics, metrics)
     table = [*score_lines(metrics), *(f"note: {note}" for note in perceptual.missing)]
     return "\n".join([f"scores in {folders.metrics}", *table, *result_lines(metrics, folders)])

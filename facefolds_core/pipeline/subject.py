@@ -29,11 +29,9 @@ def subject(folders: SubjectFolders) -> str:
     )
     named, start = (None if path is None else Path(path) for path in (entry.mattes, entry.start))
     found, told = make_folder(scene, folders.subject, params, named, start)
-    counts = Counter(one.source for one in told)
+    counts = Counter(one["source"] for one in told)
     sources = ", ".join(f"{count} {WORDS[source]}" for source, count in counts.items())
-    doubtful = [
-        f"{scene.cameras[one.key[0]].name} {scene.frame_ids[one.key[1]]}" for one in told if one.source == "gaussians"
-    ]
+    doubtful = [f"{one['camera']} {one['frame']}" for one in told if one["source"] == "gaussians"]
     more = f"; these pictures contradict the others: {shorten(doubtful, 300)}" if doubtful else ""
     return (
         f"{len(found.splats)} Gaussians, PSNR {found.psnr:.1f} dB; mattes: {sources}; "

@@ -20,8 +20,7 @@ def texture(folders: SubjectFolders) -> str:
     meshes, grids = read_meshes(folders.meshes / "meshes.npz"), read_grids(folders.samples / "grids.npz")
     size, chosen = texels_for(read_scene(folders.scene), meshes, grids, samples, params)
     with atomic_folder(folders.resampled) as temporary:
-        kept = folders.checkpoints / "resampled"
-        source = resample_store(samples, temporary / TEXTURES, size, kept)
+        source = resample_store(samples, temporary / TEXTURES, size)
         why = write_choice(temporary, chosen)
     if size > source.height:
         sys.stderr.write(

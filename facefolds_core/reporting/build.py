@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,22 +13,19 @@ from markupsafe import Markup
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.captures.scene import Scene, read_scene
+from facefolds_core.captures.sketch import sketch
 from facefolds_core.facts import worded
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, pictures, tables, words
 from facefolds_core.reporting.face import face
 from facefolds_core.reporting.facts import Facts, finite, read_facts
-from facefolds_core.scoring.panels import HEADLINES
-from facefolds_core.scoring.record import Record, View, read_record
+from facefolds_core.scoring.films import read_films
+from facefolds_core.scoring.pictures import WORST
 from facefolds_core.scoring.report import headline
-from facefolds_core.scoring.sheets import MAX_ERROR
 from facefolds_core.scoring.terminal import HEADLINE_WORDS
 
 REPORT_NAME = "report.html"
-MOST_PIXELS = 2_500_000
-"""Of all compared pictures together, but for the worst: keeps the page below 5 MB."""
-MOST_VIEWS = 24
 TEXTURE_SIDE = 320
 MOST_FILM_BYTES = 8_000_000
 """Of all films in the page together."""
@@ -39,15 +37,13 @@ class Subject:
 
     Attributes:
         scene: None where the normalised scene is not there.
-        record: what `evaluate` saw; None where that is not there.
-        views: the pictures of it that are shown.
+        evaluation: the folder of what `evaluate` saw.
     """
 
     facts: Facts
     asset: Asset
     scene: Scene | None
-    record: Record | None
-    views: tuple[View, ...]
+    evaluation: Path
     player: Path | None
 
 
@@ -70,21 +66,11 @@ def gather(folders: SubjectFolders, player: Path | None) -> Subject:
     facts = read_facts(folders)
     asset = read_asset(folders.asset)
     scene = read_scene(folders.scene) if (folders.scene / "scene.json").is_file() else None
-    record = read_record(folders.evaluation, asset)
-    return Subject(facts, asset, scene, record, chosen_views(record) if record else (), player)
+    return Subject(facts, asset, scene, folders.evaluation, player)
 
 
 def now() -> str:
     return datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")
-
-
-def chosen_views(record: Record) -> tuple[View, ...]:
-    """As many as the page has room for, evenly spread, the worst one always."""
-    views = record.views
-    most = max(1, min(MOST_VIEWS, MOST_PIXELS // views[0].truth[..., 0].size))
-    fewer = min(len(views), most)
-    shown = {round(i * (len(views) - 1) / max(1, fewer - 1)) for i in range(fewer)} | {record.worst}
-    return tuple(view for i, view in enumerate(views) if i in shown)
 
 
 def render_page(subject: Subject, folder: str) -> str:
@@ -118,37 +104,31 @@ def _source(environment: Environment, name: str) -> str:
 
 def context(subject: Subject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
-    facts, manifest, scene, record = subject.facts, subject.asset.manifest, subject.scene, subject.record
+    facts, manifest, scene = subject.facts, subject.asset.manifest, subject.scene
     key = headline(facts.metrics)
     places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
-    pairs = {(view.camera, view.frame): i for i, view in enumerate(subject.views)}
-    compared, poster = comparisons(subject, places), subject.asset.folder / "poster.jpg"
+    poster, sheet = subject.asset.folder / "poster.jpg", subject.evaluation / "contact_sheet.png"
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
         "made": now(),
         "face": face(subject.asset, subject.player),
-        "poster": pictures.jpeg(poster) if poster.is_file() else None,
+        "poster": pictures.stored(poster) if poster.is_file() else None,
         "generator": manifest.generator,
         "of_what": HEADLINE_WORDS[key],
         "warnings": warnings(facts.metrics),
-        **films(record, scene),
+        **films(subject),
         "tiles": tiles(subject, key),
         "scores": tables.scores(facts.metrics),
-        "comparisons": compared,
-        "error_scale": {"most": MAX_ERROR, "stops": error_stops()},
-        "heat": tables.heat_map(facts.images, key, pairs, places) if facts.images else None,
-        "camera_map": camera_map(scene) if scene else None,
-        "validating": scene is not None and "validate" in scene.splits,
-        "cameras": tables.cameras(scene, facts.images, key) if scene else [],
-        "worst": next((one for one in compared if one["worst"]), None),
-        "patch": patch(subject),
+        "sheet": pictures.sheet(sheet) if sheet.is_file() else None,
+        "heat": tables.heat_map(facts.images, key, places) if facts.images else None,
+        "camera_map": Markup(sketch(scene)) if scene else None,
+        "worst": worst(subject),
         "textures": textures(subject),
-        "curves": curves(facts),
+        "curves": [(words.curve_name(name), charts.line_chart(of)) for name, of in facts.curves.items()],
         "fit_notes": [worded(one) for part in ("reasons", "events") for one in (facts.fit or {}).get(part, [])],
         "stages": tables.stages(facts.stages),
         "levels": tables.levels(manifest),
-        "config": tables.configuration(facts.config),
-        "versions": facts.versions,
+        "config": {name: json.dumps(value, indent=2) for name, value in facts.config.items()},
     }
 
 
@@ -172,119 +152,47 @@ def tiles(subject: Subject, key: str) -> list[dict[str, str]]:
         ("Triangles", cost.get("triangles"), words.count, f"{words.count(subject.asset.num_layers)} layers"),
         ("Training", cost.get("train_seconds"), words.duration, str(cost.get("device") or "")),
     ]
-    found = [(name, value, number_unit(value, "dB"), note) for name, value, note in decibels]
+    found = [(name, value, f"{words.number(value)}\u00a0dB", note) for name, value, note in decibels]
     found += [(name, value, form(value), note) for name, value, form, note in others]
     return [
         {"name": name, "value": text, "note": note} for name, value, text, note in found if finite(value) is not None
     ]
 
 
-def number_unit(value: Any, unit: str) -> str:
-    return f"{words.number(value)}\u00a0{unit}"
-
-
-def comparisons(subject: Subject, places: dict[str, tables.Place]) -> list[dict[str, Any]]:
-    """Truth, asset and error of each view."""
-    result: list[dict[str, Any]] = []
-    for view in subject.views:
-        shown = view.asset if view.over is None else view.over
-        known = [name for name in HEADLINES if getattr(view, name) is not None]
-        values = [f"{words.number(getattr(view, name))} dB {HEADLINE_WORDS[name]}" for name in known]
-        values += place_words(places.get(view.camera))
-        label = words.frame_label(subject.scene.frame_ids if subject.scene else (), view.frame)
-        worst = subject.record is not None and view is subject.record.views[subject.record.worst]
-        result.append(
-            {
-                "name": f"{view.camera}, frame {label}{', the worst' if worst else ''}",
-                "label": label,
-                "scores": ", ".join(values),
-                "worst": worst,
-                "camera": view.camera,
-                "frame": view.frame,
-                "best": ", ".join([values[0], *place_words(places.get(view.camera))]),
-                "index": len(result),
-                "height": view.truth.shape[0],
-                "width": view.truth.shape[1],
-                "truth": pictures.photo(view.truth),
-                "asset": pictures.photo(shown) if worst else "",  # as it is, at the head of the page
-                "scored": pictures.photo(pictures.as_scored(view)),
-                # Over the plate nothing is left out: what stands beside the subject is an error, too.
-                "error": pictures.error_map(shown, view.truth, view.mask if view.over is None else None),
-                "part": "of the subject alone" if view.over is None and view.mask is not None else "of the whole frame",
-            }
-        )
-    return result
-
-
-def patch(subject: Subject) -> dict[str, Any] | None:
-    """The window in which the asset is worst, truth beside asset; None where it is not known."""
-    crop = subject.record.patch if subject.record else None
-    if crop is None:
+def worst(subject: Subject) -> dict[str, str] | None:
+    """Where the asset is worst, photo beside asset: a window, or where that is not known a picture."""
+    path, known = subject.evaluation / WORST, subject.facts.metrics.get("worst_patch")
+    if not path.is_file():
         return None
-    row, column, side = crop.box
-    height, width = crop.truth.shape[:2]
-    box = {"top": row / height, "left": column / width, "height": side / height, "width": side / width}
-    return {
-        "truth": pictures.exact(crop.truth),
-        "asset": pictures.exact(crop.asset),
-        "width": width,
-        "height": height,
-        "box": "; ".join(f"{name}: {100 * share:.1f}%" for name, share in box.items()),
-        "camera": crop.camera,
-        "label": words.frame_label(subject.scene.frame_ids if subject.scene else (), crop.frame),
-        "psnr": words.number(crop.psnr),
-    }
+    key = headline(subject.facts.metrics)
+    scored = [one for one in subject.facts.images if getattr(one, key) is not None]
+    if isinstance(known, dict):
+        camera, frame, psnr, what = known["camera"], known["frame"], known["psnr"], "in the square, over grey"
+    elif scored:
+        least = min(scored, key=lambda one: getattr(one, key))
+        camera, frame, psnr, what = least.camera, least.frame, getattr(least, key), HEADLINE_WORDS[key]
+    else:
+        return None
+    label = words.frame_label(subject.scene.frame_ids if subject.scene else (), frame)
+    return {"src": pictures.stored(path), "words": f"camera {camera}, frame {label}; {words.number(psnr)} dB {what}"}
 
 
-def films(record: Record | None, scene: Scene | None) -> dict[str, Any]:
-    """Films of the held-out cameras, as many as the page has room for, and the worst picture beside them."""
-    if record is None:
-        return {"films": [], "films_left": 0, "film_size": (2, 1)}
+def films(subject: Subject) -> dict[str, Any]:
+    """Films of the held-out cameras, as many as the page has room for."""
+    scene = subject.scene
     places = {camera.name: tables.place_of(camera).angle for camera in scene.cameras} if scene else {}
-    kept, room = [], MOST_FILM_BYTES
-    for film in sorted(record.films, key=lambda one: places.get(one.camera, 0.0)):
-        path = record.folder / film.file
+    kept, left, room = list[dict[str, Any]](), 0, MOST_FILM_BYTES
+    for film in sorted(read_films(subject.evaluation), key=lambda one: places.get(one.camera, 0.0)):
+        path = subject.evaluation / film.file
         size = path.stat().st_size if path.is_file() else room + 1
-        if size <= room:
-            room -= size
-            labels = [words.frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
-            kept.append(
-                {
-                    "camera": film.camera,
-                    "fps": film.fps,
-                    "frames": film.frames,
-                    "labels": labels,
-                    "src": pictures.film(path),
-                }
-            )
-    view = record.views[record.worst]
-    width, height = view.truth.shape[1], view.truth.shape[0]
-    return {"films": kept, "films_left": len(record.films) - len(kept), "film_size": (2 * width, height)}
-
-
-def place_words(place: tables.Place | None) -> list[str]:
-    return [f"{place.angle:.0f}° from front"] if place else []
-
-
-def curves(facts: Facts) -> list[dict[str, Any]]:
-    named = [(words.curve_name(curve.name), curve.points) for curve in facts.curves]
-    return [{"name": name, "svg": charts.line_chart(points, name, "step")} for name, points in named]
-
-
-def error_stops() -> str:
-    """The error's colours as the stops of a CSS gradient."""
-    return ", ".join(
-        f"rgb({red:.0f} {green:.0f} {blue:.0f})" for red, green, blue in (255 * pictures.error_colours(9)).tolist()
-    )
-
-
-def camera_map(scene: Scene) -> Markup:
-    return charts.camera_map(
-        [
-            charts.Dot((place := tables.place_of(camera)).azimuth, place.elevation, camera.name, split)
-            for camera, split in zip(scene.cameras, scene.splits, strict=True)
-        ]
-    )
+        if size > room:
+            left += 1
+            continue
+        room -= size
+        labels = [words.frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
+        kept.append({**asdict(film), "labels": labels, "src": pictures.stored(path)})
+    size = (2 * scene.width, scene.height) if scene else (2, 1)
+    return {"films": kept, "films_left": left, "film_size": size}
 
 
 def textures(subject: Subject) -> dict[str, Any]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import platform
-import subprocess
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -36,30 +33,6 @@ STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
     "evaluate": ("evaluation", "metrics.json"),
 }
 """What each stage leaves in data/<subject>, in the order in which they run."""
-
-PACKAGES = ("facefolds", "torch", "numpy", "dvc", "av", "DracoPy")
-
-
-@dataclass(frozen=True)
-class StageCost:
-    """What a stage took when it ran last.
-
-    Attributes:
-        seconds: wall clock; None where no timing was left.
-        bytes: of all it left on disk; None where nothing is there.
-    """
-
-    name: str
-    seconds: float | None
-    bytes: int | None
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One series of the training log: (step, value), steps rising, values finite."""
-
-    name: str
-    points: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -89,19 +62,17 @@ class Facts:
         training: model/training.json.
         fit: model/fit.json, of presets that fit the scene first.
         curves: the training log.
-        stages: in the order in which they run.
+        stages: seconds and bytes of each, in the order in which they run.
         config: the subject's parameters, by section.
-        versions: (what, version); of the environment in which the report is made.
     """
 
     metrics: dict[str, Any]
     images: tuple[ImageScores, ...]
     training: dict[str, Any] | None
     fit: dict[str, Any] | None
-    curves: tuple[Curve, ...]
-    stages: tuple[StageCost, ...]
+    curves: dict[str, list[tuple[float, float]]]
+    stages: dict[str, tuple[float | None, int | None]]
     config: dict[str, dict[str, Any]]
-    versions: tuple[tuple[str, str], ...]
 
 
 def read_facts(folders: SubjectFolders) -> Facts:
@@ -125,9 +96,8 @@ def read_facts(folders: SubjectFolders) -> Facts:
         training=read_mapping(folders.model / "training.json"),
         fit=read_mapping(folders.model / "fit.json"),
         curves=read_curves(folders.training_log / "plots" / "metrics"),
-        stages=tuple(stage_cost(folders, name) for name in STAGE_OUTPUTS),
+        stages={name: (seconds_of(folders, name), bytes_of(folders, name)) for name in STAGE_OUTPUTS},
         config={path.stem: read_mapping(path) or {} for path in sorted(folders.config.glob("*.json"))},
-        versions=versions(Path(__file__).resolve().parents[2]),
     )
 
 
@@ -195,61 +165,23 @@ def finite(value: Any) -> float | None:
     return float(value)
 
 
-def read_curves(folder: Path) -> tuple[Curve, ...]:
-    """Every series of dvclive's log, PSNR first; lines that hold no two finite numbers are left out."""
-    curves = []
-    for path in sorted(folder.rglob("*.tsv")):
-        points = []
-        with path.open(newline="", encoding="utf-8", errors="replace") as file:
-            for row in csv.reader(file, delimiter="\t"):
-                values = [as_number(text) for text in row]
-                if len(values) >= 2 and values[0] is not None and values[-1] is not None:
-                    points.append((values[0], values[-1]))
-        if len(points) > 1:
-            curves.append(Curve(path.relative_to(folder).with_suffix("").as_posix(), tuple(sorted(points))))
-    return tuple(sorted(curves, key=lambda curve: (curve.name != "psnr", curve.name)))
+def read_curves(folder: Path) -> dict[str, list[tuple[float, float]]]:
+    """Every series of dvclive's log, PSNR first: (step, value); lines without two finite numbers are left out."""
+    curves = {}
+    for path in sorted(folder.rglob("*.tsv"), key=lambda path: (path.stem != "psnr", path)):
+        rows = np.genfromtxt(path, delimiter="\t", skip_header=1, usecols=(0, -1), invalid_raise=False).reshape(-1, 2)
+        if len(points := rows[np.isfinite(rows).all(1)]) > 1:
+            curves[path.relative_to(folder).with_suffix("").as_posix()] = list(map(tuple, points.tolist()))
+    return curves
 
 
-def as_number(text: str) -> float | None:
-    try:
-        return finite(float(text))
-    except ValueError:
-        return None
+def seconds_of(folders: SubjectFolders, stage: str) -> float | None:
+    """Wall clock of a stage's last run."""
+    return finite((read_mapping(folders.timing(stage)) or {}).get("seconds"))
 
 
-def stage_cost(folders: SubjectFolders, stage: str) -> StageCost:
-    timing = read_mapping(folders.timing(stage)) or {}
+def bytes_of(folders: SubjectFolders, stage: str) -> int | None:
+    """Of all that a stage left on disk; None where nothing is there."""
     outputs = [path for name in STAGE_OUTPUTS[stage] if (path := folders.root / name).exists()]
-    return StageCost(stage, finite(timing.get("seconds")), sum(map(size_of, outputs)) if outputs else None)
-
-
-def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files in a folder."""
-    if path.is_file():
-        return path.stat().st_size
-    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-
-
-def versions(project: Path) -> tuple[tuple[str, str], ...]:
-    """(what, version) of Python, of the packages that matter, and of the project's work tree."""
-    found = [("Python", platform.python_version())]
-    for package in PACKAGES:
-        try:
-            found.append((package, version(package)))
-        except PackageNotFoundError:
-            found.append((package, "not installed"))
-    return (*found, ("git commit", commit(project) or "not a git work tree"))
-
-
-def commit(project: Path) -> str | None:
-    """The commit that is checked out, with a note if files differ from it; None outside of git."""
-
-    def git(*arguments: str) -> str | None:
-        try:
-            done = subprocess.run(["git", "-C", project, *arguments], capture_output=True, text=True, check=False)
-        except OSError:
-            return None
-        return done.stdout.strip() if done.returncode == 0 else None
-
-    head = git("rev-parse", "--short=12", "HEAD")
-    return f"{head}, with uncommitted changes" if head and git("status", "--porcelain") else head
+    files = [file for path in outputs for file in (path, *path.rglob("*")) if file.is_file()]
+    return sum(file.stat().st_size for file in files) if outputs else None

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from facefolds_core.asset.manifest import Manifest
-from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.reporting.charts import heat_colour, ink_on
-from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, StageCost, finite
+from facefolds_core.reporting.facts import STAGE_OUTPUTS, ImageScores, finite
 from facefolds_core.reporting.words import count, duration, number, size
 from facefolds_core.scoring.panels import VARIANTS
 
@@ -94,14 +93,8 @@ def scores(metrics: dict[str, Any]) -> dict[str, Any]:
     return {"groups": groups, "names": names, "rows": rows}
 
 
-def heat_map(
-    images: Sequence[ImageScores], key: str, pairs: dict[tuple[str, str], int], places: dict[str, Place]
-) -> Row:
-    """PSNR of every held-out camera and frame.
-
-    Args:
-        pairs: index of the comparison of (camera, frame), where the page shows one.
-    """
+def heat_map(images: Sequence[ImageScores], key: str, places: dict[str, Place]) -> Row:
+    """PSNR of every held-out camera and frame."""
     values = {(image.camera, image.frame): getattr(image, key) for image in images}
     known = [value for value in values.values() if value is not None]
     low, high = (min(known), max(known)) if known else (0.0, 0.0)
@@ -119,7 +112,6 @@ def heat_map(
                     "value": number(value, 1),
                     "colour": None if where is None else heat_colour(where),
                     "ink": None if where is None else ink_on(where),
-                    "pair": pairs.get((camera, frame)),
                 }
             )
         place = places.get(camera)
@@ -133,24 +125,6 @@ def heat_map(
         "high": number(middle + half, 1),
         "stops": stops,
     }
-
-
-def cameras(scene: Scene, images: Sequence[ImageScores], key: str) -> list[Row]:
-    """Held-out cameras, the most frontal first."""
-    rows = []
-    held = [scene.cameras[index] for index in scene.indices("holdout")]
-    for camera, place in sorted(((c, place_of(c)) for c in held), key=lambda one: one[1].angle):
-        own = [value for i in images if i.camera == camera.name and (value := getattr(i, key)) is not None]
-        rows.append(
-            {
-                "name": camera.name,
-                "angle": f"{place.angle:.0f}°",
-                "azimuth": number(place.azimuth, 0) + "°",
-                "elevation": number(place.elevation, 0) + "°",
-                "psnr": number(np.mean(own) if own else None),
-            }
-        )
-    return rows
 
 
 def levels(manifest: Manifest) -> list[Row]:
@@ -174,43 +148,17 @@ def levels(manifest: Manifest) -> list[Row]:
     return rows
 
 
-def stages(costs: Sequence[StageCost]) -> list[Row]:
-    most_seconds = max((cost.seconds for cost in costs if cost.seconds is not None), default=0.0)
-    most_bytes = max((cost.bytes for cost in costs if cost.bytes is not None), default=0)
+def stages(costs: Mapping[str, tuple[float | None, int | None]]) -> list[Row]:
+    """Args: seconds and bytes by stage."""
+    most_seconds, most_bytes = (max(cost[q] or 0 for cost in costs.values()) for q in (0, 1))
     return [
         {
-            "name": cost.name,
-            "seconds": duration(cost.seconds),
-            "seconds_bar": share(cost.seconds, most_seconds),
-            "bytes": size(cost.bytes),
-            "bytes_bar": share(cost.bytes, most_bytes),
-            "what": ", ".join(STAGE_OUTPUTS[cost.name]),
+            "name": name,
+            "seconds": duration(seconds),
+            "seconds_bar": share(seconds, most_seconds),
+            "bytes": size(used),
+            "bytes_bar": share(used, most_bytes),
+            "what": ", ".join(STAGE_OUTPUTS[name]),
         }
-        for cost in costs
+        for name, (seconds, used) in costs.items()
     ]
-
-
-def configuration(config: dict[str, dict[str, Any]]) -> list[Row]:
-    """One entry a section: (key, value) with dotted keys; `subject` first, then in the order of the stages."""
-    order = ["subject", *STAGE_OUTPUTS]
-    names = sorted(config, key=lambda name: (order.index(name) if name in order else len(order), name))
-    return [{"name": name, "rows": list(flat(config[name]))} for name in names]
-
-
-def flat(value: Any, key: str = "") -> list[tuple[str, str]]:
-    """Leaves of nested objects and of lists of objects, with dotted keys."""
-    if isinstance(value, dict) and value:
-        return [leaf for name, part in value.items() for leaf in flat(part, f"{key}.{name}" if key else str(name))]
-    if isinstance(value, list) and any(isinstance(part, dict) for part in value):
-        return [leaf for i, part in enumerate(value) for leaf in flat(part, f"{key}.{i + 1}")]
-    if isinstance(value, list):
-        return [(key, ", ".join(map(plain, value)) or "none")]
-    return [(key, plain(value))]
-
-
-def plain(value: Any) -> str:
-    if value is None or value == {}:
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)

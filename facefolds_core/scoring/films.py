@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +15,13 @@ import numpy as np
 from av.video.reformatter import ColorRange, Colorspace
 
 from facefolds_core.asset.colour import rgb_to_yuv420
+from facefolds_core.errors import UserError
+from facefolds_core.files.reading import remake
+from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.metrics import Array
+
+FILMS = "films.json"
+NAME = re.compile(r"films/[0-9]+\.mp4")
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,24 @@ class FilmFile:
     file: str
     fps: float
     frames: tuple[str, ...]
+
+
+def read_films(folder: Path) -> list[FilmFile]:
+    """What `evaluate` lists in `films.json`; nothing where that is not there.
+
+    Raises:
+        UserError: if it is garbled, or names other files than films of an evaluation.
+    """
+    path = folder / FILMS
+    if not path.is_file():
+        return []
+    try:
+        films = [FilmFile(**one) for one in read_json(path)]
+        if not all(NAME.fullmatch(film.file) for film in films):
+            raise ValueError("a file that is no film of an evaluation")
+    except (TypeError, ValueError) as error:
+        raise UserError("a garbled list of films", file=path, found=str(error), remedy=remake(path)) from None
+    return films
 
 
 class FilmRoll:

@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,26 +26,12 @@ from facefolds_core.progress import progress
 from facefolds_core.spacing import spread
 from facefolds_core.subject.cut_out import agreement
 from facefolds_core.subject.find import find_subject
-from facefolds_core.subject.mattes import Key, Matte, Mattes, Source
+from facefolds_core.subject.mattes import Key, Mattes
 from facefolds_core.subject.sheet import MOST, contact_sheet, tile
 from facefolds_core.subject.storage import FoundSubject, write_found
 
-
-@dataclass(frozen=True)
-class Told:
-    """What is told of one picture's matte.
-
-    Attributes:
-        key: (camera, frame) in the scene.
-        source: whence it is.
-        agreement: see `Matte`.
-        iou: with the true mask, where there is one.
-    """
-
-    key: Key
-    source: Source
-    agreement: float | None
-    iou: float | None
+Told = dict[str, Any]
+"""What mattes.json says of a picture: `camera`, `frame`, `source`, `agreement`, and `iou` with the true mask."""
 
 
 def make_folder(
@@ -66,7 +51,7 @@ def make_folder(
         rows = _rows(scene, mattes, temporary, told, tiles)
         write_frames(temporary / MATTES, (scene.height, scene.width, 1), rows)
         Pillow.fromarray(contact_sheet(list(tiles.values()))).save(temporary / "sheet.png")
-        write_json(temporary / "mattes.json", _described(scene, told, found))
+        write_json(temporary / "mattes.json", _described(told, found))
     return found, told
 
 
@@ -76,46 +61,38 @@ def _rows(
     """Mattes of all pictures; `told` and `tiles` grow with them."""
     store, masks = scene.open_frames(), scene.open_masks()
     keys = sorted(store)
-    shown = set(spread(keys, MOST))
+    shown, doubtful = set(spread(keys, MOST)), list[Key]()
     with progress(total=len(keys), desc="mattes", unit="picture") as bar:
         for key in keys:
             matte = mattes.of(key)
             iou = None
             if masks is not None and key in masks:
                 iou = agreement(matte.opacity > 127, masks.image(*key)[..., 0] > 127)
-            told.append(Told(key, matte.source, matte.agreement, iou))
+            camera, frame = scene.cameras[key[0]].name, scene.frame_ids[key[1]]
+            entry = {"camera": camera, "frame": frame, "source": matte.source}
+            told.append({**entry, "agreement": _rounded(matte.agreement), "iou": _rounded(iou)})
             if matte.source != "capture":
-                _save(scene, key, matte, folder)
+                place = folder / camera / f"{frame}.png"
+                place.parent.mkdir(exist_ok=True)
+                Pillow.fromarray(matte.opacity).save(place)
+            doubtful += [key] if matte.source == "gaussians" else []
             if key in shown or matte.source == "gaussians":
                 tiles[key] = tile(scene, key, store.image(*key), matte)
             yield (*key, matte.opacity[..., None])
             bar.update()
-    doubtful = [one.key for one in told if one.source == "gaussians"]
     ordered = [*doubtful, *(key for key in sorted(shown) if key not in doubtful)][:MOST]
     kept = {key: tiles[key] for key in ordered}
     tiles.clear()
     tiles.update(kept)
 
 
-def _save(scene: Scene, key: Key, matte: Matte, folder: Path) -> None:
-    place = folder / scene.cameras[key[0]].name / f"{scene.frame_ids[key[1]]}.png"
-    place.parent.mkdir(exist_ok=True)
-    Pillow.fromarray(matte.opacity).save(place)
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 5)
 
 
-def _described(scene: Scene, told: list[Told], found: FoundSubject) -> dict[str, Any]:
+def _described(told: list[Told], found: FoundSubject) -> dict[str, Any]:
     """mattes.json."""
-    pictures = [
-        {
-            "camera": scene.cameras[one.key[0]].name,
-            "frame": scene.frame_ids[one.key[1]],
-            "source": one.source,
-            "agreement": None if one.agreement is None else round(one.agreement, 5),
-            "iou": None if one.iou is None else round(one.iou, 5),
-        }
-        for one in told
-    ]
-    known = [one.iou for one in told if one.iou is not None]
+    known = [one["iou"] for one in told if one["iou"] is not None]
     mean = round(float(np.mean(known)), 5) if known else None
     start = {"gaussians": len(found.splats), "psnr": round(found.psnr, 3)}
-    return {"version": 2, "start": start, "iou": mean, "pictures": pictures}
+    return {"version": 2, "start": start, "iou": mean, "pictures": told}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -27,44 +25,34 @@ the cameras: their common point may lie at its back, as of a head on a wall."""
 TOWARDS = 0.5
 """Least cosine of the angle to the cameras' mean direction, times that mean's length: 1 where all stand at one place, 0
 where they stand all around. What is nearer to them than the subject, and joined to it, is the subject's."""
+JOINED = 2.2
+"""Side of the cells in which Gaussians are connected, in median lengths of those in the ball."""
+SOLID = 0.3
+"""Opacity from which on a Gaussian connects."""
+NEAR = 0.1
+"""Standard deviation of the neighbourhood of the origin in which the body is the heaviest, units."""
+VIEWS = 3
+"""Training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer."""
 
 
-@dataclass(frozen=True)
-class BodyParams:
-    """How the subject is told from the room.
-
-    Attributes:
-        joined: side of the cells in which Gaussians are connected, in median lengths of those in the ball.
-        solid: opacity from which on a Gaussian connects.
-        near: standard deviation of the neighbourhood of the origin in which the body is the heaviest, units.
-        views: training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer.
-    """
-
-    joined: float = 2.2
-    solid: float = 0.3
-    near: float = 0.1
-    views: int = 3
-
-
-def subject_of(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+def subject_of(splats: Splats, scene: Scene) -> Bool:
     """(N,) whether a Gaussian is the subject's, of those of a whole scene."""
-    params = params or BodyParams()
-    return _body(splats, near_enough(splats, scene, params), scene.radius or REACH, params)
+    return _body(splats, near_enough(splats, scene), scene.radius or REACH)
 
 
-def joined(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+def joined(splats: Splats, scene: Scene) -> Bool:
     """(N,) whether a Gaussian is joined to the subject, of those fitted to it alone; all, if none is solid."""
     reach = AROUND * (scene.radius or REACH)
-    body = _body(splats, np.linalg.norm(splats.means, axis=1) < reach, reach, params or BodyParams())
+    body = _body(splats, np.linalg.norm(splats.means, axis=1) < reach, reach)
     return body if body.any() else np.ones(len(splats), bool)
 
 
-def _body(splats: Splats, possible: Bool, reach: float, params: BodyParams) -> Bool:
+def _body(splats: Splats, possible: Bool, reach: float) -> Bool:
     """(N,) the heaviest connected body near the origin among those that are possible, in the ball of `reach`."""
-    solid = possible & (splats.opacities > params.solid)
+    solid = possible & (splats.opacities > SOLID)
     if not solid.any():
         return solid
-    voxel = float(np.clip(params.joined * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
+    voxel = float(np.clip(JOINED * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
     low = splats.means[possible].min(0) - 1.5 * voxel
     cells = ((splats.means - low) / voxel).astype(np.int64)
     weight = np.zeros(tuple(cells[possible].max(0) + 2), np.float32)
@@ -74,20 +62,20 @@ def _body(splats: Splats, possible: Bool, reach: float, params: BodyParams) -> B
     labels, count = ndimage.label(weight > 0, np.ones((3, 3, 3)))
     x, y, z = ((np.arange(size) + 0.5) * voxel + low[axis] for axis, size in enumerate(weight.shape))
     square = x[:, None, None] ** 2 + y[:, None] ** 2 + z**2
-    mass = ndimage.sum_labels(weight * np.exp(-0.5 * square / params.near**2), labels, np.arange(1, count + 1))
+    mass = ndimage.sum_labels(weight * np.exp(-0.5 * square / NEAR**2), labels, np.arange(1, count + 1))
     body = ndimage.binary_dilation(labels == 1 + int(np.argmax(mass)), iterations=1)
     return np.asarray(possible & body[tuple(cells.T)])
 
 
-def near_enough(splats: Splats, scene: Scene, params: BodyParams | None = None) -> Bool:
+def near_enough(splats: Splats, scene: Scene) -> Bool:
     """(N,) Gaussians in the subject's ball, or before it, that enough cameras have in their pictures."""
-    params, reach = params or BodyParams(), scene.radius or REACH
+    reach = scene.radius or REACH
     cameras, away = scene.views_of("train"), np.linalg.norm(splats.means, axis=1)
     mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in cameras], 0)
     before = splats.means @ mean > TOWARDS * away
     inside = away < np.where(before & (scene.radius is None), AROUND * reach, reach)
     seen = seen_by(cameras, splats.means.astype(np.float64))
-    return np.asarray(inside & (seen >= min(params.views, len(cameras))))
+    return np.asarray(inside & (seen >= min(VIEWS, len(cameras))))
 
 
 def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, low: Array, voxel: float) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -110,9 +109,6 @@ def load_checkpoint(state: TrainingState, fingerprint: str, folder: Path) -> Non
             found=f"fingerprint {metadata.get('fingerprint')}",
             remedy=remedy,
         )
-    numbers = metadata.get("iteration", ""), metadata.get("seconds", ""), metadata.get("psnr", "")
-    if not numbers[0].isdecimal() or not _is_finite(numbers[1]) or float(numbers[1]) < 0 or not _is_finite(numbers[2]):
-        raise UserError("a damaged checkpoint", file=path, place="iteration, seconds, psnr", remedy=remedy)
     _fill_optimiser(state)
     check_tensors(tensors, _state_tensors(state), path, remedy)
     state.model.load_state_dict(
@@ -125,13 +121,6 @@ def load_checkpoint(state: TrainingState, fingerprint: str, folder: Path) -> Non
     state.generator.set_state(tensors["generator"])
     state.iteration, state.seconds = int(metadata["iteration"]), float(metadata["seconds"])
     state.psnr = float(metadata["psnr"])
-
-
-def _is_finite(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
 
 
 def _fill_optimiser(state: TrainingState) -> None:

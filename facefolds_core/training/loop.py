@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
-import sys
 import time
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ from typing import Any
 import torch
 
 from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
-from facefolds_core.errors import UserError, is_disk_error
+from facefolds_core.errors import UserError
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
@@ -30,7 +28,6 @@ from facefolds_core.training.checkpoints import (
 )
 from facefolds_core.training.log import log_metrics, open_log
 from facefolds_core.training.losses import Losses, batch_losses
-from facefolds_core.training.patience import patiently
 from facefolds_core.training.rays import RaySampler
 from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.start import Start, find_start, fit_outline
@@ -199,7 +196,7 @@ class _Progress:
         metrics |= {"psnr": self.psnr, "lr/manifold": rates["manifold"], "lr/texture": rates["texture"]}
         metrics["rays_per_second"] = self.count * self.params.rays / (now - self.since)
         log_metrics(self.live, iteration, metrics)
-        patiently(self.live.make_summary)
+        self.live.make_summary()
         self.bar.set_postfix_str(f"PSNR {self.psnr:.2f} dB", refresh=False)
         self.count, self.since = 0, now
 
@@ -221,20 +218,7 @@ def _trim_log(folder: Path, iteration: int) -> None:
 
 
 def train(scene: Scene, params: MlpParams, model_folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    """`fit_mlp`, and the model's folder written whole; a full disk is waited for, and leaves a checkpoint at worst."""
-    run, trained = _fit(scene, params, checkpoints, log)
-    try:
-        patiently(lambda: trained.save(model_folder))
-    except OSError:
-        with suppress(OSError):  # the one before stays
-            save_checkpoint(run.state, run.fingerprint, run.checkpoints)
-        raise
-    shutil.rmtree(run.checkpoints, ignore_errors=True)
-    return trained.report
-
-
-def fit_mlp(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> Trained:
-    """Train on `scene`, and remove the checkpoint.
+    """Train on `scene`, write the model's folder, whole, and remove the checkpoint.
 
     A run that was interrupted continues from its last checkpoint, to the same result (bit for bit on a CPU with the
     same number of threads).
@@ -246,20 +230,15 @@ def fit_mlp(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> Tr
     Raises:
         UserError: if training diverges (the last checkpoint stays), or the checkpoint found is damaged.
     """
-    run, trained = _fit(scene, params, checkpoints, log)
-    shutil.rmtree(run.checkpoints, ignore_errors=True)
-    return trained
-
-
-def _fit(scene: Scene, params: MlpParams, checkpoints: Path, log: Path) -> tuple[TrainingRun, Trained]:
     run = begin(scene, params, checkpoints)
     psnr = _finish(run, params, log)
-    state = run.state
+    state, device = run.state, run.sampler.device
     rays = state.iteration * params.rays
-    device = run.sampler.device
     memory = peak_memory(device)
     report = make_report(state.seconds, state.iteration, device_name(device), memory, params.preset, rays, psnr)
-    return run, Trained(state.model, run.spec, report)
+    Trained(state.model, run.spec, report).save(model_folder)
+    shutil.rmtree(run.checkpoints, ignore_errors=True)
+    return report
 
 
 def _move_to_mesh(state: TrainingState, params: MlpParams, start: Start) -> None:
@@ -284,21 +263,9 @@ def _finish(run: TrainingRun, params: MlpParams, log: Path) -> float:
             state.seconds, last = state.seconds + now - last, now
             if now - saved > params.checkpoint_seconds:
                 state.psnr = progress.psnr
-                _checkpoint(run)
+                save_checkpoint(state, run.fingerprint, run.checkpoints)
                 saved = now
     finally:
         progress.close()
     state.psnr = progress.psnr
     return progress.psnr
-
-
-def _checkpoint(run: TrainingRun) -> None:
-    """Save one; where the disk fails the one before stays, and training goes on: there may be room at its end."""
-    try:
-        save_checkpoint(run.state, run.fingerprint, run.checkpoints)
-    except OSError as error:
-        if not is_disk_error(error):
-            raise
-        sys.stderr.write(
-            f"\ntrain: no checkpoint at iteration {run.state.iteration}: {error.strerror} ({error.filename})\n"
-        )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,14 +21,12 @@ class Trained:
         spec: what `model.json` says of it.
         report: seconds, iterations, PSNR on training rays.
         fit: what was chosen and why (`fit.json`), of models that choose.
-        draw: writes a picture of it (`fit.png`).
     """
 
     model: RadianceManifolds
     spec: Spec
     report: TrainingReport
     fit: dict[str, Any] | None = None
-    draw: Callable[[Path], None] | None = None
 
     def save(self, folder: Path) -> None:
         """Write the model's folder, whole or not at all."""
@@ -38,5 +35,3 @@ class Trained:
             write_json(temporary / "training.json", asdict(self.report))
             if self.fit is not None:
                 write_json(temporary / "fit.json", self.fit)
-            if self.draw is not None:
-                self.draw(temporary / "fit.png")

@@ -56,7 +56,6 @@ def packaged(
     scene: Scene,
     section: dict[str, Any],
     reflection: ReflectionMaps | None = None,
-    kept: Path | None = None,
 ) -> None:
     """Package the caps with the section `compress`."""
     store = folder.with_name("textures.arrow")
@@ -67,4 +66,4 @@ def packaged(
 
     levels = {level["mesh_resolution"] for level in section.get("levels", ())}
     export = Export(caps(12), [WINDOW] * LAYERS, textures, CENTRE, {r: caps(r) for r in levels}, reflection)
-    package(folder, export, scene, CompressParams.model_validate(merged(PLAIN.model_dump(), section)), kept)
+    package(folder, export, scene, CompressParams.model_validate(merged(PLAIN.model_dump(), section)))

@@ -91,7 +91,7 @@ def test_textures_too_large_for_a_video_are_refused_before_anything_is_encoded(
 ) -> None:
     rig(folders, video={"target_psnr": 38.0})
     monkeypatch.setattr("facefolds_core.asset.packing.MAX_PIXELS", 10_000)
-    monkeypatch.setattr("facefolds_core.asset.writer.encode_video", lambda *_: pytest.fail("encoded"))
+    monkeypatch.setattr("facefolds_core.asset.parts.encode_video", lambda *_: pytest.fail("encoded"))
     with pytest.raises(UserError, match="do not fit") as caught:
         compress(folders)
     assert "texture.resolution" in str(caught.value.remedy)

@@ -8,10 +8,8 @@ import pytest
 import torch
 import yaml
 
-from bench.run import Project, own_params, score_model, training_of
+from bench.run import Project, own_params, score_model
 from facefolds_core.errors import UserError
-from facefolds_core.facts import fact
-from facefolds_core.files.writing import write_json
 from facefolds_core.model.storage import save_model
 from facefolds_core.scoring.perceptual import Perceptual
 from tests.scoring.fakes import FRAMES, SPEC, flat_scene, half_mask, tiny_model
@@ -47,22 +45,6 @@ def test_a_failed_stage_says_what_it_said(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="a parameter is wrong") as caught:
         project.run("configure")
     assert caught.value.place == "configure of actor"
-
-
-def test_levels_that_were_begun_again_are_counted(tmp_path: Path) -> None:
-    folders = Project(tmp_path, "x").folders
-    write_json(folders.model / "training.json", {"seconds": 3})
-    assert training_of(folders) == {"seconds": 3, "restarts": 0}
-    write_json(
-        folders.model / "fit.json",
-        {
-            "events": [
-                fact("diverged", level=1, rate=0.1).to_json(),
-                fact("mesh_is_off", share=0.5, distance=1).to_json(),
-            ]
-        },
-    )
-    assert training_of(folders)["restarts"] == 1
 
 
 def test_a_model_is_scored_on_its_held_out_cameras(tmp_path: Path) -> None:

@@ -58,17 +58,13 @@ def test_pictures_with_jittered_poses_are_one_camera(tmp_path: Path, labels: str
     names = tuple(view.name for view in capture.views)
     scene = scene_of(root, "transforms", tmp_path / "scene", names)
     check_same(scene, film(), dict(zip(names, film().names, strict=True)), tolerance=1e-3)
-    (note,) = [one for one in capture.left_out if one.kind == "calibration_varies"]
-    assert note.values["cameras"] == 5
-    assert 0.001 < note.values["pixels"] < 0.1
 
 
-def test_a_jittered_focal_length_is_averaged_and_said(tmp_path: Path) -> None:
+def test_a_jittered_focal_length_is_averaged(tmp_path: Path) -> None:
     camera = film().cameras[0]
     root = write(tmp_path, "{c}/{k}.png", jitter=0, fl_x=camera.K[0, 0] * 1.003)
     capture = read(root)
     assert capture.views[0].camera.K[0, 0] == pytest.approx(camera.K[0, 0] * 1.001)
-    assert [one.values["worst"] for one in capture.left_out] == [camera.name]
 
 
 def test_a_camera_that_moves_is_none_of_several(tmp_path: Path) -> None:

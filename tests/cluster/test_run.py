@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import subprocess
@@ -78,7 +77,6 @@ def test_results_are_as_of_dvc_repro_and_a_failing_job_fails_alone(tmp_path: Pat
     status, output = run(parallel, project_root, "facefolds_core", "run", "-j", "3")
     assert status == 1
     assert "evaluate: error: this one is bad" in output
-    assert "to repeat it: dvc repro evaluate@bad" in output
     assert "not found in the cache" not in output
     lines = {line.split()[0]: line.split()[1] for line in output.splitlines() if line[:2] in ("a ", "bb", "ba")}
     assert lines == {"a": "done", "bb": "done", "bad": "failed"}
@@ -170,22 +168,3 @@ def test_a_sweep_gives_a_table(tmp_path: Path, project_root: Path) -> None:
     header, *rows = (root / "t.csv").read_text().splitlines()
     assert "decimate.resolution" in header
     assert len(rows) == 2
-
-
-def test_a_failed_cell_is_repeated_with_its_values(tmp_path: Path, project_root: Path) -> None:
-    root = make_project(tmp_path / "project", "bad")
-    (root / "grid.yaml").write_text("decimate.resolution: [8, 16]\n")
-    status, output = run(root, project_root, "facefolds_core", "run", "--sweep", "grid.yaml", "--out", "t.csv")
-    assert status == 1
-    before = (root / "t.csv").read_bytes()
-    told = sorted(line.split("to repeat it: facefolds ")[1] for line in output.splitlines() if "to repeat it" in line)
-    assert len(set(told)) == 2
-    command = told[0].split()
-    assert run(root, project_root, "facefolds_core", *command)[0] == 1
-    values = {}
-    for table in (root / "t.csv", root / command[-1]):
-        with table.open(newline="") as lines:
-            values[table] = [row["decimate.resolution"] for row in csv.DictReader(lines)]
-    cell = yaml.safe_load((root / command[command.index("--sweep") + 1]).read_text())
-    assert values == {root / "t.csv": ["8", "16"], root / command[-1]: [str(cell["decimate.resolution"][0])]}
-    assert (root / "t.csv").read_bytes() == before

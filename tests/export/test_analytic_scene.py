@@ -47,12 +47,12 @@ def export(
     model: Ellipsoids, folder: Path, resolution: int, uv: Literal["nearest", "exact"] = "exact", size: int | None = None
 ) -> Exported:
     window = visible_window(model, RIG)
-    grids = sample_grids(model, resolution, window, progress=False)
-    write_textures(folder / "samples.arrow", model, grids, progress=False)
+    grids = sample_grids(model, resolution, window)
+    write_textures(folder / "samples.arrow", model, grids)
     poisson = ReconstructParams(depth=6)
     surfaces = [reconstruct(gather_samples(grids, i, None), poisson, i) for i in range(grids.num_layers)]
-    meshes = decimate_layers(surfaces, grids, 32, DecimateParams(uv=uv), progress=False)
-    resample_store(folder / "samples.arrow", folder / "textures.arrow", size or resolution, progress=False)
+    meshes = decimate_layers(surfaces, grids, 32, DecimateParams(uv=uv))
+    resample_store(folder / "samples.arrow", folder / "textures.arrow", size or resolution)
     return Exported(meshes, FrameStore(folder / "textures.arrow"))
 
 
@@ -89,8 +89,8 @@ def test_each_step_of_the_grid_export_loses_no_more_than_this(
 ) -> None:
     # PSNR to the model of the samples as a mesh, and of the decimated meshes: seen 67 and 65 dB at 32 x 32 vertices, 67
     # and 39 at 8 x 8.
-    grids = sample_grids(model, 192, visible_window(model, RIG), progress=False)
-    opacity = write_textures(tmp_path / "samples.arrow", model, grids, progress=False)
+    grids = sample_grids(model, 192, visible_window(model, RIG))
+    opacity = write_textures(tmp_path / "samples.arrow", model, grids)
     sheets = grid_sheets(replace(grids, opacity=opacity), None)
     samples = FrameStore(tmp_path / "samples.arrow")
     coarse = decimate_sheets(sheets, resolution**2)

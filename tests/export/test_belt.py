@@ -63,7 +63,7 @@ def model(waves: float = 0.0) -> RadianceManifolds:
 
 @pytest.fixture(scope="module")
 def grids() -> Grids:
-    return sample_grids(model(), N, WINDOW, progress=False)
+    return sample_grids(model(), N, WINDOW)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def sheets(grids: Grids) -> Sheets:
 
 @pytest.fixture(scope="module")
 def bumpy() -> Sheets:
-    return grid_sheets(sample_grids(model(0.02), N, WINDOW, progress=False), None)
+    return grid_sheets(sample_grids(model(0.02), N, WINDOW), None)
 
 
 def off(points: NDArray[np.float32], radius: float) -> NDArray[np.float64]:

@@ -179,7 +179,7 @@ def test_coarser_levels_are_never_finer_than_the_full_one(
     tmp_path: Path, method: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = make_scene(tmp_path, cameras=3, size=40, frames=1)
-    grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
+    grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4))
     write_frames(tmp_path / "samples.arrow", (8, 8, 4), [(n, 0, np.full((8, 8, 4), 255, np.uint8)) for n in range(2)])
     for name, value in {"MESHES": (8, 16), "MESH_LOSS": 50.0, "FIDELITY": 0.0}.items():
         monkeypatch.setattr(choosing, name, value)

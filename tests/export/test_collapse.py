@@ -25,7 +25,7 @@ CENTRE = np.array(Ellipsoids().chart.centre)
 
 @pytest.fixture(scope="module")
 def sheets() -> Sheets:
-    return grid_sheets(sample_grids(Ellipsoids(), N, WINDOW, progress=False), None)
+    return grid_sheets(sample_grids(Ellipsoids(), N, WINDOW), None)
 
 
 def rough(sheets: Sheets, seed: int) -> Sheets:

@@ -29,7 +29,7 @@ CENTRE = np.array(CHART.centre)
 
 @pytest.fixture(scope="module")
 def grids() -> Grids:
-    return sample_grids(Ellipsoids(), 96, WINDOW, progress=False)
+    return sample_grids(Ellipsoids(), 96, WINDOW)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_exact_texture_coordinates_are_the_direction(grids: Grids) -> None:
 
 
 def test_layers_in_order_do_not_cross(grids: Grids, surfaces: list[Surface]) -> None:
-    order = layer_order(decimate_layers(surfaces, grids, 16, DecimateParams(), progress=False), CHART)
+    order = layer_order(decimate_layers(surfaces, grids, 16, DecimateParams()), CHART)
     assert order.compared > 200
     assert order.crossed == 0
 
@@ -99,12 +99,12 @@ def test_layers_out_of_order_are_counted(surfaces: list[Surface]) -> None:
 
 def test_a_surface_too_many_is_an_error(grids: Grids, surfaces: list[Surface]) -> None:
     with pytest.raises(UserError, match="do not belong together"):
-        decimate_layers(surfaces * 2, grids, 16, DecimateParams(), progress=False)
+        decimate_layers(surfaces * 2, grids, 16, DecimateParams())
 
 
 def test_where_nothing_is_left_of_a_layer_its_resolution_is_named(grids: Grids, surfaces: list[Surface]) -> None:
     """Faces that all look inwards are dropped."""
     inwards = [Surface(one.vertices, np.ascontiguousarray(one.faces[:, ::-1])) for one in surfaces]
     with pytest.raises(UserError, match="left nothing") as caught:
-        decimate_layers(inwards, grids, 16, DecimateParams(), progress=False)
+        decimate_layers(inwards, grids, 16, DecimateParams())
     assert "R^m 16" in str(caught.value) and "decimate.resolution" in str(caught.value)

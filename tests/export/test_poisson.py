@@ -28,7 +28,7 @@ PARAMS = ReconstructParams(depth=6)
 
 
 def surface_of(model: Ellipsoids, resolution: int, window: Window, params: ReconstructParams = PARAMS) -> Surface:
-    grids = sample_grids(model, resolution, window, progress=False)
+    grids = sample_grids(model, resolution, window)
     return reconstruct(gather_samples(grids, 0, params.resolution), params, 0)
 
 
@@ -55,7 +55,7 @@ def test_the_surface_covers_the_samples_and_little_more() -> None:
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW], ids=["hemisphere", "window"])
 def test_the_surface_lies_on_the_layer(window: Window) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 128, window, progress=False)
+    grids = sample_grids(model, 128, window)
     result = reconstruct(gather_samples(grids, 0, None), PARAMS, 0)
     scaled = (result.vertices - model.centre.numpy()) / np.array(model.axes[0])
     error = np.abs(np.linalg.norm(scaled, axis=-1) - 1) * 0.35
@@ -72,21 +72,21 @@ def test_faces_look_outward() -> None:
 
 @pytest.mark.slow
 def test_two_processes_give_what_one_gives() -> None:
-    grids = sample_grids(Ellipsoids(), 48, WINDOW, progress=False)
+    grids = sample_grids(Ellipsoids(), 48, WINDOW)
     apart = [reconstruct(gather_samples(grids, i, None), PARAMS, i) for i in range(2)]
-    together = reconstruct_layers(grids, PARAMS, progress=False)
+    together = reconstruct_layers(grids, PARAMS)
     for a, b in zip(apart, together, strict=True):
         assert np.array_equal(a.vertices, b.vertices)
         assert np.array_equal(a.faces, b.faces)
 
 
 def test_thinning_keeps_one_sample_in_k_squared() -> None:
-    grids = sample_grids(Ellipsoids(), 64, (-0.1, 0.1, -0.1, 0.1), progress=False)
+    grids = sample_grids(Ellipsoids(), 64, (-0.1, 0.1, -0.1, 0.1))
     assert len(gather_samples(grids, 0, 16).points) == 16**2
 
 
 def test_samples_are_evenly_spread_up_to_the_poles() -> None:
-    grids = sample_grids(Ellipsoids(axes=((0.3, 0.3, 0.3),)), 64, FULL_WINDOW, progress=False)
+    grids = sample_grids(Ellipsoids(axes=((0.3, 0.3, 0.3),)), 64, FULL_WINDOW)
     samples = gather_samples(grids, 0, None)
     # Area of the half sphere over the square of the spacing.
     assert len(samples.points) == pytest.approx(2 / np.pi * 64**2, rel=0.1)

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from facefolds_core.errors import UserError
 from facefolds_core.export import sampling
-from facefolds_core.export.bilinear import Projection
 from facefolds_core.export.sampling import grid_normals, sample_grids, samples_for, texture_rows, write_textures
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.geometry.chart import Chart
@@ -28,7 +26,7 @@ WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
 def test_points_lie_on_the_layers_at_the_grids_uv(window: Window) -> None:
     model = Ellipsoids(axes=SPHERES)
-    grids = sample_grids(model, 24, window, progress=False)
+    grids = sample_grids(model, 24, window)
     uv, radius = points_to_uv(grids.points.astype(np.float64), model.centre.numpy())
     assert np.abs(uv - texel_uv(24, 24, window)).max() < 1e-5
     assert np.abs(radius - np.array([0.35, 0.30])[:, None, None]).max() < 1e-6
@@ -37,7 +35,7 @@ def test_points_lie_on_the_layers_at_the_grids_uv(window: Window) -> None:
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW])
 def test_normals_of_an_ellipsoid(window: Window) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 96, window, progress=False)
+    grids = sample_grids(model, 96, window)
     for points, normals, axes in zip(grids.points, grids.normals, model.axes, strict=True):
         true = (points - model.centre.numpy()) / np.array(axes) ** 2
         true /= np.linalg.norm(true, axis=-1, keepdims=True)
@@ -47,7 +45,7 @@ def test_normals_of_an_ellipsoid(window: Window) -> None:
 
 def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
     model = Ellipsoids(axes=SPHERES)
-    grids = sample_grids(model, 128, FULL_WINDOW, progress=False)
+    grids = sample_grids(model, 128, FULL_WINDOW)
     outward = grids.points[0] - model.centre.numpy()
     outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
     noisy = grids.points[0] * (1 + 1e-5 * np.random.default_rng(0).standard_normal((128, 128, 1)))
@@ -57,8 +55,8 @@ def test_noise_of_the_search_does_not_turn_the_normals_at_the_poles() -> None:
 
 def test_invalid_neighbours_do_not_bend_the_normals() -> None:
     model = Ellipsoids(hole=0.15)
-    grids = sample_grids(model, 64, WINDOW, progress=False)
-    whole = sample_grids(Ellipsoids(), 64, WINDOW, progress=False)
+    grids = sample_grids(model, 64, WINDOW)
+    whole = sample_grids(Ellipsoids(), 64, WINDOW)
     assert not grids.valid.all()
     cosine = (grids.normals * whole.normals).sum(-1)[grids.valid]
     assert cosine.min() > 0.999
@@ -82,8 +80,8 @@ def test_rows_near_the_poles_span_more_columns() -> None:
 
 def test_textures_are_the_models(tmp_path: Path) -> None:
     model = Ellipsoids()
-    grids = sample_grids(model, 16, WINDOW, progress=False)
-    write_textures(tmp_path / "textures.arrow", model, grids, progress=False)
+    grids = sample_grids(model, 16, WINDOW)
+    write_textures(tmp_path / "textures.arrow", model, grids)
     store = FrameStore(tmp_path / "textures.arrow")
     rgb, alpha = model.texture(torch.as_tensor(texel_uv(16, 16, WINDOW).reshape(-1, 2)), 0, 1.0)
     expected = torch.cat([rgb, alpha[:, None]], 1).reshape(16, 16, 4).numpy()
@@ -93,15 +91,15 @@ def test_textures_are_the_models(tmp_path: Path) -> None:
 
 def test_textures_are_transparent_where_the_layer_is_missing() -> None:
     model = Ellipsoids(hole=0.15)
-    grids = sample_grids(model, 32, WINDOW, progress=False)
-    _, _, image = next(texture_rows(model, grids, progress=False))
+    grids = sample_grids(model, 32, WINDOW)
+    _, _, image = next(texture_rows(model, grids))
     assert (image[~grids.valid[0]] == 0).all()
     assert (image[grids.valid[0], 3] > 0).all()
 
 
 def test_a_layer_without_any_point_is_named() -> None:
     with pytest.raises(UserError, match="layer 0"):
-        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW, progress=False)
+        sample_grids(Ellipsoids(hole=9.0), 16, WINDOW)
 
 
 @dataclass(frozen=True)
@@ -124,13 +122,13 @@ class Broken(Ellipsoids):
 
 def test_nan_in_the_surface_is_caught() -> None:
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 1"):
-        sample_grids(Broken(), 16, WINDOW, progress=False)
+        sample_grids(Broken(), 16, WINDOW)
 
 
 def test_nan_in_a_texture_is_caught() -> None:
-    grids = sample_grids(Ellipsoids(), 16, WINDOW, progress=False)
+    grids = sample_grids(Ellipsoids(), 16, WINDOW)
     with pytest.raises(UserError, match=r"not finite[\s\S]*layer 0, frame 0"):
-        next(texture_rows(Broken(), grids, progress=False))
+        next(texture_rows(Broken(), grids))
 
 
 @dataclass(frozen=True)
@@ -162,43 +160,3 @@ def test_samples_are_no_coarser_than_the_models_texels(monkeypatch: pytest.Monke
     assert [samples_for(Fine(), window) for window in (whole, upper, narrow)] == [704, 384, 448]
     monkeypatch.setattr(sampling, "LEAST", 1024)
     assert samples_for(Fine(), whole) == samples_for(Ellipsoids(), whole) == 1024
-
-
-def test_frames_whose_texels_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    grids = sample_grids(OfTexels(), 16, WINDOW, progress=False)
-    made, project = list[int](), Projection.__call__
-
-    def counted(self: Projection, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        made.append(1)
-        return project(self, image)
-
-    monkeypatch.setattr(Projection, "__call__", counted)
-    for name, model in (("first", OfTexels()), ("again", OfTexels()), ("changed", OfTexels(changed=2))):
-        write_textures(tmp_path / name, model, grids, tmp_path / "kept", progress=False)
-        assert len(made) == {"first": 8, "again": 0, "changed": 2}[name]  # of 4 frames of 2 layers
-        made.clear()
-    opacity = write_textures(tmp_path / "whole", OfTexels(changed=2), grids, progress=False)
-    assert (tmp_path / "changed").read_bytes() == (tmp_path / "whole").read_bytes()
-    kept = write_textures(tmp_path / "changed", OfTexels(changed=2), grids, tmp_path / "kept", progress=False)
-    assert np.array_equal(kept, opacity)
-
-
-class Flashing(OfTexels):
-    """More opaque in one frame."""
-
-    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
-        rgb, alpha = super().texture(uv, layer, time)
-        return rgb, alpha * (1.0 if time == self.changed else 0.5)
-
-
-def test_a_layer_shows_where_the_frames_asked_for_do(tmp_path: Path) -> None:
-    model = Flashing(changed=2)
-    grids = sample_grids(model, 8, WINDOW, progress=False)
-    by_all, by_others, by_one = (
-        write_textures(tmp_path / "t.arrow", model, grids, among=among, progress=False)
-        for among in (None, [0, 1, 3], [2])
-    )
-    without = write_textures(tmp_path / "t.arrow", Flashing(), grids, progress=False)
-    assert np.array_equal(by_others, without)
-    assert np.array_equal(by_one, by_all)
-    assert not np.array_equal(by_others, by_all)

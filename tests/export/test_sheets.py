@@ -21,7 +21,7 @@ CENTRE = np.array(Ellipsoids().chart.centre)
 
 @pytest.fixture(scope="module")
 def grids() -> Grids:
-    return sample_grids(Ellipsoids(), 48, WINDOW, progress=False)
+    return sample_grids(Ellipsoids(), 48, WINDOW)
 
 
 def test_vertices_are_the_samples_with_exact_texture_coordinates(grids: Grids) -> None:
@@ -44,7 +44,7 @@ def test_thinned_samples_keep_their_texture_coordinates(grids: Grids) -> None:
 
 
 def test_no_face_touches_a_sample_that_is_not_valid() -> None:
-    grids = sample_grids(Ellipsoids(hole=0.1), 48, WINDOW, progress=False)
+    grids = sample_grids(Ellipsoids(hole=0.1), 48, WINDOW)
     sheets = grid_sheets(grids, None)
     assert not grids.valid.all()
     for mesh, valid in zip(full_meshes(sheets), grids.valid, strict=True):

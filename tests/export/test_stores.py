@@ -36,7 +36,7 @@ TRIANGLE = TexturedMesh(
 
 @pytest.fixture(scope="module")
 def grids() -> Grids:
-    return sample_grids(Ellipsoids(), 8, (-0.5, 0.5, -0.5, 0.5), progress=False)
+    return sample_grids(Ellipsoids(), 8, (-0.5, 0.5, -0.5, 0.5))
 
 
 def test_grids_round_trip(tmp_path: Path, grids: Grids) -> None:

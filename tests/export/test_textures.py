@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.errors import UserError
-from facefolds_core.export import textures
-from facefolds_core.export.textures import Image, resample, resample_store
+from facefolds_core.export.textures import resample, resample_store
 from facefolds_core.files.frame_store import FrameStore, write_frames
 
 
@@ -94,7 +93,7 @@ def write(path: Path, keys: list[tuple[int, int]], size: int = 8) -> None:
 
 def test_the_store_keeps_layers_and_frames(tmp_path: Path) -> None:
     write(tmp_path / "in.arrow", [(layer, frame) for frame in range(3) for layer in range(2)])
-    resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+    resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
     out = FrameStore(tmp_path / "out.arrow")
     assert out.keys() == [(layer, frame) for layer in range(2) for frame in range(3)]
     assert np.array_equal(out.image(1, 2), resample(noise(8, 12), 4))
@@ -103,7 +102,7 @@ def test_the_store_keeps_layers_and_frames(tmp_path: Path) -> None:
 def test_a_missing_image_is_an_error(tmp_path: Path) -> None:
     write(tmp_path / "in.arrow", [(0, 0), (1, 0), (0, 1)])
     with pytest.raises(UserError, match="not complete"):
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
 
 
 def test_a_truncated_store_is_an_error_and_leaves_nothing(tmp_path: Path) -> None:
@@ -111,24 +110,5 @@ def test_a_truncated_store_is_an_error_and_leaves_nothing(tmp_path: Path) -> Non
     whole = (tmp_path / "in.arrow").read_bytes()
     (tmp_path / "in.arrow").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(UserError, match="damaged"):
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4, progress=False)
+        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", 4)
     assert [p.name for p in tmp_path.iterdir()] == ["in.arrow"]
-
-
-def test_frames_that_are_the_same_are_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = list[int]()
-
-    def counted(image: Image, size: int) -> Image:
-        made.append(size)
-        return resample(image, size)
-
-    monkeypatch.setattr(textures, "resample", counted)
-    for changed, size, count in ((-1, 4, 6), (-1, 4, 0), (1, 4, 2), (1, 5, 6)):
-        rows = ((n, k, noise(8, 10 * n + k + 100 * (k == changed))) for k in range(3) for n in range(2))
-        write_frames(tmp_path / "in.arrow", (8, 8, 4), rows)
-        resample_store(tmp_path / "in.arrow", tmp_path / "out.arrow", size, tmp_path / "kept", progress=False)
-        assert len(made) == count
-        made.clear()
-        resample_store(tmp_path / "in.arrow", tmp_path / "anew.arrow", size, progress=False)
-        assert (tmp_path / "out.arrow").read_bytes() == (tmp_path / "anew.arrow").read_bytes()
-        made.clear()

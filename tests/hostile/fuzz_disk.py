@@ -31,7 +31,6 @@ from facefolds_core.pipeline.sample import sample
 from facefolds_core.pipeline.subject import subject
 from facefolds_core.pipeline.texture import texture
 from facefolds_core.pipeline.train import train
-from facefolds_core.training import patience
 from stages.configure import configure
 from tests.golden import digests
 from tests.hostile.damage import Counts, Outcome, fingerprint, outcome
@@ -121,10 +120,8 @@ def filled_disk(folder: Path, free: int) -> Iterator[None]:
 
 def run(count: int, seed: int, folder: Path) -> Counts:
     """`count` cases: the stages in turn, every second one, and then the others, on a full disk where one can be had."""
-    counts, before = Counts(), patience.SECONDS
-    patience.SECONDS = 0.0
+    counts = Counts()
     with ExitStack() as stack:
-        stack.callback(setattr, patience, "SECONDS", before)
         try:
             root, disk = stack.enter_context(small_disk(folder / "disk")), True
         except NoSmallDiskError as error:

@@ -178,7 +178,7 @@ def make(root: Path) -> None:
     splats = Splats(random.normal(size=(7, COLUMNS)).astype(np.float32), np.zeros(3, np.float32))
     fit = CameraFit(np.full((1, 3), 1.5), np.full(1, 0.1))
     write_found(root / "subject" / "gaussians.npz", FoundSubject(splats, 30.0, fit))
-    grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5), progress=False)
+    grids = sample_grids(Ellipsoids(), 6, (-0.5, 0.5, -0.5, 0.5))
     grids = replace(grids, chart=Chart(grids.chart.centre, Belt(0.8, 0.3)))
     write_grids(root / "samples" / "grids.npz", grids)
     write_sheets(root / "surfaces" / "sheets.npz", grid_sheets(grids, None))

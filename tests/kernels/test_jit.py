@@ -9,13 +9,12 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from facefolds_core.kernels import jit
-from facefolds_core.kernels.jit import compiled, fingerprint, kernel
+from facefolds_core.kernels.jit import fingerprint, kernel
 
 NUMBA_COMPILERS = {"njit", "jit", "vectorize", "guvectorize", "cfunc", "stencil", "generated_jit", "experimental"}
 
@@ -81,19 +80,6 @@ def test_an_edit_of_an_imported_module_is_compiled(tmp_path: Path, decorator: st
     assert answer(power=2.0) == "118.0 0"
 
 
-def test_a_constant_changed_at_run_time_is_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    from facefolds_core.export import hold_kernel
-    from facefolds_core.kernels import hit_codes
-
-    before = fingerprint(hold_kernel.add_weights)
-    assert fingerprint(hold_kernel.add_weights) == before
-    monkeypatch.setattr(hit_codes, "SCALE", 0.5)
-    changed = fingerprint(hold_kernel.add_weights)
-    monkeypatch.undo()
-    monkeypatch.setattr(hold_kernel, "_tap", hit_codes.corner)
-    assert len({before, changed, fingerprint(hold_kernel.add_weights)}) == 3
-
-
 def test_options_and_libraries_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     def function(x: float) -> float:
         return math.sqrt(x)
@@ -103,23 +89,6 @@ def test_options_and_libraries_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(module, "__version__", version)
         both.add(fingerprint(kernel(function)))
     assert len(both) == 5
-
-
-def test_attributes_of_a_module_that_two_functions_share_are_all_seen() -> None:
-    module = ModuleType("somewhere")
-
-    def make(second: float) -> str:
-        module.first, module.second = 1.0, second  # type: ignore[attr-defined]
-        inner = compiled(lambda x: x + module.second)  # type: ignore[attr-defined]
-        return fingerprint(kernel(lambda x: module.first + inner(x)))  # type: ignore[attr-defined]
-
-    assert make(1.0) == make(1.0) != make(2.0)
-
-
-def test_a_global_that_cannot_be_judged_is_refused() -> None:
-    table = {"a": 1.0}
-    with pytest.raises(TypeError, match="global of type dict"):
-        fingerprint(kernel(lambda x: x + table["a"]))
 
 
 def test_kernels_run_where_no_cache_can_be_written(tmp_path: Path) -> None:

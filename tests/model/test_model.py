@@ -1,12 +1,10 @@
 """The model as its users see it: initialisation, latents, rendering, export queries, files."""
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 import torch
-from safetensors.torch import save_file
 
 from facefolds_core.captures.scene import SPHERE_CENTRE
 from facefolds_core.errors import UserError
@@ -138,17 +136,6 @@ def test_saved_model_loads_to_the_same_picture(tmp_path: Path) -> None:
     assert torch.equal(
         loaded.render(origins, directions, 0.5, True).rgb, model.render(origins, directions, 0.5, True).rgb
     )
-
-
-def test_a_model_of_version_1_has_the_scales_of_its_time(tmp_path: Path) -> None:
-    model = make_model()
-    description = {**spec().model_dump(mode="json"), "version": 1}
-    del description["input_scale"], description["output_scale"]
-    text = json.dumps(description)
-    save_file(model.state_dict(), tmp_path / "model.safetensors", metadata={"spec": text})
-    (tmp_path / "model.json").write_text(text)
-    manifolds = load_model(tmp_path).manifolds
-    assert (manifolds.scale, manifolds.output_scale) == (pytest.approx(6 / LEVELS[0]), 1.0)
 
 
 def test_a_model_keeps_its_scales(tmp_path: Path) -> None:

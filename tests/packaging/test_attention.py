@@ -12,7 +12,7 @@ import pytest
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.packing import MACROBLOCK, AtlasLayout
-from facefolds_core.asset.regions import Region, nowhere
+from facefolds_core.asset.regions import Region
 from facefolds_core.asset.video import decode_video, encode_video, pack_frame, unpack_picture
 from facefolds_core.asset.writer import LevelContent
 from facefolds_core.packaging.attention import block_weights, merged, offsets, regions_of, views_of
@@ -88,8 +88,8 @@ def test_where_nothing_shows_nothing_is_marked() -> None:
 
 
 def test_no_cameras_or_no_strength_is_no_region() -> None:
-    assert regions_of(content(Waves()), [], USUAL) is nowhere
-    assert regions_of(content(Waves()), cameras(), AttentionParams(strength=0)) is nowhere
+    assert regions_of(content(Waves()), [], USUAL) == ()
+    assert regions_of(content(Waves()), cameras(), AttentionParams(strength=0)) == ()
 
 
 def test_regions_are_the_steps_without_overlap() -> None:
@@ -123,7 +123,7 @@ def test_h264_codes_a_region_as_it_is_told(tmp_path: Path) -> None:
 def test_what_is_seen_gets_the_bits() -> None:
     """The middle of the outermost layer shows; the same place of the innermost lies behind two others."""
     full = content(Waves(), frames=FRAMES)
-    found = regions_of(replace(full), cameras()[:1], USUAL)(range(1))
+    found = regions_of(replace(full), cameras()[:1], USUAL)
 
     def offset(layer: int) -> int:
         x, y, width, height = full.layout.rects[layer]
@@ -132,30 +132,3 @@ def test_what_is_seen_gets_the_bits() -> None:
         return next((region.offset for region in inside), 0)
 
     assert offset(0) + 6 <= offset(2)
-
-
-class ChangedAt(Changed):
-    """In one frame alone."""
-
-    def __init__(self, frame: int) -> None:
-        super().__init__(0, slice(3, 4), -150)
-        self._frame = frame
-
-    def image(self, layer: int, frame: int, /) -> np.ndarray:
-        return super().image(layer, frame) if frame == self._frame else Waves().image(layer, frame)
-
-
-def test_segments_are_looked_at_by_themselves() -> None:
-    first, last = range(2), range(FRAMES - 2, FRAMES)
-
-    def found(textures: Waves, of: str, part_frames: int = 2) -> list[object]:
-        full = replace(content(textures, FRAMES), part_frames=part_frames)
-        regions = regions_of(full, cameras()[:1], USUAL.model_copy(update={"of": of}))
-        return [regions(frames) for frames in (first, last)]
-
-    before, after = (found(textures, "take") for textures in (Waves(), ChangedAt(FRAMES - 1)))
-    assert before[0] == before[1] != after[0] == after[1]
-    before, after = (found(textures, "segment") for textures in (Waves(), ChangedAt(FRAMES - 1)))
-    assert before[0] == after[0]
-    assert before[1] != after[1]
-    assert found(Waves(), "segment", part_frames=0) == found(Waves(), "take")

@@ -33,22 +33,6 @@ def test_what_is_longer_than_it_may_be_in_one_piece(tmp_path: Path, beyond: floa
     assert sum(1 for _ in asset.frames()) == 3
 
 
-def test_what_an_earlier_run_encoded_is_taken_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, kept = filmed(tmp_path / "scene"), tmp_path / "kept"
-    section = {"levels": LEVELS, "stream": {"beyond": 0.05, "segment_seconds": 0.1}, "video": {"target_psnr": 38}}
-    packaged(tmp_path / "first" / "asset", scene, section, kept=kept)
-    assert len(list(kept.iterdir())) > 2  # of two levels, and of the search
-
-    def encode(*arguments: object) -> int:
-        raise AssertionError("encoded again")
-
-    monkeypatch.setattr("facefolds_core.asset.parts.encode_video", encode)
-    packaged(tmp_path / "second" / "asset", scene, section, kept=kept)
-    first, second = (tmp_path / name / "asset" for name in ("first", "second"))
-    assert [path.name for path in sorted(first.iterdir())] == [path.name for path in sorted(second.iterdir())]
-    assert all((second / path.name).read_bytes() == path.read_bytes() for path in first.iterdir())
-
-
 def test_a_still_picture_is_no_stream() -> None:
     params = StreamParams(beyond=0)
     assert not is_streamed(params, 1, 30.0) and not is_streamed(params, 1, 0.0)

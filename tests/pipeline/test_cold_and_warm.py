@@ -35,12 +35,12 @@ SCRIPTS = {
     """,
     "train": """
         from facefolds_core.params import ExplicitParams
-        from facefolds_core.training.explicit.loop import train_explicit
+        from facefolds_core.training.explicit.loop import fit_explicit
         from tests.scenes import OPAQUE, make_scene
 
         scene = make_scene(folder / "scene", size=32, surface_radius=OPAQUE[0].radius, mattes=True)
         params = ExplicitParams.model_validate({"device": "cpu", "layers": 4, "iterations": 183})
-        train_explicit(scene, params, folder / "model", folder / "log")
+        fit_explicit(scene, params, folder / "log").save(folder / "model")
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,
     "decimate": """
@@ -49,7 +49,7 @@ SCRIPTS = {
         from facefolds_core.export.sheets import grid_sheets
         from tests.ellipsoids import Ellipsoids
 
-        grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4), progress=False)
+        grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4))
         for mesh in decimate_sheets(grid_sheets(grids, None), 64):
             show(mesh.vertices, mesh.faces, mesh.st)
     """,

@@ -22,7 +22,6 @@ PANELS = [
     "What ships",
     "Time and bytes by stage",
     "Configuration",
-    "Versions",
 ]
 
 Open = Callable[..., Page]
@@ -52,73 +51,15 @@ def open_report(new_page: Callable[..., Page], report: Path) -> Iterator[Open]:
     assert {url for url in requests if not url.startswith("data:")} == {report.as_uri()}
 
 
-def share_of_truth(page: Page) -> float:
-    """Percent of the picture in front of the divider that is the photo."""
-    clip = page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).clipPath")
-    numbers = [float(text) for text in re.findall(r"[\d.]+(?=%)", clip)]
-    return 100 - numbers[0]
-
-
 @pytest.mark.parametrize("viewport", [PHONE, DESKTOP], ids=["phone", "desktop"])
 def test_all_panels_are_there_and_fit(open_report: Open, viewport: dict[str, int]) -> None:
     page = open_report(viewport=viewport)
     assert page.locator("h2").all_inner_texts() == PANELS
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"]
     assert page.evaluate("[...document.images].filter((i) => !i.naturalWidth).length") == 0
-    outside = """[...document.querySelectorAll('main *')].filter((e) => !e.closest('.scroll, svg, .wipe, .plain')
+    outside = """[...document.querySelectorAll('main *')].filter((e) => !e.closest('.scroll, svg')
         && e.getBoundingClientRect().right > innerWidth).length"""
     assert page.evaluate(outside) == 0
-
-
-def test_the_divider_follows_keys_and_drags(open_report: Open) -> None:
-    page = open_report()
-    assert share_of_truth(page) == pytest.approx(50)
-    slider = page.get_by_role("slider", name="Divide between truth")
-    slider.focus()
-    page.keyboard.press("ArrowRight")
-    assert share_of_truth(page) == pytest.approx(51)
-    page.keyboard.press("Home")
-    assert share_of_truth(page) == pytest.approx(0)
-    picture = page.locator(".view:visible .wipe")
-    picture.scroll_into_view_if_needed()
-    box = picture.bounding_box()
-    assert box is not None
-    page.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2)
-    assert share_of_truth(page) == pytest.approx(80, abs=1)
-    page.mouse.move(box["x"] + 3 * box["width"], box["y"])
-    assert share_of_truth(page) == pytest.approx(100)
-    page.mouse.up()
-    page.mouse.move(box["x"] + 5, box["y"] + 5)
-    assert share_of_truth(page) == pytest.approx(100)
-    assert slider.input_value() == "100"
-
-
-def test_a_touch_moves_the_divider(open_report: Open) -> None:
-    page = open_report(viewport=PHONE, has_touch=True)
-    picture = page.locator(".view:visible .wipe")
-    picture.scroll_into_view_if_needed()
-    box = picture.bounding_box()
-    assert box is not None
-    page.touchscreen.tap(box["x"] + 0.25 * box["width"], box["y"] + 0.3 * box["height"])
-    assert share_of_truth(page) == pytest.approx(25, abs=1)
-
-
-def test_pictures_are_chosen_by_list_buttons_and_heat_map(open_report: Open) -> None:
-    page = open_report()
-    choice = page.get_by_label("Held-out picture", exact=True)
-    page.get_by_role("slider", name="Divide").press("Home")
-    choice.select_option("1")
-    assert page.locator(".view:visible").get_attribute("data-view") == "1"
-    assert share_of_truth(page) == pytest.approx(0)  # the divider stays
-    page.get_by_role("button", name="Next picture").click()
-    page.get_by_role("button", name="Next picture").click()
-    assert page.locator(".view:visible").get_attribute("data-view") == "0"
-    page.get_by_role("button", name="Previous picture").click()
-    assert choice.input_value() == str(FRAMES - 1)
-    page.locator(".heat a").first.click()
-    assert page.locator(".view:visible").get_attribute("data-view") == "0"
 
 
 def test_it_follows_light_and_dark(open_report: Open) -> None:
@@ -129,11 +70,6 @@ def test_it_follows_light_and_dark(open_report: Open) -> None:
     levels = [sum(map(int, re.findall(r"\d+", colour))) for colour in colours]
     assert levels[0] > 600
     assert levels[1] < 150
-
-
-def test_without_script_the_first_picture_is_shown(open_report: Open) -> None:
-    page = open_report(java_script_enabled=False)
-    assert page.locator(".view:visible").count() == 1
 
 
 def test_any_frame_of_the_film_is_shown_by_its_name(open_report: Open) -> None:
@@ -164,26 +100,6 @@ def test_a_film_shows_both_halves_one_or_one_after_the_other(open_report: Open) 
     assert half["width"] / half["height"] == pytest.approx(0.5 * wide["width"] / wide["height"], rel=0.02)
     assert seen["photo"][0] == "none" and float(seen["asset"][0].split(",")[4]) < -50  # moved to the left by half
     assert seen["blink"][1] == "other-half"
-
-
-def test_stills_are_zoomed_together_and_blink(open_report: Open) -> None:
-    page = open_report()
-    picture = page.locator(".view:visible .wipe")
-    before = picture.bounding_box()
-    page.get_by_label("Zoom", exact=True).select_option("4")
-    after = picture.bounding_box()
-    assert before is not None and after is not None
-    assert after["width"] == pytest.approx(4 * before["width"], rel=0.02)
-    pans = page.locator(".view:visible .pan")
-    pans.first.evaluate("p => { p.scrollLeft = 30; p.scrollTop = 40; }")
-    page.wait_for_function("() => document.querySelectorAll('.view:not([hidden]) .pan')[1].scrollLeft === 30")
-    assert pans.last.evaluate("p => [p.scrollLeft, p.scrollTop]") == [30, 40]
-    blink = page.get_by_role("button", name="Blink")
-    blink.click()
-    assert blink.get_attribute("aria-pressed") == "true"
-    assert page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).animationName") == "away"
-    blink.click()
-    assert page.locator(".view:visible .over").evaluate("e => getComputedStyle(e).animationName") == "none"
 
 
 def test_it_prints_on_two_pages_at_most_with_the_assets_picture(open_report: Open) -> None:

@@ -13,9 +13,7 @@ from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
 from facefolds_core.files.writing import write_text
 from facefolds_core.reporting import charts, tables, words
-from facefolds_core.reporting.facts import Curve, ImageScores, read_curves, read_facts, read_images
-from facefolds_core.reporting.pictures import as_scored
-from facefolds_core.scoring.record import View
+from facefolds_core.reporting.facts import ImageScores, read_curves, read_facts, read_images
 from facefolds_core.scoring.report import write_per_image
 from tests.reporting.tiny import FRAMES, make_subject, scores
 from tests.scenes import look_at_origin
@@ -48,9 +46,9 @@ def test_garbled_scores_are_named(tmp_path: Path, text: str) -> None:
 def test_scores_alone_are_enough_to_read(tmp_path: Path) -> None:
     write_text(tmp_path / "metrics.json", '{"asset": {}, "cost": {}}')
     facts = read_facts(SubjectFolders(tmp_path))
-    assert (facts.images, facts.curves, facts.config) == ((), (), {})
+    assert (facts.images, facts.curves, facts.config) == ((), {}, {})
     assert facts.training is None
-    assert all(stage.seconds is None for stage in facts.stages)
+    assert all(seconds is None for seconds, _ in facts.stages.values())
 
 
 def test_damaged_scores_of_pictures_are_named(folders: SubjectFolders, tmp_path: Path) -> None:
@@ -64,17 +62,15 @@ def test_damaged_scores_of_pictures_are_named(folders: SubjectFolders, tmp_path:
 def test_facts_are_those_of_the_files(folders: SubjectFolders) -> None:
     facts = read_facts(folders)
     assert facts.images[0] == ImageScores("cam3", "000000", 19.0, 24.0)
-    assert facts.curves == (Curve("psnr", ((0, 10), (2, 20))),)  # the header and NaN are left out
-    costs = {stage.name: stage for stage in facts.stages}
-    assert costs["train"].seconds == 10
-    assert costs["compress"].bytes == sum(path.stat().st_size for path in folders.asset.iterdir())
-    assert costs["bake"].bytes is None
-    assert dict(facts.versions)["numpy"] == np.__version__
+    assert facts.curves == {"psnr": [(0, 10), (2, 20)]}  # the header and NaN are left out
+    assert facts.stages["train"][0] == 10
+    assert facts.stages["compress"][1] == sum(path.stat().st_size for path in folders.asset.iterdir())
+    assert facts.stages["bake"][1] is None
 
 
 def test_a_curve_of_one_point_is_none(tmp_path: Path) -> None:
     write_text(tmp_path / "x.tsv", "step\tx\n0\t1\n")
-    assert read_curves(tmp_path) == ()
+    assert read_curves(tmp_path) == {}
 
 
 @pytest.mark.parametrize(
@@ -111,29 +107,16 @@ def test_a_heat_map_with_gaps() -> None:
         ImageScores("b", "0", 21.0, None),
     ]
     images[1] = replace(images[1], psnr=None)
-    heat = tables.heat_map(images, "psnr", {("a", "0"): 4}, {})
+    heat = tables.heat_map(images, "psnr", {})
     assert heat["frames"] == ["0", "1"]
     assert (heat["low"], heat["high"]) == ("19.0", "22.0")  # at least 3 dB, about the middle
-    assert [cell["pair"] for cell in heat["rows"][0]["cells"]] == [4, None]
     assert [cell["value"] for cell in heat["rows"][1]["cells"]] == ["21.0", "–"]
-
-
-def test_configuration_is_flat_and_whole() -> None:
-    value = {"a": {"b": 1.0, "c": []}, "d": [{"e": None}, {"e": True}], "f": [0.5, 2]}
-    expected = [("a.b", "1"), ("a.c", "none"), ("d.1.e", "none"), ("d.2.e", "yes"), ("f", "0.5, 2")]
-    assert list(tables.flat(value)) == expected
-
-
-def test_thinning_keeps_means() -> None:
-    assert charts.thinned([(0, 0), (1, 2), (2, 4), (3, 6)], 2) == [(0.5, 1), (2.5, 5)]
 
 
 @pytest.mark.parametrize("values", [(1.0, 1.0), (0.0, 1e-9), (-1e6, 1e6)])
 def test_a_line_chart_of_any_range_is_finite(values: tuple[float, float]) -> None:
-    svg = charts.line_chart([(0, values[0]), (1, values[1])], "<x>", "step")
-    assert "nan" not in svg
-    assert "<x>" not in svg
-    assert svg.count("<polyline") == 1
+    svg = charts.line_chart([(0, values[0]), (1, values[1])])
+    assert svg.startswith("<svg") and "nan" not in svg
 
 
 def test_ink_is_read_on_any_colour() -> None:
@@ -144,13 +127,3 @@ def test_the_place_of_a_camera() -> None:
     found = tables.place_of(look_at_origin("left", 30, 20, 8))
     expected = np.degrees(np.arccos(np.cos(np.radians(30)) * np.cos(np.radians(20))))
     assert (found.azimuth, found.elevation, found.angle) == pytest.approx((30, 20, expected))
-
-
-def test_the_asset_is_held_against_the_photo_where_it_is_scored() -> None:
-    truth, asset = np.full((2, 2, 3), 0.8), np.full((2, 2, 3), 0.2)
-    mask = np.array([[1.0, 0.5], [0.0, 0.0]])
-    plain = View("a", "0", truth, asset, None, 20.0, None)
-    np.testing.assert_allclose(as_scored(replace(plain, mask=mask))[..., 0], [[0.2, 0.5], [0.8, 0.8]])
-    np.testing.assert_array_equal(as_scored(plain), asset)
-    over = np.full((2, 2, 3), 0.4)
-    np.testing.assert_array_equal(as_scored(replace(plain, mask=mask, over=over)), over)

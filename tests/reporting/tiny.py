@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 from PIL import Image
@@ -10,14 +11,15 @@ from facefolds_core.asset import read_asset
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.facts import fact
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.writing import write_json, write_text
+from facefolds_core.files.writing import read_json, write_json, write_text
 from facefolds_core.params import section_of
 from facefolds_core.rendering import AssetCaster, composite
-from facefolds_core.scoring.films import FilmFolder
+from facefolds_core.scoring.films import FILMS, FilmFolder
 from facefolds_core.scoring.metrics import shown
 from facefolds_core.scoring.panels import METRICS, SUBJECT_METRICS, VARIANTS, ImageScore, Panel
-from facefolds_core.scoring.record import write_record
+from facefolds_core.scoring.pictures import WORST, write_worst
 from facefolds_core.scoring.report import metrics_json, write_per_image
+from facefolds_core.scoring.sheets import write_contact_sheet
 from tests.assets import make_asset
 from tests.scenes import make_scene
 
@@ -39,7 +41,7 @@ def scores(subject: bool) -> list[ImageScore]:
 
 
 def write_seen(folders: SubjectFolders, masks: bool) -> None:
-    """The record of the held-out camera's pictures, all of them on the contact sheet; the first one is the worst."""
+    """Pictures and films of the held-out camera, all frames on the contact sheet; the first one is the worst."""
     scene, asset = read_scene(folders.scene), read_asset(folders.asset)
     (index,) = scene.indices("holdout")
     truths, opacity = scene.open_frames(), scene.open_masks()
@@ -56,7 +58,10 @@ def write_seen(folders: SubjectFolders, masks: bool) -> None:
         assert roll is not None
         for panel in panels:
             roll.add(panel.frame, panel.truth, panel.shown)
-    write_record(folders.evaluation, panels, panels[0], asset, rolls.files)
+    write_json(folders.evaluation / FILMS, [asdict(film) for film in rolls.files])
+    write_worst(folders.evaluation / WORST, panels[0], None)
+    metrics = read_json(folders.metrics)
+    write_contact_sheet(folders.evaluation / "contact_sheet.png", "spheres", panels, metrics)
 
 
 def make_subject(root: Path, masks: bool = True) -> SubjectFolders:

@@ -66,7 +66,7 @@ def test_each_picture_has_a_matte_named_ones_first_then_the_captures_then_beside
 ) -> None:
     named = put(tmp_path / "named", scene, 2, None, 150, (SIZE // 2, SIZE // 2))  # of all frames, of another size
     found, told = make_folder(scene, folders.subject, PARAMS, named)
-    assert Counter(one.source for one in told) == {"capture": 1, "named": 2, "plate": 11}
+    assert Counter(one["source"] for one in told) == {"capture": 1, "named": 2, "plate": 11}
     whole = found_scene(folders)
     store = whole.open_mattes()
     assert store is not None and all_mattes(whole) and len(list(store)) == 14

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import shutil
 from pathlib import Path
@@ -15,7 +14,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.model import load_model
 from facefolds_core.params import train_params
-from facefolds_core.training import loop, patience, trained
+from facefolds_core.training import loop
 from facefolds_core.training.checkpoints import CHECKPOINT, fingerprint, load_checkpoint, save_checkpoint
 from tests.scenes import OPAQUE, make_scene
 from tests.training.test_training import params, run, state_for
@@ -130,38 +129,3 @@ def test_the_fingerprint_of_the_explicit_model_has_its_nested_keys(scene: Scene,
     usual = train_params({"preset": "fast"})
     assert fingerprint(train_params({"preset": "fast", **values}), scene) != fingerprint(usual, scene)
     assert fingerprint(train_params({"preset": "fast", "device": "cpu"}), scene) == fingerprint(usual, scene)
-
-
-def test_a_disk_too_full_for_checkpoints_does_not_end_the_training(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    expected = run(scene, params(), tmp_path / "undisturbed")
-
-    def full(*_: object) -> Path:
-        raise OSError(errno.ENOSPC, "No space left on device", "checkpoint.safetensors")
-
-    monkeypatch.setattr(loop, "save_checkpoint", full)
-    found = run(scene, params(checkpoint_seconds=1e-9), tmp_path)
-    assert all(torch.equal(found[name], tensor) for name, tensor in expected.items())
-    assert "no checkpoint at iteration 1: No space left" in capsys.readouterr().err
-
-
-def test_a_model_that_could_not_be_written_is_not_trained_again(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    expected = run(scene, params(), tmp_path / "undisturbed")
-    report = json.loads((tmp_path / "undisturbed" / "model" / "training.json").read_text())
-
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    with monkeypatch.context() as patched, pytest.raises(OSError) as caught:
-        patched.setattr(patience, "SECONDS", 0.0)
-        patched.setattr(trained, "save_model", full)
-        run(scene, params(), tmp_path)
-    assert caught.value.filename == str(tmp_path / "model")
-    monkeypatch.setattr(loop, "train_step", None)  # nothing is left to be done
-    found = run(scene, params(), tmp_path)
-    assert all(torch.equal(found[name], tensor) for name, tensor in expected.items())
-    again = json.loads((tmp_path / "model" / "training.json").read_text())
-    assert again["final_psnr"] == report["final_psnr"]

@@ -260,7 +260,7 @@ def test_normals_lean_as_the_reflection_asks_for() -> None:
 
 def test_normals_stay_where_they_are_asked_to() -> None:
     truth = _random_maps(3)
-    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, replace(PARAMS, normals=False))
+    found = fit_maps(_seen(truth, 0.2), _start(truth), 2, replace(PARAMS, max_tilt=0.0))
     np.testing.assert_array_equal(found.tilt, 0)
     np.testing.assert_allclose(found.normals, tilted(truth.surface, 0 * truth.tilt))
 

@@ -167,7 +167,7 @@ def test_a_changed_frame_trains_itself_alone(again: tuple[Scene, Path]) -> None:
     rows = [(camera, k, brighter(camera, k)) for camera, k in store]
     write_frames(scene.folder / "frames.arrow", (store.height, store.width, 3), rows)
     with counted() as fitted:
-        train(scene, folder, named=[scene.frame_ids[k] for k in keys])
+        train(scene, folder)
     assert fitted == [changed]
 
 
@@ -208,12 +208,7 @@ def test_another_base_than_before_is_said(
     training = "facefolds_core.training.segments.loop.train_base"
     with patch(training, side_effect=KeyboardInterrupt), pytest.raises(KeyboardInterrupt):
         base_of(plan_take(scene, params(), 2), scene, params(), tmp_path, tmp_path / "log")
-    assert ("train.segments.named" in capsys.readouterr().out) == bool(before)
-
-
-def test_an_unknown_key_frame_is_refused(again: tuple[Scene, Path]) -> None:
-    with pytest.raises(UserError, match="key frame"):
-        train(again[0], again[1], named=["000001", "elsewhere"])
+    assert ("another one than before" in capsys.readouterr().out) == bool(before)
 
 
 def test_a_head_that_turns_is_fitted_frame_by_frame_too(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.fit import Fit
-from facefolds_core.training.explicit.plan import Epochs, plan
+from facefolds_core.training.explicit.plan import epochs, plan
 from facefolds_core.training.explicit.state import TextureState
 
 PIXELS = 3_000_000
@@ -50,19 +51,19 @@ def test_few_frames_share_the_iterations_that_are_asked_for(frames: int) -> None
 @pytest.mark.parametrize(("frames", "steps"), [(24, 20), (200, 20), (1000, 20), (1000, 1)])
 def test_each_of_many_frames_has_its_steps_at_full_resolution(frames: int, steps: int) -> None:
     last = plan(fitted(), params(steps), frames, PIXELS)[-1]
-    epochs = Epochs(frames, np.random.default_rng(0))
-    taken = Counter(epochs.next() for _ in range(last.iterations))
+    order = epochs(frames, np.random.default_rng(0))
+    taken = Counter(islice(order, last.iterations))
     assert last.texels == (128, 96)
     assert len(taken) == frames
     assert min(taken.values()) >= max(1, int(0.6 * steps))
 
 
 def test_orders_differ_and_repeat_with_the_seed() -> None:
-    first, again = (Epochs(9, np.random.default_rng(3)) for _ in range(2))
-    orders = [[first.next() for _ in range(9)] for _ in range(2)]
+    first, again = (epochs(9, np.random.default_rng(3)) for _ in range(2))
+    orders = [list(islice(first, 9)) for _ in range(2)]
     assert orders[0] != orders[1]
     assert sorted(orders[0]) == sorted(orders[1]) == list(range(9))
-    assert orders == [[again.next() for _ in range(9)] for _ in range(2)]
+    assert orders == [list(islice(again, 9)) for _ in range(2)]
 
 
 @pytest.mark.parametrize(("iterations", "pace"), [(183, 1.0), (460, 1.0), (740, 0.5), (1860, 1 / 6)])

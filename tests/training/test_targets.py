@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.subject.find import reference_frame
-from facefolds_core.training.explicit.targets import CutOuts, OneFrame
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 from tests.scenes import make_scene
@@ -68,11 +68,9 @@ def test_what_is_not_kept_is_cut_out_again_and_is_the_same(scene: Scene) -> None
 
 
 def test_one_frame_is_itself_whichever_is_asked_for(scene: Scene) -> None:
-    pictures = CutOuts(scene)
-    one = OneFrame(pictures, 1)
-    np.testing.assert_array_equal(one.cut(0), pictures.cut(1))
-    one.shuffle(np.random.default_rng(0))
-    np.testing.assert_array_equal(one.behind, np.random.default_rng(0).random((6, 3), np.float32))
+    one = CutOuts(scene)
+    one.only = 1
+    np.testing.assert_array_equal(one.cut(0), CutOuts(scene).cut(1))
 
 
 def test_each_step_has_other_colours_for_each_camera(scene: Scene) -> None:

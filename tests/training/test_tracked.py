@@ -10,7 +10,7 @@ import trimesh
 
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import directions_to_uv
-from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii
+from facefolds_core.training.explicit.tracked import REACH, blend, mesh_radii
 
 AXIS = -0.2
 
@@ -18,14 +18,14 @@ AXIS = -0.2
 def test_mesh_is_kept_near_the_volume_and_left_far_from_it() -> None:
     mesh, volume = np.full((41, 41), 0.3), np.full((41, 41), 0.31)
     mesh[:, 30:] = np.nan
-    volume[:, :10] = 0.3 + 2 * MESH.reach
+    volume[:, :10] = 0.3 + 2 * REACH
     volume[20, 20] = np.nan
-    radii, kept = blend(mesh, volume, MESH.reach)
+    radii, kept = blend(mesh, volume, REACH)
     np.testing.assert_allclose(radii[:, :10], volume[:, :10])
     np.testing.assert_allclose(radii[:, 30:], 0.31)
     assert radii[20, 20] == 0.3
-    deep = np.where(np.arange(41) == 20, 0.3 - 2 * MESH.reach, volume)
-    np.testing.assert_array_equal(blend(mesh, deep, MESH.reach)[0][5, 20], 0.3)  # a hole of the volume
+    deep = np.where(np.arange(41) == 20, 0.3 - 2 * REACH, volume)
+    np.testing.assert_array_equal(blend(mesh, deep, REACH)[0][5, 20], 0.3)  # a hole of the volume
     assert radii[5, 20] == 0.3 and kept[5, 20] == 1 and kept[5, 5] == 0 and kept[5, 35] == 0
 
 

@@ -41,5 +41,5 @@ def test_what_is_not_well_is_said_with_a_remedy(tmp_path: Path) -> None:
     assert low.kind == "start_explains_little" and "20.1 dB" in str(low) and "sheet.png" in str(low)
     (lost,) = warnings_of(scene, replace(WELL, chart=FARTHER))
     assert "30%" in str(lost) and "train.start.centres" in str(lost)
-    guessed = replace(scene, left_out=(fact("front_guessed"),))
+    guessed = replace(scene, left_out=(fact("front_found", camera="a", share=0.5),))
     assert "`front`" in str(warnings_of(guessed, WELL)[0])

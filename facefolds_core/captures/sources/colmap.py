@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
-from facefolds_core.captures.arrangement import Shot, arrange, jitter, mean_calibration
+from facefolds_core.captures.arrangement import Shot, arrange, mean_calibration
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.colmap_model import ModelCamera, ModelImage, model_folder, read_model
 from facefolds_core.captures.gathering import Calibration, Recognised, gather, inside, pictures_in
@@ -61,7 +61,7 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
         groups = {name: [image] for name, (image, _) in films.items()}
         photos, left_out = {name: pictures_in(place) for name, (_, place) in films.items()}, []
     each = [[_calibration(name, image, cameras[image.camera], file) for image in of] for name, of in groups.items()]
-    left_out += [*jitter(each), *_other_models(folder)]
+    left_out += _other_models(folder)
     means = [mean_calibration(some) for some in each]
     return gather(root, means, photos, subject, fps=FPS, pixel_centres=PIXEL_CENTRES, left_out=left_out)
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, jitter, mean_calibration, wrong
+from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, mean_calibration, wrong
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.gathering import Calibration, Recognised
 from facefolds_core.captures.images import image_size
@@ -127,7 +127,6 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     members = {name: [present[i] for i in of] for name, of in arranged.cameras.items()}
     each = [_calibrations(name, some, centres, path) for name, some in members.items()]
     views = tuple(_view(mean_calibration(some)) for some in each)
-    left_out += jitter(each)
     position = {name: f for f, name in enumerate(frames)}
     images: dict[tuple[int, int], Picture] = {}
     for c, of in enumerate(arranged.cameras.values()):

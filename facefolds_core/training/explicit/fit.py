@@ -29,7 +29,7 @@ from facefolds_core.subject.outline import (
 from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
-from facefolds_core.training.explicit.tracked import MESH, blend, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
 
@@ -106,9 +106,9 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
-        known, kept = blend(mesh, seen.radius, MESH.reach)
-        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, MESH.opacity), opacity)
-        source = fact("middle_from_mesh", reach=MESH.reach)
+        known, kept = blend(mesh, seen.radius, REACH)
+        opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
+        source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)
     most = greatest_halfwidth(geometry, pixel_size(scene))
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
@@ -120,7 +120,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         window=window,
         middle=middle,
         halfwidth=widths,
-        trust=MESH.trust * kept,
+        trust=TRUST * kept,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,

@@ -22,7 +22,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit import follow_kernel, shading_kernel
 from facefolds_core.training.explicit.rates import ALPHA_RATE, BETAS, falling
 from facefolds_core.training.explicit.state import MIN_ALPHA, MIN_LIGHT, TextureState
-from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, Views
 
 Light = Callable[[TextureState, Views, int], None]
@@ -34,7 +34,7 @@ Errors = NDArray[np.float32]
 def follow(
     state: TextureState,
     source: Rays,
-    pictures: Pictures,
+    pictures: CutOuts,
     rates: NDArray[np.float32],
     light: Light,
 ) -> tuple[Errors, float]:
@@ -58,13 +58,12 @@ def follow(
     return usual, float(np.mean(lag))
 
 
-def follow_rates(params: ExplicitParams, rate: float) -> NDArray[np.float32]:
-    """(2,) for colours and for logits of alpha, after a training whose own learning rate has come to `rate`."""
-    own = params.follow.rate * rate / params.textures.learning_rate
-    return own * np.array([1, ALPHA_RATE], np.float32)
+def follow_rates(params: ExplicitParams) -> NDArray[np.float32]:
+    """(2,) for colours and for logits of alpha."""
+    return params.follow.rate * np.array([1, ALPHA_RATE], np.float32)
 
 
-def mean_errors(state: TextureState, source: Rays, pictures: Pictures, frame: int, light: Light) -> Errors:
+def mean_errors(state: TextureState, source: Rays, pictures: CutOuts, frame: int, light: Light) -> Errors:
     """(M, 3): mean C - I over the rays that meet each texel; 0 of texels that show less than half a ray."""
     (h, w), n = state.shape, state.layers.shape[2]
     sums, texture = state.gradient.numpy().reshape(n, h, w, 4), _texture(state, frame)
@@ -91,7 +90,7 @@ def lagging(errors: Errors, shape: tuple[int, int], least: float) -> NDArray[np.
 def follow_frame(
     state: TextureState,
     source: Rays,
-    pictures: Pictures,
+    pictures: CutOuts,
     frame: int,
     chosen: NDArray[np.bool_],
     errors: Errors,

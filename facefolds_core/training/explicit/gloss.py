@@ -27,7 +27,7 @@ from facefolds_core.training.explicit.reflection import (
 )
 from facefolds_core.training.explicit.reflection_maps import Maps, Seen, map_shape, surface_normals
 from facefolds_core.training.explicit.state import TextureState
-from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, StillRays, Views
 
 
@@ -60,7 +60,7 @@ class GlossFit:
         self.maps: Maps | None = None
         self._normals: NDArray[np.float32] | None = None
 
-    def follow(self, state: TextureState, source: Rays, pictures: Pictures, middle: torch.Tensor) -> None:
+    def follow(self, state: TextureState, source: Rays, pictures: CutOuts, middle: torch.Tensor) -> None:
         """New crossings, and perhaps a new middle radius: normals, and what the reflection adds to each ray."""
         if not self.on:
             return
@@ -82,13 +82,12 @@ class GlossFit:
     def due(self, step: int, level: Level) -> bool:
         """Whether to fit after this step of a level: `fits` times, the last after its last one."""
         fits, steps = self.params.fits, level.iterations
-        begun = self.params.begin == "rounds" or (self.params.begin == "full" and level.last)
-        return self.on and begun and (step + 1) * fits // steps > step * fits // steps
+        return self.on and self.params.begin == "rounds" and (step + 1) * fits // steps > step * fits // steps
 
-    def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: Pictures) -> Fact | None:
+    def after(self, number: int, rounds: int, state: TextureState, source: Rays, pictures: CutOuts) -> Fact | None:
         """After level `number`, of which `rounds` are of geometry: where it is time, whether there is one; with
         `begin: end` it is fitted now."""
-        if not self.on or number != {"rounds": rounds - 1, "full": rounds, "end": rounds + 1}[self.params.begin]:
+        if not self.on or number != (rounds - 1 if self.params.begin == "rounds" else rounds + 1):
             return None
         seen = self.look(state, source, pictures)
         found = self._decide(state, seen)
@@ -96,7 +95,7 @@ class GlossFit:
             self._fit(state, seen, done=True)
         return found
 
-    def fit(self, state: TextureState, source: Rays, pictures: Pictures, done: bool) -> None:
+    def fit(self, state: TextureState, source: Rays, pictures: CutOuts, done: bool) -> None:
         """Fit to what the textures leave over now; `done` if they are trained no more."""
         self._fit(state, self.look(state, source, pictures), done)
 
@@ -140,7 +139,7 @@ class GlossFit:
         """What the model gets."""
         return None if self.maps is None else self.maps.model()
 
-    def look(self, state: TextureState, source: Rays, pictures: Pictures) -> Seen:
+    def look(self, state: TextureState, source: Rays, pictures: CutOuts) -> Seen:
         """What textures leave over, on rays for a fit."""
         if self.poses is not None:
             return self._look_in_turns(state, source, pictures, self.poses)
@@ -151,7 +150,7 @@ class GlossFit:
             state.look(views, pictures, frame, sums)
         return Seen.of(views.camera, views.directions, sums, len(frames)).filled(views)
 
-    def _look_in_turns(self, state: TextureState, source: Rays, pictures: Pictures, poses: Track) -> Seen:
+    def _look_in_turns(self, state: TextureState, source: Rays, pictures: CutOuts, poses: Track) -> Seen:
         """Of some rays of each of some frames, as many as a fit takes: in each frame the room shines from elsewhere.
 
         Frames are looked at twice. What all their rays see would take up to a gigabyte; how many are opaque, and so
@@ -195,7 +194,7 @@ def _views(source: Rays) -> Views:
     return source.views
 
 
-def _seen(state: TextureState, views: Views, pictures: Pictures, frame: int) -> NDArray[np.float32]:
+def _seen(state: TextureState, views: Views, pictures: CutOuts, frame: int) -> NDArray[np.float32]:
     """(P, 6) what rays see in one frame, as `TextureState.look` gives it."""
     sums = np.zeros((len(views.pixel), 6), np.float32)
     state.look(views, pictures, frame, sums)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,38 +19,27 @@ from facefolds_core.subject.find import found_in, subject_in
 from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.fit import fit_scene
-from facefolds_core.training.explicit.picture import draw_fit
 from facefolds_core.training.explicit.plan import plan
-from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.explicit.warnings import warnings_of
 from facefolds_core.training.log import open_log
-from facefolds_core.training.patience import check_space, patiently
-from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
+from facefolds_core.training.report import device_name, make_report, peak_memory
 from facefolds_core.training.trained import Trained
 
 
-def train_explicit(scene: Scene, params: ExplicitParams, model_folder: Path, log: Path) -> TrainingReport:
-    """`fit_explicit`, and the model's folder written whole; a full disk is waited for."""
-    trained = fit_explicit(scene, params, log, model_folder)
-    patiently(lambda: trained.save(model_folder))
-    return trained.report
-
-
-def fit_explicit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None) -> Trained:
+def fit_explicit(scene: Scene, params: ExplicitParams, log: Path) -> Trained:
     """Train on `scene`.
 
     Args:
         log: folder of dvclive's files.
-        place: where the model is to be written: that it will fit there is checked before the training.
 
     Raises:
         UserError: if an image or its matte is missing, there is no subject, or training diverges even at small learning
             rates.
     """
-    return fit_with_surroundings(scene, params, log, place)[0]
+    return fit_with_surroundings(scene, params, log)[0]
 
 
 @dataclass(frozen=True)
@@ -61,27 +49,23 @@ class Surroundings:
     Attributes:
         splits: of the scene's cameras; of those that contradict the others "out".
         gains: (C, 3) of the training cameras that are left.
-        rate: the learning rate that it ended with.
         usual: (M, 3) mean errors of the texels in most frames.
     """
 
     splits: tuple[Split, ...]
     gains: NDArray[np.float64]
-    rate: float
     usual: NDArray[np.float32]
 
 
-def fit_with_surroundings(
-    scene: Scene, params: ExplicitParams, log: Path, place: Path | None = None
-) -> tuple[Trained, Surroundings]:
+def fit_with_surroundings(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surroundings]:
     """`fit_explicit`, and what else was found out."""
     check_images(scene)
     with TemporaryDirectory() as folder:
         scene = found_in(scene, SubjectParams(seed=params.seed), Path(folder) / "subject")
-        return _fit(scene, params, log, place)
+        return _fit(scene, params, log)
 
 
-def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) -> tuple[Trained, Surroundings]:
+def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surroundings]:
     """The same of a scene whose subject was found."""
     device = device_of(params)
     began = time.perf_counter()
@@ -95,8 +79,6 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) ->
         warnings = warnings_of(scene, fit)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
-        if place is not None:
-            check_space(place, model_bytes(fit.texels, params.layers, scene.num_frames))
         teacher = Teacher(cameras.scene, subject, params.seed)
         trainer = Trainer(cameras, params, fit, device, teacher)
         trainer.events = [*trainer.events, *warnings]
@@ -106,7 +88,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) ->
         for k, level in enumerate(levels):
             trainer.run(level, k, live, bar)
         bar.close()
-        patiently(live.make_summary)
+        live.make_summary()
     model, spec = trainer.result(fingerprint(params, scene))
     report = make_report(
         time.perf_counter() - began,
@@ -117,6 +99,5 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path, place: Path | None) ->
         trainer.rays,
         trainer.psnr,
     )
-    draw = partial(draw_fit, fit=fit, layers=spec.num_layers, subject_opacity=params.start.subject_opacity)
-    surroundings = Surroundings(cameras.scene.splits, cameras.gains, trainer.rate, trainer.usual)
-    return Trained(model, spec, report, trainer.summary(spec), draw), surroundings
+    surroundings = Surroundings(cameras.scene.splits, cameras.gains, trainer.usual)
+    return Trained(model, spec, report, trainer.summary(spec)), surroundings

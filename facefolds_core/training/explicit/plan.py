@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,22 +49,15 @@ class Level:
         return done != before and done % every == 0
 
 
-class Epochs:
+def epochs(frames: int, random: np.random.Generator) -> Iterator[int]:
     """Frames in the order in which steps take them: without replacement, shuffled anew each time all have been taken.
 
     Args:
         frames: K.
         random: draws the orders.
     """
-
-    def __init__(self, frames: int, random: np.random.Generator) -> None:
-        self._frames, self._random = frames, random
-        self._left: list[int] = []
-
-    def next(self) -> int:
-        if not self._left:
-            self._left = self._random.permutation(self._frames).tolist()
-        return self._left.pop()
+    while True:
+        yield from reversed(random.permutation(frames).tolist())
 
 
 def plan(fit: Fit, params: ExplicitParams, frames: int, pixels: int) -> list[Level]:

@@ -31,7 +31,6 @@ class GlossParams:
 
     Attributes:
         normal_blur: smoothing of the radius map before normals are taken of it, standard deviation, nodes.
-        normals: let the normals lean from those of the radius map.
         normal_smoothness: weight of the smoothness of how they lean.
         max_tilt: largest tangent of the angle by which they lean, along each of two tangents.
         gloss_smoothness: weight of the smoothness of gloss and offset.
@@ -51,7 +50,6 @@ class GlossParams:
     """
 
     normal_blur: float = 1.5
-    normals: bool = True
     normal_smoothness: float = 0.3
     max_tilt: float = 0.3
     gloss_smoothness: float = 0.1
@@ -96,9 +94,8 @@ def fit_maps(seen: Seen, start: Maps, rounds: int, params: GlossParams) -> Maps:
         left = o[:, None] * values_at(gloss[..., None], seen.st) * light - wanted
         offset = _solve(seen.st, o * o, o[:, None] * left, gloss.shape, params.gloss_smoothness)
         maps = replace(maps, gloss=gloss, offset=offset, environment=environment)
-        if params.normals:
-            for axis in (0, 1):
-                maps = _lean(maps, seen, wanted, axis, params)
+        for axis in (0, 1):
+            maps = _lean(maps, seen, wanted, axis, params)
     return maps
 
 

@@ -18,7 +18,7 @@ from facefolds_core.training.explicit import adam_kernel, shading_kernel
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.reflection_kernel import look
 from facefolds_core.training.explicit.smoothing import smooth
-from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, Views
 
 UNSEEN_LOGIT = -9.0
@@ -136,7 +136,7 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        pictures: Pictures,
+        pictures: CutOuts,
         frame: int,
         min_alpha: float,
         rates: NDArray[np.float32],
@@ -162,7 +162,7 @@ class TextureState:
         self,
         views: Views,
         rays: NDArray[np.int64],
-        pictures: Pictures,
+        pictures: CutOuts,
         frame: int,
         min_alpha: float,
         rates: NDArray[np.float32],
@@ -214,7 +214,7 @@ class TextureState:
     def _smooth(self, logits: Tensor) -> None:
         logits.copy_(torch.from_numpy(smooth(np.ascontiguousarray(logits.numpy()), *self.shape)))
 
-    def look(self, views: Views, pictures: Pictures, frame: int, seen: NDArray[np.float32]) -> None:
+    def look(self, views: Views, pictures: CutOuts, frame: int, seen: NDArray[np.float32]) -> None:
         """Add what the rays show in one frame, without reflections, to `seen` (P, 6): see `reflection_kernel.look`."""
         (h, w), n = self.shape, self.layers.shape[2]
         texture = self.activated(frame).numpy().reshape(h, w, n, 4)
@@ -237,26 +237,10 @@ class TextureState:
         self.layers[0, ..., 3] = torch.where(unseen, UNSEEN_LOGIT, self.layers[0, ..., 3])
         self.frame_alpha[0] = torch.where(unseen, 0.0, self.frame_alpha[0])
 
-    def snapshot(self) -> list[Tensor]:
-        """Copies of the values, for `restore`; of the moments there are none, which would triple them."""
-        return [x.clone() for x in self._values()]
-
-    def restore(self, saved: list[Tensor]) -> None:
-        """The values of a `snapshot`; moments and steps start afresh."""
-        for tensor, value in zip(self._values(), saved, strict=True):
-            tensor.copy_(value)
-        for tensor in (self.colour, self.layers, self.frame_colour, self.frame_alpha):
-            tensor[1:].zero_()
-        self.steps[:] = 0
-        self.gradient.zero_()
-
     def forget_moments(self) -> None:
         """Give their memory back, two thirds of the grids'; no `step` can follow."""
         self.colour, self.layers = self.colour[:1].clone(), self.layers[:1].clone()
         self.frame_colour, self.frame_alpha = self.frame_colour[:1].clone(), self.frame_alpha[:1].clone()
-
-    def _values(self) -> list[Tensor]:
-        return [self.colour[0], self.layers[0], self.frame_colour[0], self.frame_alpha[0]]
 
 
 def state_on(device: torch.device) -> Callable[..., TextureState]:

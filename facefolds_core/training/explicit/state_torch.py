@@ -15,7 +15,7 @@ from facefolds_core.training.explicit import reference
 from facefolds_core.training.explicit.rates import BETAS
 from facefolds_core.training.explicit.smoothing import smooth_reference
 from facefolds_core.training.explicit.state import MIN_LIGHT, TextureState
-from facefolds_core.training.explicit.targets import Pictures
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import Rays, Views
 
 GRIDS = ("colour", "layers", "frame_colour", "frame_alpha")
@@ -85,7 +85,7 @@ class TorchTextureState(TextureState):
         self,
         views: Views,
         rays: NDArray[np.int64],
-        pictures: Pictures,
+        pictures: CutOuts,
         frame: int,
         min_alpha: float,
         rates: NDArray[np.float32],

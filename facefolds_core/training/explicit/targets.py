@@ -9,9 +9,8 @@ inside, at the outline and outside. What stands behind need not be known, and no
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import dataclass
-from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,31 +18,17 @@ from facefolds_core.captures.cutout import cut_from
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.training.explicit.teacher import Teacher
-from facefolds_core.training.explicit.views import Images
 
 KEPT_BYTES = 2 << 30
 """Of cut-outs that a training keeps in memory; others are made again when their frame's turn comes."""
 
 
-class Pictures(Protocol):
-    """Cut-outs of the training cameras, by frame."""
-
-    @property
-    def behind(self) -> NDArray[np.float32]:
-        """(C, 3) in [0, 1]: the colour behind the subject and behind the layers, of each camera."""
-        ...
-
-    def shuffle(self, random: np.random.Generator) -> None:
-        """Other colours behind."""
-        ...
-
-    def cut(self, index: int) -> NDArray[np.uint8]:
-        """(C, H W, 4) RGBA of a frame, colours times opacity."""
-        ...
-
-
 class CutOuts:
-    """See `Pictures`.
+    """Cut-outs of the training cameras, by frame; all their images must be there (`check_images`).
+
+    Attributes:
+        behind: (C, 3) in [0, 1]: the colour behind the subject and behind the layers, of each camera.
+        only: the one frame that is shown, whichever is asked for; None for all.
 
     Args:
         scene: with mattes of all training pictures.
@@ -60,18 +45,23 @@ class CutOuts:
         teacher: Teacher | None = None,
     ) -> None:
         self._kept_bytes, self._teacher = kept_bytes, teacher
-        self._photos = Images(scene, gains)
+        self._tables = None if gains is None or np.all(gains == 1) else _tables(gains)
+        self._cameras, self._photos, self._plates = scene.indices("train"), scene.open_frames(), scene.open_plates()
         mattes = scene.open_mattes()
         assert mattes is not None
         self._mattes: FrameStore = mattes
         self._kept: OrderedDict[int, NDArray[np.uint8]] = OrderedDict()
         virtual = 0 if teacher is None else len(teacher.virtual.cameras)
-        self.behind = np.full((len(self._photos.cameras) + virtual, 3), 0.5, np.float32)
+        self.behind = np.full((len(self._cameras) + virtual, 3), 0.5, np.float32)
+        self.only: int | None = None
 
     def shuffle(self, random: np.random.Generator) -> None:
+        """Other colours behind."""
         self.behind = random.random(self.behind.shape, np.float32)
 
     def cut(self, index: int) -> NDArray[np.uint8]:
+        """(C, H W, 4) RGBA of a frame, colours times opacity."""
+        index = index if self.only is None else self.only
         found = self._kept.pop(index, None)
         if found is None:
             found = self._cut(index)
@@ -85,30 +75,23 @@ class CutOuts:
         return found
 
     def _cut(self, index: int) -> NDArray[np.uint8]:
-        photos, plates = self._photos.frame(index), self._photos.plates()
-        found = np.empty((*photos.shape[:2], 4), np.uint8)
-        for position, (camera, photo, plate) in enumerate(zip(self._photos.cameras, photos, plates, strict=True)):
-            matte = self._mattes.image(camera, index)[..., 0]
-            opacity, picture = matte / np.float32(255), photo.reshape(*matte.shape, 3) / np.float32(255)
-            behind = None if plate is None else plate / np.float32(255)
-            rgb = np.rint(255 * cut_from(picture, opacity, behind)).astype(np.uint8)
+        height, width = self._photos.height, self._photos.width
+        found = np.empty((len(self._cameras), height * width, 4), np.uint8)
+        for position, camera in enumerate(self._cameras):
+            matte, plate = self._mattes.image(camera, index)[..., 0], None
+            if self._plates is not None and (camera, 0) in self._plates:
+                plate = self._alike(position, self._plates.image(camera, 0)) / np.float32(255)
+            photo = self._alike(position, self._photos.image(camera, index)) / np.float32(255)
+            rgb = np.rint(255 * cut_from(photo, matte / np.float32(255), plate)).astype(np.uint8)
             found[position] = np.concatenate([rgb, matte[..., None]], -1).reshape(-1, 4)
         return found
 
+    def _alike(self, position: int, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """An image of the camera at a position of the list, without its gains."""
+        return image if self._tables is None else cv2.LUT(image, self._tables[position]).astype(np.uint8)
 
-@dataclass(frozen=True)
-class OneFrame:
-    """The cut-outs of one frame, whichever is asked for."""
 
-    pictures: Pictures
-    index: int
-
-    @property
-    def behind(self) -> NDArray[np.float32]:
-        return self.pictures.behind
-
-    def shuffle(self, random: np.random.Generator) -> None:
-        self.pictures.shuffle(random)
-
-    def cut(self, index: int) -> NDArray[np.uint8]:
-        return self.pictures.cut(self.index)
+def _tables(gains: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
+    """(1, 256, 3) for each camera: 8-bit values without its gains (3,)."""
+    values = np.arange(256)[None, :, None] / gains[:, None, None, :]
+    return list(np.rint(values.clip(0, 255)).astype(np.uint8))

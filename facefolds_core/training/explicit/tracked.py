@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
@@ -18,61 +16,43 @@ from facefolds_core.subject.volume import Volume
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class MeshParams:
-    """How far a tracked mesh is believed, where there is one.
-
-    Attributes:
-        reach: where the Gaussians lie outside the mesh by more, units, they are believed: a mesh knows no hair.
-        max_distance: a direction in which mesh and Gaussians lie farther apart, units, is off.
-        max_share_off: a mesh that is off in more than this share of the directions is left out.
-        nodes: rows and columns of (u, v) at which mesh and Gaussians are compared.
-        trust: the mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much.
-        opacity: at the start, where only the mesh has a surface.
-    """
-
-    reach: float = 0.03
-    max_distance: float = 0.02
-    max_share_off: float = 0.5
-    nodes: int = 128
-    trust: float = 0.004
-    opacity: float = 0.9
-
-
-MESH = MeshParams()
+REACH = 0.03
+"""Where the Gaussians lie outside a tracked mesh by more, units, they are believed: a mesh knows no hair."""
+MAX_DISTANCE = 0.02
+"""A direction in which mesh and Gaussians lie farther apart, units, is off."""
+MAX_SHARE_OFF = 0.5
+"""A mesh that is off in more than this share of the directions is left out."""
+NODES = 128
+"""Rows and columns of (u, v) at which mesh and Gaussians are compared."""
+TRUST = 0.004
+"""The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""
+OPACITY = 0.9
+"""At the start, where only the mesh has a surface."""
 
 
 def trusted_surface(
-    scene: Scene, volume: Volume, chart: Chart, start: StartParams, params: MeshParams = MESH
+    scene: Scene, volume: Volume, chart: Chart, start: StartParams
 ) -> tuple[tuple[NDArray[np.float32], NDArray[np.int32]] | None, tuple[Fact, ...]]:
     """The tracked mesh, or None where there is none or it is wrong; and what is to be said of it."""
     surface = scene.load_surface()
     if surface is None:
         return None, ()
     vertices = surface[0].astype(np.float64)
-    share = share_off(volume, chart, vertices, surface[1], start, params)
-    if share <= params.max_share_off:
+    share = share_off(volume, chart, vertices, surface[1], start)
+    if share <= MAX_SHARE_OFF:
         return surface, ()
-    return None, (fact("mesh_is_off", share=share, distance=params.max_distance),)
+    return None, (fact("mesh_is_off", share=share, distance=MAX_DISTANCE),)
 
 
-def share_off(
-    volume: Volume,
-    chart: Chart,
-    vertices: Array,
-    faces: NDArray[np.int32],
-    start: StartParams,
-    params: MeshParams = MESH,
-) -> float:
+def share_off(volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.int32], start: StartParams) -> float:
     """Share of the directions, of those with a surface in the volume and in the mesh (K, V, 3), in which the two lie
-    over `max_distance` apart; 0 where there are none. Nothing is compared behind the ears, where few cameras look."""
+    over MAX_DISTANCE apart; 0 where there are none. Nothing is compared behind the ears, where few cameras look."""
     u0, u1, v0, v1 = whole_window(chart, start)
-    uv = window_uv((max(u0, -1.0), u1, max(v0, -1.0), min(v1, 1.0)), params.nodes, params.nodes)
+    uv = window_uv((max(u0, -1.0), u1, max(v0, -1.0), min(v1, 1.0)), NODES, NODES)
     least = start.subject_opacity
     seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
     apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
-    return float((apart > params.max_distance).mean()) if len(apart) else 0.0
+    return float((apart > MAX_DISTANCE).mean()) if len(apart) else 0.0
 
 
 def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> Array:

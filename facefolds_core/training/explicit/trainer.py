@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,22 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import shells, texel_uv
-from facefolds_core.training.explicit.attempt import Attempt, DivergenceParams
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
-from facefolds_core.training.explicit.plan import Epochs, Level
+from facefolds_core.training.explicit.plan import Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
+
+ERROR_RATIO, SMOOTHING = 9.0, 0.1
+"""Training diverges where the running mean of the squared error is so many times the best of its level; share of the
+newest step in that mean."""
 
 LAYER_ALPHA = 1 / 255
 """Outer or inner layers whose alpha is nowhere larger are dropped: no pixel changes by more."""
@@ -42,8 +46,6 @@ class Trainer:
     Attributes:
         usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
     """
-
-    divergence = DivergenceParams()
 
     def __init__(
         self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: torch.device, teacher: Teacher
@@ -58,7 +60,6 @@ class Trainer:
         self.stride = 0
         self.state: TextureState | None = None
         self.iteration = self.rays = 0
-        self.rate = params.textures.learning_rate
         self.psnr = 0.0
         self.events = list(cameras.notes)
         real = len(self.scene.indices("train"))
@@ -70,29 +71,16 @@ class Trainer:
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
-        """One level, again from its start at a lower learning rate if it diverges."""
+        """One level.
+
+        Raises:
+            UserError: if it diverges.
+        """
         self._prepare(level)
-        assert self.state is not None and self.views is not None
-        lit = self.gloss.maps, self.state.shine
-        at = Attempt(number, self.state.snapshot(), Epochs(self.scene.num_frames, self.random))
-        while at.tries < self.divergence.attempts:
-            if self._attempt(level, at, live, bar):
-                self._judge_reflection(number, bar)
-                if number >= len(self.params.geometry.rounds):
-                    self._follow()
-                return
-            self.state.restore(at.saved)
-            self.gloss.maps, self.state.shine = lit
-            self.rate /= self.divergence.slow_down
-            self.events.append(fact("diverged", level=number, rate=self.rate))
-            bar.write(f"train: {self.events[-1]}")
-            at.begin_again(Epochs(self.scene.num_frames, self.random))
-        raise UserError(
-            "training diverged",
-            place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {self.rate:.3g}",
-            expected="an error that falls",
-            remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
-        )
+        self._step(level, number, live, bar)
+        self._judge_reflection(number, bar)
+        if number >= len(self.params.geometry.rounds):
+            self._follow()
 
     def _judge_reflection(self, number: int, bar: tqdm) -> None:
         """After a level, where it is time: whether the reflection helps."""
@@ -166,15 +154,15 @@ class Trainer:
             moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
         )
 
-    def _attempt(self, level: Level, at: Attempt, live: Live, bar: tqdm) -> bool:
-        """What is left of a level's iterations; False if it diverges."""
+    def _step(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
+        """A level's iterations."""
         assert self.state is not None and self.views is not None
-        stride = self._stride()
+        stride, frames = self._stride(), epochs(self.scene.num_frames, self.random)
         self.state.pace = level.pace
-        coarse = at.level < len(self.params.geometry.rounds)
+        coarse = number < len(self.params.geometry.rounds)
         min_alpha = 0.0 if coarse else MIN_ALPHA
-        for i in range(at.step, level.iterations):
-            frame = at.epochs.next()
+        best, recent = math.inf, math.nan
+        for i, frame in zip(range(level.iterations), frames, strict=False):
             views, rays = self.views.part(frame, int(self.random.integers(stride)), stride)
             self.gloss.light(self.state, views, frame)
             self.pictures.shuffle(self.random)
@@ -182,20 +170,20 @@ class Trainer:
             error = self.state.step(views, rays, self.pictures, frame, min_alpha, rates)
             if not coarse and level.smooths(i, self.params.textures.smooth_every):
                 self.state.smooth_alpha(frame)
-            if not at.heed(error, self.divergence):
-                return False
+            recent = error if i == 0 else (1 - SMOOTHING) * recent + SMOOTHING * error
+            best = min(best, recent)
+            if not recent <= ERROR_RATIO * best + 1e-4:  # NaN, too
+                raise _diverged(number, level, self.params.textures.learning_rate)
             if self.gloss.due(i, level):
                 done = level.last and i == level.iterations - 1
                 self.gloss.fit(self.state, self.views, self.pictures, done)
             self.iteration += 1
             self.rays += len(rays)
-            self.psnr = -10 * float(np.log10(max(at.recent, 1e-12)))
+            self.psnr = -10 * float(np.log10(max(recent, 1e-12)))
             if i % 10 == 9:
                 log_metrics(live, self.iteration, {"psnr": self.psnr, "texel_rows": level.texels[0]})
             bar.update()
             bar.set_postfix(psnr=f"{self.psnr:.2f}", texels=f"{level.texels[0]}x{level.texels[1]}", refresh=False)
-            at.step = i + 1
-        return True
 
     def _stride(self) -> int:
         """Steps look at every so-manieth ray."""
@@ -204,12 +192,12 @@ class Trainer:
         return max(1, int(self.views.count / (self.params.textures.rays_per_texel * texels)))
 
     def _rates(self, pace: float, progress: float) -> NDArray[np.float32]:
-        return rates_of(pace * self.rate * falling(progress))
+        return rates_of(pace * self.params.textures.learning_rate * falling(progress))
 
     def _follow(self) -> None:
         """Frames where they lag behind what moves."""
         assert self.state is not None and self.views is not None
-        rates = follow_rates(self.params, self.rate)
+        rates = follow_rates(self.params)
         self.usual, share = follow(self.state, self.views, self.pictures, rates, self.gloss.light)
         self.events.append(fact("followed", share=share))
 
@@ -268,6 +256,15 @@ class Trainer:
             "cameras": self.cameras.summary,
             "events": [event.to_json() for event in self.events],
         }
+
+
+def _diverged(number: int, level: Level, rate: float) -> UserError:
+    return UserError(
+        "training diverged",
+        place=f"level {number} ({level.texels[0]} x {level.texels[1]} texels), learning rate {rate:.3g}",
+        expected="an error that falls",
+        remedy="lower train.textures.learning_rate; if that does not help, check the capture's calibration",
+    )
 
 
 def _shrink(values: torch.Tensor, by: torch.Tensor) -> torch.Tensor:

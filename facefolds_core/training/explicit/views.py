@@ -342,39 +342,3 @@ def rays_of(
     if scene.poses is None:
         return StillRays(trace_views(scene, manifolds, stride, virtual))
     return MovingRays(scene, manifolds, stride, share, params, virtual=virtual)
-
-
-class Images:
-    """The training images of one frame at a time, from the memory-mapped store; all must be there (`check_images`).
-
-    Args:
-        gains: (C, 3) of the training cameras' channels, which are taken out; None for none.
-    """
-
-    def __init__(self, scene: Scene, gains: NDArray[np.float64] | None = None) -> None:
-        self.tables = None if gains is None or np.all(gains == 1) else _tables(gains)
-        self.store, self._plates = scene.open_frames(), scene.open_plates()
-        self.cameras = scene.indices("train")
-
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        """(C, H W, 3)."""
-        images = [self._alike(position, self.store.image(c, index)) for position, c in enumerate(self.cameras)]
-        return np.stack([image.reshape(-1, 3) for image in images])
-
-    def plates(self) -> list[NDArray[np.uint8] | None]:
-        """Of each camera its clean plate (H, W, 3), or None."""
-        plates = self._plates
-        return [
-            self._alike(position, plates.image(c, 0)) if plates is not None and (c, 0) in plates else None
-            for position, c in enumerate(self.cameras)
-        ]
-
-    def _alike(self, position: int, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """An image of the camera at a position of the list, without its gains."""
-        return image if self.tables is None else cv2.LUT(image, self.tables[position]).astype(np.uint8)
-
-
-def _tables(gains: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
-    """(1, 256, 3) for each camera: 8-bit values without its gains (3,)."""
-    values = np.arange(256)[None, :, None] / gains[:, None, None, :]
-    return list(np.rint(values.clip(0, 255)).astype(np.uint8))

@@ -20,8 +20,6 @@ def warnings_of(scene: Scene, fit: Fit) -> tuple[Fact, ...]:
     lost = fit.losses[fit.chart]
     if lost > MAX_LOST:
         found.append(fact("surface_without_a_place", share=lost, x=fit.chart.centre[0]))
-    if any(
-        line.kind in ("front_found", "front_guessed") or "no `front` camera" in str(line) for line in scene.left_out
-    ):
+    if any(line.kind == "front_found" for line in scene.left_out):
         found.append(fact("front_is_guessed"))
     return tuple(found)

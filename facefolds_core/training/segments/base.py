@@ -27,8 +27,6 @@ from facefolds_core.model.tensor_files import read_tensors, write_tensors
 from facefolds_core.params import ExplicitParams, ReflectionParams
 from facefolds_core.training.explicit.loop import Surroundings, fit_with_surroundings
 from facefolds_core.training.explicit.reflection_maps import Maps
-from facefolds_core.training.patience import patiently
-from facefolds_core.training.trained import Trained
 
 LOG = "log"
 """Folder in a base's: dvclive's files of its training."""
@@ -131,11 +129,7 @@ def fingerprint_of_base(scene: Scene, training: bytes, keys: list[int], digests:
 
 def train_base(scene: Scene, keys: list[int], params: ExplicitParams, folder: Path, log: Path) -> None:
     """Train the key frames at once, and write the base's folder, whole or not at all."""
-    trained, found = fit_with_surroundings(part_of(scene, keys), params, log, folder)
-    patiently(lambda: _write_base(trained, found, folder, log))
-
-
-def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) -> None:
+    trained, found = fit_with_surroundings(part_of(scene, keys), params, log)
     with atomic_folder(folder) as temporary:
         trained.save(temporary / "model")
         for path in (temporary / "model").iterdir():
@@ -145,9 +139,7 @@ def _write_base(trained: Trained, found: Surroundings, folder: Path, log: Path) 
             "gains": torch.from_numpy(np.ascontiguousarray(found.gains)),
             "usual": torch.from_numpy(found.usual),
         }
-        # One entry: safetensors writes several in any order, and equal bases are to be equal files.
-        about = {"about": json.dumps({"splits": found.splits, "rate": found.rate})}
-        write_tensors(temporary / "surroundings.safetensors", tensors, about)
+        write_tensors(temporary / "surroundings.safetensors", tensors, {"splits": json.dumps(found.splits)})
         shutil.copytree(log, temporary / LOG)
 
 
@@ -161,10 +153,8 @@ def read_base(folder: Path, fingerprint: str) -> Base:
     shared = GridTextures(spec.window, spec.texels, spec.num_layers, 0, textures.reflection)
     shared.colour, shared.layers = textures.colour, textures.layers
     tensors, metadata = read_tensors(folder / "surroundings.safetensors", _REMEDY)
-    about = json.loads(metadata["about"])
-    surroundings = Surroundings(
-        tuple(about["splits"]), tensors["gains"].numpy(), about["rate"], tensors["usual"].numpy()
-    )
+    splits = tuple(json.loads(metadata["splits"]))
+    surroundings = Surroundings(splits, tensors["gains"].numpy(), tensors["usual"].numpy())
     return Base(folder, spec, manifolds, shared, surroundings, fingerprint)
 
 

@@ -13,7 +13,6 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from facefolds_core.model.tensor_files import write_tensors
-from facefolds_core.training.patience import patiently
 
 NAMES = ("frame_colour", "frame_alpha")
 
@@ -66,13 +65,13 @@ class SegmentCache:
         return colour, alpha, psnr
 
     def write(self, frames: Sequence[str], fitted: Sequence[tuple[Tensor, Tensor, float]]) -> None:
-        """Write a segment, whole or not at all; a full disk is waited for."""
+        """Write a segment, whole or not at all."""
         path = self.path(frames)
         parts = [one[0] for one in fitted], [one[1] for one in fitted]
         tensors = {name: torch.stack(part) for name, part in zip(NAMES, parts, strict=True)}
         # One entry: safetensors writes several in any order, and equal segments are to be equal files.
         about = {"frames": json.dumps([[frame, one[2]] for frame, one in zip(frames, fitted, strict=True)])}
-        patiently(lambda: write_tensors(path, tensors, about))
+        write_tensors(path, tensors, about)
         self.read(path)
 
     def keep_only(self, paths: Sequence[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.state import model_bytes
 from facefolds_core.training.explicit.targets import KEPT_BYTES
-from facefolds_core.training.patience import check_space
 
 TEXEL_BYTES = 300.0
 """A texel of one frame takes so many in a training at once."""
@@ -55,26 +55,21 @@ class Forecast:
         return f"{how}: about {time}, {self.memory / 1e9:.1f} GB of memory, {self.disk / 1e9:.2f} GB on the disk"
 
 
-def forecast(scene: Scene, params: ExplicitParams, left: int | None = None) -> Forecast:
-    """Of a scene's training.
-
-    Args:
-        left: frames that are still to be fitted to a base that is there; None where there is none.
-    """
+def forecast(scene: Scene, params: ExplicitParams) -> Forecast:
+    """Of a scene's training."""
     segments = params.segments
     side = params.textures.pixels_per_texel
     texels = round(TEXELS_PER_PIXEL * scene.width * scene.height / side**2)
     most = int(segments.memory_megabytes * 1e6 / (TEXEL_BYTES * texels))
     frames = scene.num_frames
-    at_once = frames <= min(segments.joint_frames, most) and left is None
-    keys = frames if at_once else min(max(1, most), frames, len(segments.named) or segments.key_frames)
-    trained = keys if left is None else 1
+    at_once = frames <= min(segments.joint_frames, most)
+    keys = frames if at_once else min(max(1, most), frames, segments.key_frames)
     rays = len(scene.indices("train")) * scene.width * scene.height
-    cut_outs = min(KEPT_BYTES, trained * 4 * rays)
-    memory = round(trained * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
-    steps = max(params.iterations, params.textures.steps_per_frame * keys) if left is None else 0
+    cut_outs = min(KEPT_BYTES, keys * 4 * rays)
+    memory = round(keys * texels * TEXEL_BYTES + rays * _ray_bytes(params) + cut_outs + FLOOR_BYTES)
+    steps = max(params.iterations, params.textures.steps_per_frame * keys)
     if not at_once:
-        steps += segments.steps * (frames if left is None else left)
+        steps += segments.steps * frames
     seconds = _seconds(params, steps, texels) / numba.get_num_threads()
     base = model_bytes((1, texels), params.layers, keys)
     disk = base if at_once else base + 2 * texels * frames * (3 + params.layers)
@@ -142,3 +137,25 @@ def check_forecast(found: Forecast, params: ExplicitParams, place: Path | None) 
         )
     if place is not None:
         check_space(place, found.disk)
+
+
+def check_space(folder: Path, needed: int) -> None:
+    """Refuse to train what could not be written.
+
+    Args:
+        folder: of the model.
+        needed: bytes.
+
+    Raises:
+        UserError: if there is less space on the disk.
+    """
+    there = next(path for path in folder.absolute().parents if path.exists())
+    free = shutil.disk_usage(there).free
+    if free < needed:
+        raise UserError(
+            "the trained model would not fit on the disk",
+            file=folder,
+            expected=f"{needed / 1e6:.0f} MB of free space",
+            found=f"{free / 1e6:.0f} MB",
+            remedy="free some space and run the same command again; finished stages are kept",
+        )

@@ -20,7 +20,7 @@ from facefolds_core.params import ExplicitParams
 from facefolds_core.training.explicit.follow import follow_frame, follow_rates, lagging, mean_errors
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, state_on
-from facefolds_core.training.explicit.targets import CutOuts, OneFrame, Pictures
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.views import MovingRays, Rays, StillRays, Views, trace_views
 from facefolds_core.training.segments.base import Base
 
@@ -92,7 +92,7 @@ class FrameFitter:
         steps = params.segments.steps
         phases: list[int] = []
         rays, errors = 0, []
-        pictures = OneFrame(self.pictures, frame)
+        pictures, self.pictures.only = self.pictures, frame
         for i in range(steps):
             phases = phases or random.permutation(parts).tolist()
             seen, which = views.part(0, phases.pop(), parts)
@@ -111,7 +111,7 @@ class FrameFitter:
         colour, alpha = state.frame_colour[0, 0].view(h, w, 3), state.frame_alpha[0, 0].view(h, w, -1)
         return FittedFrame(colour.half(), alpha.half(), psnr, rays)
 
-    def _follow(self, frame: int, views: Rays, pictures: Pictures) -> None:
+    def _follow(self, frame: int, views: Rays, pictures: CutOuts) -> None:
         """Where the frame does not follow yet what moves."""
         state, found = self.state, self.base.surroundings
 
@@ -121,7 +121,7 @@ class FrameFitter:
 
         errors = mean_errors(state, views, pictures, 0, light)
         chosen = lagging(errors - found.usual, state.shape, self.params.follow.min_error)
-        follow_frame(state, views, pictures, 0, chosen, errors, follow_rates(self.params, found.rate), light)
+        follow_frame(state, views, pictures, 0, chosen, errors, follow_rates(self.params), light)
 
     def _start(self, shares: NDArray[np.float64]) -> None:
         colour, alpha = self.base.mixed(shares)
@@ -142,7 +142,7 @@ class FrameFitter:
         return MovingRays(alone, self.base.manifolds, 1, share, self.params.moving, first)
 
     def _rates(self, progress: float) -> NDArray[np.float32]:
-        rates = rates_of(self.base.surroundings.rate * falling(progress))
+        rates = rates_of(self.params.textures.learning_rate * falling(progress))
         rates[:3] = 0  # what all frames share stays as it is
         return rates
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.errors import UserError
 from facefolds_core.progress import progress
 from facefolds_core.spacing import spread
 
@@ -77,25 +76,6 @@ def farthest_first(rows: Float, count: int) -> list[int]:
         chosen.append(int(distance.argmax()))
         distance = np.minimum(distance, _squares(rows, rows[chosen[-1]]))
     return sorted(set(chosen))
-
-
-def named_frames(scene: Scene, names: Sequence[str]) -> list[int]:
-    """Numbers of the frames of these names, in their order in the take.
-
-    Raises:
-        UserError: if one is not there.
-    """
-    missing = [name for name in names if name not in scene.frame_ids]
-    if missing:
-        raise UserError(
-            "a key frame that the take does not have",
-            file=scene.folder / "scene.json",
-            place="train.segments.named",
-            expected=f"names of frames, {scene.frame_ids[0]} to {scene.frame_ids[-1]}",
-            found=", ".join(missing[:5]),
-            remedy="leave it out, or give the key a range of frames that holds it",
-        )
-    return sorted({scene.frame_ids.index(name) for name in names})
 
 
 def _apart(keys: Float) -> float:

@@ -6,7 +6,6 @@ import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -30,7 +29,6 @@ from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.loop import fit_explicit
 from facefolds_core.training.explicit.views import check_images
 from facefolds_core.training.log import log_metrics, open_log
-from facefolds_core.training.patience import patiently
 from facefolds_core.training.report import TrainingReport, device_name, make_report, peak_memory
 from facefolds_core.training.segments.base import LOG, Base, read_base, train_base
 from facefolds_core.training.segments.cache import SegmentCache
@@ -44,9 +42,9 @@ _REMEDY = "run the same command again: finished segments are kept"
 
 
 def train_take(scene: Scene, params: ExplicitParams, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    """`fit_take`, and the model's folder written whole; a full disk is waited for."""
+    """`fit_take`, and the model's folder written whole."""
     trained = fit_take(scene, params, checkpoints, log, folder)
-    patiently(lambda: trained.save(folder))
+    trained.save(folder)
     return trained.report
 
 
@@ -65,7 +63,7 @@ def fit_take(scene: Scene, params: ExplicitParams, checkpoints: Path, log: Path,
     check_forecast(told, params, place)
     tqdm.write(f"train: {scene.num_frames} frames {told}")
     if told.key_frames is None:
-        return fit_explicit(scene, params, log, place)
+        return fit_explicit(scene, params, log)
     with TemporaryDirectory() as found:
         whole = found_in(scene, SubjectParams(seed=params.seed), Path(found) / "subject")
         return _Take(whole, params, checkpoints / "take", log, told).run()
@@ -158,15 +156,7 @@ class _Take:
             psnr,
         )
         report = replace(report, processor_seconds=round(report.processor_seconds + sum(self.used.seconds.values()), 2))
-        drawn = base.folder / "fit.png"
-        picture = drawn.read_bytes() if drawn.exists() else None
-        return Trained(
-            RadianceManifolds(base.manifolds, textures).eval(),
-            spec,
-            report,
-            self._summary(base),
-            None if picture is None else partial(_write, picture),
-        )
+        return Trained(RadianceManifolds(base.manifolds, textures).eval(), spec, report, self._summary(base))
 
     def _summary(self, base: Base) -> dict[str, Any]:
         """`fit.json`: the base's, and how the take was dealt into segments."""
@@ -200,13 +190,9 @@ def base_of(plan: TakePlan, scene: Scene, params: ExplicitParams, folder: Path, 
         if any(other.is_dir() for other in folder.glob("base-*")):
             tqdm.write(
                 "train: it is another one than before (other key frames, pictures, parameters or code), and all frames "
-                "are fitted anew; `train.segments.named`, with `key_frames` of fit.json, keeps the key frames"
+                "are fitted anew"
             )
         train_base(scene, list(plan.keys), params, place, log)
     shutil.rmtree(log, ignore_errors=True)
     shutil.copytree(place / LOG, log)
     return read_base(place, plan.base)
-
-
-def _write(content: bytes, path: Path) -> None:
-    path.write_bytes(content)

@@ -19,7 +19,6 @@ from facefolds_core.training.segments.keys import (
     farthest_first,
     likenesses,
     mixture,
-    named_frames,
 )
 
 
@@ -56,13 +55,10 @@ def plan_take(scene: Scene, params: ExplicitParams, key_frames: int) -> TakePlan
 
     Args:
         key_frames: at most.
-
-    Raises:
-        UserError: if a key frame is named that is not there.
     """
     digests = digests_of_frames(scene, progress(range(scene.num_frames), desc="fingerprints", unit="frame"))
     parts, segments = likenesses(scene), params.segments
-    keys = named_frames(scene, segments.named) if segments.named else farthest_first(comparable(parts), key_frames)
+    keys = farthest_first(comparable(parts), key_frames)
     base = fingerprint_of_base(scene, digest_of_training(params), keys, digests)
     common = base.encode() + digest_of_fitting(params)
     names = [hashlib.sha256(common + digest).hexdigest()[:16] for digest in digests]

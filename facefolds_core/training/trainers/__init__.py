@@ -6,8 +6,7 @@ A module's name is that of its model. It has
 - `PRESETS`: name -> the values that differ from the defaults;
 - `spec()`: the pydantic model of `model.json`, with `kind: Literal[NAME] = NAME`;
 - `build(spec)`: an untrained `RadianceManifolds`;
-- `fit(scene, params, checkpoints, log)`: a `Trained`; and `train`, which writes files as well, if it
-  looks after them itself.
+- `train(scene, params, folder, checkpoints, log)`: trains it, writes its folder and returns a `TrainingReport`.
 
 Parameters are checked without torch, so a module imports no more than params at its top, and the rest within the
 functions: a stage's digest counts what the functions that it calls import (source_code.py).
@@ -25,25 +24,13 @@ if TYPE_CHECKING:
     from facefolds_core.captures.scene import Scene
     from facefolds_core.params import TrainParams
     from facefolds_core.training.report import TrainingReport
-    from facefolds_core.training.trained import Trained
 
 
-def fit(scene: Scene, params: TrainParams, checkpoints: Path, log: Path) -> Trained:
-    """Train the model that the parameters are of.
+def train(scene: Scene, params: TrainParams, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
+    """Train the model that the parameters are of, and write its folder, whole.
 
     Args:
         checkpoints, log: folders, of what lasts as long as the training and of dvclive's files.
     """
-    trained: Trained = MODELS[params.model].fit(scene, params, checkpoints, log)
-    return trained
-
-
-def train(scene: Scene, params: TrainParams, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:
-    """The same, and write the model's folder, whole: by the model's own `train`, if it has one."""
-    own = getattr(MODELS[params.model], "train", None)
-    if own is None:
-        trained = fit(scene, params, checkpoints, log)
-        trained.save(folder)
-        return trained.report
-    report: TrainingReport = own(scene, params, folder, checkpoints, log)
+    report: TrainingReport = MODELS[params.model].train(scene, params, folder, checkpoints, log)
     return report

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
     from facefolds_core.model.storage import ExplicitSpec
     from facefolds_core.training.report import TrainingReport
-    from facefolds_core.training.trained import Trained
 
 PRESETS: dict[str, dict[str, Any]] = {"fast": {}}
 
@@ -27,12 +26,6 @@ def build(spec: ExplicitSpec) -> RadianceManifolds:
     from facefolds_core.model.storage import build_explicit
 
     return build_explicit(spec)
-
-
-def fit(scene: Scene, params: Params, checkpoints: Path, log: Path) -> Trained:
-    from facefolds_core.training.segments.loop import fit_take
-
-    return fit_take(scene, params, checkpoints, log)
 
 
 def train(scene: Scene, params: Params, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from facefolds_core.model.radiance import RadianceManifolds
     from facefolds_core.model.storage import ModelSpec
     from facefolds_core.training.report import TrainingReport
-    from facefolds_core.training.trained import Trained
 
 PRESETS: dict[str, dict[str, Any]] = {"paper": {}, "quick": QUICK}
 
@@ -28,12 +27,6 @@ def build(spec: ModelSpec) -> RadianceManifolds:
     from facefolds_core.model.storage import build_mlp
 
     return build_mlp(spec)
-
-
-def fit(scene: Scene, params: Params, checkpoints: Path, log: Path) -> Trained:
-    from facefolds_core.training.loop import fit_mlp
-
-    return fit_mlp(scene, params, checkpoints, log)
 
 
 def train(scene: Scene, params: Params, folder: Path, checkpoints: Path, log: Path) -> TrainingReport:

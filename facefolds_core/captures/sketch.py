@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from facefolds_core.captures.scene import Scene
+from facefolds_core.captures.scene import Scene
 
 SIDE = 300
 """Pixels of each of the two drawings."""
@@ -28,7 +26,7 @@ def sketch(scene: Scene) -> str:
     title = f"{escape(scene.subject)}: {words}; {frames}, {scene.width} x {scene.height} pixels"
     parts = [_view(scene, SIDE * i, *view) for i, view in enumerate(VIEWS)]
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{2 * SIDE}" height="{SIDE + 24}" '
+        f'<svg width="{2 * SIDE}" height="{SIDE + 24}" '
         f'font-family="sans-serif" font-size="13" fill="gray">{"".join(parts)}'
         f'<text x="8" y="{SIDE + 16}">{title}</text></svg>'
     )
