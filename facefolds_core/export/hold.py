@@ -1,13 +1,14 @@
 """Texels that keep still, but for changes that show: what a video codec spends its bits on is to be seen.
 
 A model's texels tremble from frame to frame, most where they show least: half transparent, behind others, seen by few
-pixels. For each channel of each texel, over the frames,
+pixels. For the colour and for the alpha of each texel, over the frames,
 
-    1/2 W sum_k (x_k - y_k)^2 + price sum_k |x_k - x_(k-1)|
+    1/2 W sum_k |x_k - y_k|^2 + price (how often x changes)
 
-is made least. y are the model's codes (of 255); W says how much the texel shows: the mean over the training cameras of
-the sum over the pixels of (dC/dx)^2, so that the first term is an error summed over the pixels of a picture.
-What shows follows its frames; what does not stays constant, and what lies between moves in few steps.
+is made least. y are the model's codes (of 255); W says how much the texel shows (`add_weights`), the mean over the
+training cameras, so that the first term bounds an error summed over the pixels of a picture.
+What shows follows its frames; what does not stays constant, and what lies between moves in few steps. A change costs
+the same however far it goes: a blink of one frame is dropped or kept whole, not halved.
 
 A long take is held in overlapping windows. At once, a frame that is trained again would change a texel or two of all
 others, and every video segment would have to be encoded again.

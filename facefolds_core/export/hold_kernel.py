@@ -24,10 +24,11 @@ def _tap(texture, n, i, j, q, a, b):  # type: ignore[no-untyped-def]
 
 @kernel(parallel=True)
 def add_weights(codes, texture, sums, min_light):  # type: ignore[no-untyped-def]
-    """Adds to each texel's sums, over all rays, share * (dC/dcolour)^2 and share * |dC/dalpha|^2 / 3.
+    """Adds to each texel's sums, over all rays, share * d_n sum_m d_m: for colour and for alpha.
 
-    C is a ray's colour over black, in the texture's unit; the share is the texel's in the bilinear look-up, and the
-    derivatives are those by the value looked up.
+    d_n is the length of the derivative of the ray's colour over black (mean of RGB) by what is looked up in layer n, in
+    the texture's unit; the share is the texel's in the bilinear look-up. Since (sum_n d_n e_n)^2 <= sum_m d_m sum_n d_n
+    e_n^2, errors e weighted with it are at least the ray's, also where all layers err alike (De Pierro 1995).
 
     codes (P, N, 2) uint16, texture (N, H, W, 4) in [0, 255], sums (N, H, W, 2) float32. Layers behind less
     transmittance than `min_light` are left out.
@@ -70,91 +71,79 @@ def _weigh(codes: Any, texture: Any, min_light: Any, index: Any, wish: Any) -> N
             m += 1
             if through < min_light:
                 break
-        s0, s1, s2 = zero, zero, zero
+        s0, s1, s2, all_colour, all_alpha = zero, zero, zero, zero, zero
         for q in range(m - 1, -1, -1):
             n = layer[q]
             g0, g1, g2 = c[q, 0] - s0, c[q, 1] - s1, c[q, 2] - s2
-            wish[n, p, 2] = (before[q] * c[q, 3]) ** 2
-            wish[n, p, 3] = before[q] ** 2 * (g0 * g0 + g1 * g1 + g2 * g2) * np.float32(1 / 3.0)
+            wish[n, p, 2] = before[q] * c[q, 3]
+            wish[n, p, 3] = before[q] * np.sqrt((g0 * g0 + g1 * g1 + g2 * g2) * np.float32(1 / 3.0))
+            all_colour += wish[n, p, 2]
+            all_alpha += wish[n, p, 3]
             s0, s1, s2 = s0 + c[q, 3] * g0, s1 + c[q, 3] * g1, s2 + c[q, 3] * g2
-
-
-@inlined
-def _fill(x, first, last, value):  # type: ignore[no-untyped-def]
-    for i in range(first, last + 1):
-        x[i] = value
-    return last + 1
+        for q in range(m):
+            wish[layer[q], p, 2] *= all_colour
+            wish[layer[q], p, 3] *= all_alpha
 
 
 @kernel
-def steady(y, price, x):  # type: ignore[no-untyped-def]
-    """x = argmin 1/2 sum (x_k - y_k)^2 + price sum |x_k - x_(k-1)|: Condat 2013, direct, (K,) each.
+def pieces(y, price, best, first):  # type: ignore[no-untyped-def]
+    """y (K, Q) becomes argmin_x 1/2 sum |x_k - y_k|^2 + price * (how many k have x_k != x_(k-1)), in place.
 
-    A segment from `start` on grows while a constant can explain it: its value lies in [low, high], and `under`, `over`
-    are the sums of what these leave. Where they leave more than the price, the segment ends with a jump.
+    The Potts functional, by dynamic programming (Friedrich, Kempe, Liebscher, Winkler 2008): best[t] is the least cost
+    of the first t frames, first[t] where the last piece of frames 0 to t begins. A piece has its frames' mean.
+    best (K + 1,) and first (K,) are scratch.
     """
-    last = len(y) - 1
-    k, start, fell, rose = 0, 0, 0, 0
-    low, high, under, over = y[0] - price, y[0] + price, price, -price
-    while True:
-        if k == last:
-            if under < 0.0:
-                start = _fill(x, start, fell, low)
-                k = fell = start
-                low, under = y[k], price
-                over = low + price - high
-            elif over > 0.0:
-                start = _fill(x, start, rose, high)
-                k = rose = start
-                high, over = y[k], -price
-                under = high - price - low
-            else:
-                _fill(x, start, last, low + under / (k - start + 1))
-                return
-            continue
-        under += y[k + 1] - low
-        over += y[k + 1] - high
-        if under < -price:
-            start = _fill(x, start, fell, low)
-            k = fell = rose = start
-            low, under, over = y[k], price, -price
-            high = low + 2 * price
-        elif over > price:
-            start = _fill(x, start, rose, high)
-            k = fell = rose = start
-            high, under, over = y[k], price, -price
-            low = high - 2 * price
-        else:
-            k += 1
-            if under >= price:
-                fell = k
-                low += (under - price) / (fell - start + 1)
-                under = price
-            if over <= -price:
-                rose = k
-                high += (over + price) / (rose - start + 1)
-                over = -price
+    count, channels = y.shape
+    mean = np.empty(channels)
+    best[0] = -price
+    for t in range(count):
+        best[t + 1] = np.inf
+        mean[:] = 0.0
+        error = 0.0
+        for s in range(t, -1, -1):
+            size = t - s + 1
+            for q in range(channels):
+                off = y[s, q] - mean[q]
+                mean[q] += off / size
+                error += 0.5 * off * (y[s, q] - mean[q])
+            if best[s] + price + error < best[t + 1]:
+                best[t + 1], first[t] = best[s] + price + error, s
+            if error >= best[t + 1]:
+                break
+    t = count - 1
+    while t >= 0:
+        s = first[t]
+        for q in range(channels):
+            mean[q] = 0.0
+            for k in range(s, t + 1):
+                mean[q] += y[k, q] / (t - s + 1)
+            for k in range(s, t + 1):
+                y[k, q] = mean[q]
+        t = s - 1
 
 
 @kernel(parallel=True)
 def hold(images, weights, price):  # type: ignore[no-untyped-def]
-    """images (K, H, W, 4) uint8, in place: each channel of each texel `steady` in time, at price / weight.
+    """images (K, H, W, 4) uint8, in place: colour and alpha of each texel in `pieces`, at price / weight.
 
     weights (H, W, 2) float32 of colour and of alpha; a texel without weight keeps its mean.
     """
     count, height, width = images.shape[0], images.shape[1], images.shape[2]
     for row in prange(height):
-        y, x = np.empty(count), np.empty(count)
+        colour, alpha = np.empty((count, 3)), np.empty((count, 1))
+        best, first = np.empty(count + 1), np.empty(count, np.int64)
         for column in range(width):
-            for q in range(4):
-                least, greatest = images[0, row, column, q], images[0, row, column, q]
+            for part in range(2):
+                y = colour if part == 0 else alpha
+                moves = False
                 for k in range(count):
-                    value = images[k, row, column, q]
-                    least, greatest = min(least, value), max(greatest, value)
-                    y[k] = value
-                if least == greatest:
+                    for q in range(y.shape[1]):
+                        value = images[k, row, column, 3 * part + q]
+                        moves |= value != images[0, row, column, 3 * part + q]
+                        y[k, q] = value
+                if not moves:
                     continue
-                w = weights[row, column, 0 if q < 3 else 1]
-                steady(y, price / max(w, 1e-9), x)
+                pieces(y, price / max(weights[row, column, part], 1e-9), best, first)
                 for k in range(count):
-                    images[k, row, column, q] = np.uint8(np.rint(min(max(x[k], 0.0), 255.0)))
+                    for q in range(y.shape[1]):
+                        images[k, row, column, 3 * part + q] = np.uint8(np.rint(y[k, q]))

@@ -58,6 +58,6 @@ class TextureParams(Section):
 class BakeParams(Section):
     """Texels keep still where a change would not show."""
 
-    hold: Weight = 0.008
-    """Price of a texel's change from frame to frame, against the error of keeping still. Larger values make smaller
-    videos; 0 lets all texels tremble."""
+    hold: Weight = 5.0
+    """Price of a texel's change from one frame to the next: the squared error, in codes of 255 summed over a picture's
+    pixels, that it must at least take away. Larger values make smaller videos; 0 lets all texels tremble."""

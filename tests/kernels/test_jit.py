@@ -96,11 +96,11 @@ def test_kernels_run_where_no_cache_can_be_written(tmp_path: Path) -> None:
     code = """
     from pathlib import Path
     from facefolds_core.kernels.jit import kernel
-    from facefolds_core.export.hold_kernel import steady
+    from facefolds_core.export.hold_kernel import pieces
     import numpy as np
-    x = np.empty(2)
-    steady(np.array([1.0, 3.0]), 9.0, x)
-    print(x)
+    x = np.array([[1.0], [3.0]])
+    pieces(x, 9.0, np.empty(3), np.empty(2, np.int64))
+    print(x[:, 0])
     """
     assert run_python(tmp_path, code) == "[2. 2.]"
 
