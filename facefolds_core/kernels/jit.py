@@ -68,7 +68,7 @@ def inlined(function: Code) -> Code:
 
 def fingerprint(function: Any) -> str:
     """SHA-256 of what compiling a kernel builds in: its options, and the text of its module and of all that this
-    imports of its own package."""
+    imports of its own package and of ours."""
     code = function.py_func if isinstance(function, Dispatcher) else function
     options = sorted(function.targetoptions.items()) if isinstance(function, Dispatcher) else []
     digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {np.__version__} {options!r}".encode())
@@ -78,11 +78,11 @@ def fingerprint(function: Any) -> str:
 
 
 def _known(module: str) -> set[str]:
-    """The module and those of its package that it imports, directly or not."""
-    found, left = set[str](), [module]
+    """The module and those of its package and of ours that it imports, directly or not."""
+    found, left, packages = set[str](), [module], {module.split(".")[0], __name__.split(".")[0]}
     while left:
         name = left.pop()
-        if name not in found and name.split(".")[0] == module.split(".")[0] and _text(name):
+        if name not in found and name.split(".")[0] in packages and _text(name):
             found.add(name)
             left += _imported(name)
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.kernels import lanes
+from facefolds_core.kernels import jit, lanes
 from facefolds_core.kernels.jit import fingerprint, kernel
 from facefolds_core.kernels.lanes import fill, highest, least, load, most, store, total, where_less
 
@@ -43,4 +43,6 @@ def test_a_kernel_on_disk_is_of_these_lanes(monkeypatch: pytest.MonkeyPatch, tmp
     changed = tmp_path / "lanes.py"
     changed.write_text(Path(lanes.__file__).read_text() + "\nMORE = 1\n")
     monkeypatch.setattr(lanes, "__file__", str(changed))
+    jit._text.cache_clear()
     assert fingerprint(_all) != before
+    jit._text.cache_clear()
