@@ -14,7 +14,7 @@ from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject import outline
 from facefolds_core.subject.volume import Volume
-from facefolds_core.training.explicit.fit import fit_window
+from facefolds_core.training.explicit.fit import fit_window, moves
 
 PARAMS = ExplicitParams()
 START = PARAMS.start.model_copy(update={"centres": (-0.15, -0.2, -0.25), "belts": (10.0,)})
@@ -156,3 +156,20 @@ def test_the_back_of_a_tracked_head_widens_no_window(bust: Volume) -> None:
     alone, tracked = (fit_window(bust, chart, face, mesh, START) for mesh in (None, vertices))
     assert alone[3] < 0.6
     assert -1.1 < tracked[2] < -0.9 and 0.9 < tracked[3] < 1.1  # straight sideways, and the margin
+
+
+def test_layers_reach_as_far_as_the_surface_moves() -> None:
+    """Outwards in one frame, inwards in another; what moves less than the layers lie apart, or is not there, does
+    not."""
+    still = np.full((80, 80), 0.3)
+    open_jaw, closed = still.copy(), still + 0.005
+    open_jaw[10:30, 10:30] += 0.05
+    closed[50:70, 10:30] -= 0.045
+    open_jaw[:, 60:] = np.nan
+    still[:, 50:] = np.nan
+    closed[:, 70:] = 0.9
+    outwards, inwards = moves(still, [open_jaw, closed], np.full((80, 80), 0.006))
+    assert outwards[10:30, 10:30] == pytest.approx(0.044, rel=0.03)
+    assert inwards[50:70, 10:30] == pytest.approx(0.034, rel=0.03)
+    assert outwards[45:].max() == inwards[:35].max() == outwards[:, 50:].max() == inwards[:, 50:].max() == 0
+    assert moves(still, [], np.full((80, 80), 0.006))[0].max() == 0

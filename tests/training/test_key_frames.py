@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from facefolds_core.training.likeness import comparable, farthest_first, likenesses
 from facefolds_core.training.segments import keys as keys_module
-from facefolds_core.training.segments.keys import comparable, farthest_first, likenesses, mixture
+from facefolds_core.training.segments.keys import mixture
 from tests.scenes import make_scene
 
 LINE = np.array([[0.0], [1.0], [2.0], [3.0], [10.0]], np.float32)
@@ -20,6 +21,7 @@ def test_the_middle_comes_first_then_always_the_farthest() -> None:
     assert farthest_first(rows, 2) == [3, 4]
     assert farthest_first(rows, 3) == [0, 3, 4]
     assert farthest_first(rows, 99) == [0, 1, 2, 3, 4]
+    assert farthest_first(rows, 3, first=1) == [1, 3, 4]
 
 
 @pytest.mark.parametrize("blend", [0.0, 0.5])

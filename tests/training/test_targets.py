@@ -13,7 +13,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.subject.find import reference_frame
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.teacher import Teacher
+from facefolds_core.training.explicit.teacher import OTHERS, Teacher
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
 from tests.scenes import make_scene
 from tests.subject.splats import found
@@ -104,8 +104,10 @@ def test_virtual_cameras_come_after_the_photos_and_show_the_gaussians_of_the_fra
 
 
 def test_gaussians_that_explain_little_teach_nothing(scene: Scene) -> None:
-    assert not Teacher(scene, found(scene, MIN_START_PSNR - 0.1), seed=0).virtual.cameras
-    assert Teacher(scene, found(scene, MIN_START_PSNR), seed=0).virtual.cameras
+    photos = CutOuts(scene).photos
+    bad, good = (Teacher(scene, found(scene, psnr), seed=0) for psnr in (MIN_START_PSNR - 0.1, MIN_START_PSNR))
+    assert not bad.virtual.cameras and not bad.others(photos)
+    assert good.virtual.cameras and len(good.others(photos)) == min(OTHERS, scene.num_frames - 1)
 
 
 def test_pictures_of_a_teacher_that_are_not_kept_are_the_same_again(scene: Scene) -> None:

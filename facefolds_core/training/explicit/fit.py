@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,7 @@ from facefolds_core.subject.outline import (
     window_uv,
 )
 from facefolds_core.subject.sight import seen_by
+from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
@@ -35,6 +37,8 @@ Array = NDArray[np.float64]
 
 FINEST = 0.7
 """Voxels are no smaller than so many pixels of the median camera."""
+MOVES_MARGIN = 4
+"""Nodes of the radius maps around what moves, in which the layers reach as far."""
 MIN_VIEW_SHARE = 0.06
 """Of the training cameras: what a smaller share sees of a tracked mesh is its word alone."""
 WINDOW_MARGIN = 0.04
@@ -54,7 +58,8 @@ class Fit:
         chart: of (u, v) and radii.
         window: (u0, u1, v0, v1).
         middle: starting radii of the middle of the layers, units.
-        halfwidth: half the space between the outermost and the innermost layer, units.
+        halfwidth: half the space between the outermost and the innermost layer, units, where the surface stands still.
+        reach: half of how far it moves beyond that over the frames, units; added to any multiple of the halfwidth.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
@@ -69,6 +74,7 @@ class Fit:
     window: Window
     middle: Array
     halfwidth: Array
+    reach: Array
     trust: Array
     opacity: Array
     rgb: Array
@@ -80,11 +86,12 @@ class Fit:
     start_psnr: float
 
 
-def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fit:
+def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, others: Sequence[Splats] = ()) -> Fit:
     """Centre, window, radii, spacing and texels from the volume, and from the tracked mesh where there is one.
 
     Args:
         subject: as it was found.
+        others: its Gaussians in a few other frames.
     """
     start, geometry, finest = params.start, params.geometry, FINEST * pixel_size(scene)
     volume, coarse = (volume_of(subject.splats, cells, finest) for cells in (CELLS, COARSE))
@@ -112,7 +119,11 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
     middle = extrapolate(known).clip(MIN_RADIUS)
     most = greatest_halfwidth(geometry, pixel_size(scene))
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
-    middle = np.maximum(middle, least_middle(widths, geometry))
+    volumes = [volume_of(splats, CELLS, finest) for splats in others]
+    radii = [profile(other, chart, uv, start.subject_opacity).radius for other in volumes]
+    outwards, inwards = moves(seen.radius, radii, widths)
+    middle, reach = middle + 0.5 * (outwards - inwards), 0.5 * (outwards + inwards)
+    middle = np.maximum(middle, least_middle(widths, geometry) + reach)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
     return Fit(
@@ -120,7 +131,8 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams) -> Fi
         window=window,
         middle=middle,
         halfwidth=widths,
-        trust=TRUST * kept,
+        reach=reach,
+        trust=TRUST * kept + reach,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
@@ -188,6 +200,25 @@ def spread(seen: Profile, middle: Array, least: float, most: float, voxel: float
     off = np.nan_to_num(np.clip(np.abs(seen.radius - middle) - voxel, 0, None))
     wide: Array = ndimage.gaussian_filter(least + thick + off, 4.0, mode="nearest").clip(least, most)
     return wide
+
+
+def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Array, Array]:
+    """How much farther than a halfwidth the surface goes outwards and inwards in other frames, units.
+
+    Where a jaw opens, a ray meets the neck in one frame and the chin in another, centimetres apart.
+
+    Args:
+        radius: (rows, columns) of the surface in the frame of the start; NaN where there is none.
+        others: the same of other frames.
+        halfwidth: of the layers there.
+    """
+    found = []
+    for sign in (1.0, -1.0):
+        beyond = [np.nan_to_num(sign * (other - radius) - halfwidth).clip(0) for other in others]
+        farthest = np.max([np.zeros_like(radius), *beyond], axis=0)
+        wide = ndimage.maximum_filter(farthest, 2 * MOVES_MARGIN + 1, mode="nearest")
+        found.append(ndimage.gaussian_filter(wide, MOVES_MARGIN / 2, mode="nearest"))
+    return found[0], found[1]
 
 
 def least_middle(halfwidth: Array, params: GeometryParams) -> Array:

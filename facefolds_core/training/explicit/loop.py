@@ -20,6 +20,7 @@ from facefolds_core.training.checkpoints import fingerprint
 from facefolds_core.training.explicit.cameras import choose_cameras
 from facefolds_core.training.explicit.fit import fit_scene
 from facefolds_core.training.explicit.plan import plan
+from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.trainer import Trainer
 from facefolds_core.training.explicit.views import check_images
@@ -75,12 +76,13 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
         cameras = choose_cameras(scene, subject.cameras)
         for note in cameras.notes:
             bar.write(f"train: {note}")
-        fit = fit_scene(cameras.scene, subject, params)
+        teacher = Teacher(cameras.scene, subject, params.seed)
+        pictures = CutOuts(cameras.scene, cameras.gains, teacher=teacher)
+        fit = fit_scene(cameras.scene, subject, params, teacher.others(pictures.photos))
         warnings = warnings_of(scene, fit)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
-        teacher = Teacher(cameras.scene, subject, params.seed)
-        trainer = Trainer(cameras, params, fit, device, teacher)
+        trainer = Trainer(cameras, params, fit, device, pictures, teacher.virtual)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
         levels = plan(fit, params, scene.num_frames, pixels)

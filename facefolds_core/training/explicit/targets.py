@@ -64,17 +64,18 @@ class CutOuts:
         index = index if self.only is None else self.only
         found = self._kept.pop(index, None)
         if found is None:
-            found = self._cut(index)
+            found = self.photos(index)
             if self._teacher is not None:
                 photos = found
-                virtual = self._teacher.cut(index, lambda frame: photos if frame == index else self._cut(frame))
+                virtual = self._teacher.cut(index, lambda frame: photos if frame == index else self.photos(frame))
                 found = np.concatenate([photos, virtual])
         self._kept[index] = found
         while len(self._kept) > 1 and len(self._kept) * found.nbytes > self._kept_bytes:
             self._kept.popitem(last=False)
         return found
 
-    def _cut(self, index: int) -> NDArray[np.uint8]:
+    def photos(self, index: int) -> NDArray[np.uint8]:
+        """The same of the training cameras alone, made anew."""
         height, width = self._photos.height, self._photos.width
         found = np.empty((len(self._cameras), height * width, 4), np.uint8)
         for position, camera in enumerate(self._cameras):

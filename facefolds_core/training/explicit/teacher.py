@@ -2,7 +2,8 @@
 
 Few photos do not say what layers look like from between them: each camera can be shown a picture of its own. Gaussians
 have no such freedom, and what they show from there is nearer to the truth (docs/research/few-cameras.md). So their
-pictures are targets beside the photos, in each frame.
+pictures are targets beside the photos, in each frame. The Gaussians of frames that differ also say how far the surface
+moves, and so how far apart the layers must lie.
 """
 
 from __future__ import annotations
@@ -23,8 +24,12 @@ from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import virtual_cameras
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
+from facefolds_core.training.likeness import comparable, farthest_first, likenesses
 
 Image = NDArray[np.uint8]
+
+OTHERS = 2
+"""Frames beside that of the start in which it is looked where the surface lies."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +64,22 @@ class Teacher:
         self._usual: NDArray[np.float32] | None = None
         self._known = {self._first: splats}
         real = self._real(self._first)
-        believed = found.psnr >= MIN_START_PSNR
-        cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if believed else ()
+        self._believed = found.psnr >= MIN_START_PSNR
+        cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if self._believed else ()
         self._views = [view_of(camera) for camera in cameras]
         mattes = self._drawn(splats)[..., 3].reshape(len(cameras), scene.height, scene.width)
         self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))
+
+    def others(self, photos: Callable[[int], Image]) -> list[Splats]:
+        """The Gaussians of the `OTHERS` frames that look least like that of the start and one another.
+
+        Args:
+            photos: as of `cut`.
+        """
+        if not self._believed or self._scene.num_frames == 1:
+            return []
+        chosen = farthest_first(comparable(likenesses(self._scene)), 1 + OTHERS, self._first)
+        return [self._at(frame, photos) for frame in chosen if frame != self._first]
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.

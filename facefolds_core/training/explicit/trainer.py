@@ -28,7 +28,7 @@ from facefolds_core.training.explicit.plan import Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.teacher import Teacher
+from facefolds_core.training.explicit.teacher import Virtual
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
 
@@ -48,11 +48,17 @@ class Trainer:
     """
 
     def __init__(
-        self, cameras: CameraChoice, params: ExplicitParams, fit: Fit, device: torch.device, teacher: Teacher
+        self,
+        cameras: CameraChoice,
+        params: ExplicitParams,
+        fit: Fit,
+        device: torch.device,
+        pictures: CutOuts,
+        virtual: Virtual,
     ) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
-        self.pictures, self.virtual = CutOuts(self.scene, cameras.gains, teacher=teacher), teacher.virtual
+        self.pictures, self.virtual = pictures, virtual
         self.random = np.random.default_rng(params.seed)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
@@ -67,7 +73,7 @@ class Trainer:
         self.usual = np.zeros((0, 3), np.float32)
 
     def manifolds(self) -> RadialManifolds:
-        halfwidth = self.geometry * torch.from_numpy(self.fit.halfwidth).float()
+        halfwidth = torch.from_numpy(self.geometry * self.fit.halfwidth + self.fit.reach).float()
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
@@ -151,7 +157,7 @@ class Trainer:
         # Where hardly anything is opaque a direction may drift: not to c, where the search for crossings ends.
         moved = start + _shrink(moved - start, torch.from_numpy(self.fit.trust).float())
         self.middle = torch.maximum(
-            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry)).float()
+            moved, torch.from_numpy(least_middle(self.fit.halfwidth, self.params.geometry) + self.fit.reach).float()
         )
 
     def _step(self, level: Level, number: int, live: Live, bar: tqdm) -> None:

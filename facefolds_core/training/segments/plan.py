@@ -8,18 +8,14 @@ from dataclasses import dataclass
 from facefolds_core.captures.scene import Scene
 from facefolds_core.params import ExplicitParams
 from facefolds_core.progress import progress
+from facefolds_core.training.likeness import comparable, farthest_first, likenesses
 from facefolds_core.training.segments.base import (
     digest_of_fitting,
     digest_of_training,
     digests_of_frames,
     fingerprint_of_base,
 )
-from facefolds_core.training.segments.keys import (
-    comparable,
-    farthest_first,
-    likenesses,
-    mixture,
-)
+from facefolds_core.training.segments.keys import mixture
 
 
 @dataclass(frozen=True)
