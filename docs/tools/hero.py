@@ -22,6 +22,7 @@ import yaml
 
 from bench.results import ROOT, commit_name
 from bench.run import own_params
+from docs.tools.site import HERO_COMMIT
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.single_page import write_single_page
 from facefolds_core.errors import UserError, report_user_errors
@@ -88,6 +89,7 @@ def release(folders: SubjectFolders, out: Path) -> list[Path]:
     asset = read_asset(folders.asset)
     out.mkdir(parents=True, exist_ok=True)
     page, packed = out / "hero.html", out / "hero.zip"
+    write_text(out / Path(HERO_COMMIT).name, commit_name())
     write_single_page(page, folders.asset, asset.manifest, asset.full.entry, find_player())
     with atomic_folder(out / "asset") as temporary:
         shutil.copytree(folders.asset, temporary, dirs_exist_ok=True)

@@ -1,15 +1,16 @@
 """The documents as a site (`make docs`): what MkDocs cannot do by itself, as its hooks. mkdocs.yml names this file.
 
 The first page is README.md, with the player in place of its moving picture where there is something to play: what
-`make hero` has made, or the actor's asset of `make repro` where the player is built. Pages that lie outside of docs/
-join it; links between all of them lead to where they then are. The page of the library is made from the names that
-`facefolds_core` offers and their docstrings.
+`make hero` has made (with its age), or the actor's asset of `make repro` where the player is built. Pages that lie
+outside of docs/ join it; links between all of them lead to where they then are. The page of the library is made from
+the names that `facefolds_core` offers and their docstrings.
 """
 
 from __future__ import annotations
 
 import posixpath
 import re
+import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 HERO = "dist/hero/hero.html"
+HERO_COMMIT = "dist/hero/commit.txt"
+HERO_CODE = ("facefolds_core", "stages", "viewer/src", "params.yaml", "docs/tools/hero.yaml")
+"""What it is made by: when any of it changes, the hero grows older."""
 ACTOR = "data/actor/asset"
 MOVED = {
     "README.md": "index.md",
@@ -94,9 +98,21 @@ def playing_page(root: Path = ROOT, places: tuple[Path, ...] = PLACES) -> str | 
     return str(found["page"]) if found else None
 
 
-def first_page(text: str, player: bool) -> str:
-    """README.md with the player in place of its first picture, where there is one."""
-    return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: FRAME, text, count=1, flags=re.MULTILINE) if player else text
+def hero_age(root: Path = ROOT) -> str:
+    """In words: what made the hero, and how often its code has changed since; empty where there is none."""
+    if not (root / HERO_COMMIT).exists():
+        return ""
+    commit = (root / HERO_COMMIT).read_text(encoding="utf-8").strip()
+    since = ["git", "-C", str(root), "rev-list", "--count", f"{commit.rstrip('+')}..HEAD", "--", *HERO_CODE]
+    done = subprocess.run(since, capture_output=True, text=True, check=False)
+    count = f"{done.stdout.strip()} changes of its code ago" if done.returncode == 0 else "which is not in this history"
+    return f"Made by {commit}, {count}."
+
+
+def first_page(text: str, player: bool, age: str = "") -> str:
+    """README.md with the player in place of its first picture, where there is one, and the hero's age below."""
+    frame = f"{FRAME}<p><small>{age}</small></p>" if age else FRAME
+    return re.sub(r"^!\[[^\]]*\]\([^)]*\)", lambda _: frame, text, count=1, flags=re.MULTILINE) if player else text
 
 
 def with_steps(text: str) -> str:
@@ -150,7 +166,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for source in sorted(documents):
         text = (ROOT / source).read_text(encoding="utf-8")
         text, more = relinked(
-            with_steps(first_page(text, playing is not None)) if source == "README.md" else text, source
+            with_steps(first_page(text, playing is not None, hero_age())) if source == "README.md" else text, source
         )
         wanted |= more
         place = place_of(source)

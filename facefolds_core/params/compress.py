@@ -122,8 +122,8 @@ class CompressParams(Section):
     """How textures are compressed."""
 
     levels: Many[LevelParams] = (
-        LevelParams(name="small", mesh_resolution=16, texture_resolution=128, crf=31, max_error_pixels=0.5),
-        LevelParams(name="medium", mesh_resolution=32, texture_resolution=256, crf=28, max_error_pixels=0.2),
+        LevelParams(name="small", mesh_resolution=16, texture_resolution=128, crf=35, max_error_pixels=0.5),
+        LevelParams(name="medium", mesh_resolution=32, texture_resolution=256, crf=34, max_error_pixels=0.2),
     )
     """Coarser levels of detail, the coarsest first; the full one is always there."""
 

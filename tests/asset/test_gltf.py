@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import av
 import DracoPy
 import jsonschema
 import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
+from facefolds_core.asset.audio import AAC_MIME, encode_sound
+from facefolds_core.asset.gltf.checking import check_glb
 from facefolds_core.asset.gltf.extension import NAME, SCHEMA, LayeredVideo, schema, write_schema
 from facefolds_core.asset.gltf.writing import write_layered
 from facefolds_core.cli.export import export
@@ -22,7 +27,7 @@ from facefolds_core.params import CompressParams, MeshCodec
 from tests.assets import SOURCE, make_asset
 from tests.geometry.test_track import SHIFTS, TURNS
 from tests.gltf_files import complaints, opened, part, validator_report
-from tests.viewer.fixtures import add_reflection, rich_asset
+from tests.viewer.fixtures import add_reflection, change_manifest, file_entry, rich_asset
 
 HOME = Path(__file__).parents[2] / "docs" / "reference" / NAME
 FRAMES = 3
@@ -71,8 +76,8 @@ def test_the_documents_example_is_valid() -> None:
 def test_the_documents_table_names_every_property() -> None:
     text = (HOME / "README.md").read_text(encoding="utf-8")
     table = text[text.index("### Properties") : text.index("### JSON Schema")]
-    named = set(re.findall(r"`(\w+)`", table)) - {"KHR_texture_video", "KHR_audio_emitter"}
-    keys = set(schema()["properties"]) | set(schema()["$defs"]["Reflection"]["properties"])
+    named = set(re.findall(r"`(\w+)`", table)) - {"KHR_texture_video"}
+    keys = set(schema()["properties"]) | {name for one in schema()["$defs"].values() for name in one["properties"]}
     assert named == keys - {"extensions", "extras"}
 
 
@@ -150,3 +155,38 @@ def test_the_still_is_of_the_coarsest_level(tmp_path: Path) -> None:
     assert corners <= sum(len(mesh.vertices) for mesh in coarse.layers)
     assert len(layers["primitives"]) == full.num_layers == coarse.num_layers + 1
     assert complaints(validator_report(tmp_path / "face.glb")) == []
+
+
+def test_checksums_cover_what_it_refers_to(written: tuple[dict[str, Any], bytes]) -> None:
+    document, binary = written
+    sums = {one["bufferView"]: one["sha256"] for one in said(document)["checksums"]}
+    assert sums == {
+        i: hashlib.sha256(part(document, binary, i)).hexdigest() for i in range(len(document["bufferViews"]))
+    }
+
+
+def packets(data: bytes, kind: str) -> list[tuple[bytes, float]]:
+    """Of a stream of an MP4: (bytes, seconds)."""
+    with av.open(io.BytesIO(data)) as container:
+        stream = container.streams.get({kind: 0})[0]
+        return [(bytes(one), float(one.pts * one.time_base)) for one in container.demux(stream) if one.pts is not None]
+
+
+@pytest.mark.parametrize("encoded", [False, True])
+def test_the_sound_lies_in_the_video(tmp_path: Path, encoded: bool) -> None:
+    """The pictures stay as they are, and so does sound that is AAC already."""
+    rich = rich_asset(tmp_path / "asset")
+    if encoded:
+        encode_sound(rich / "sound.mp4", rich / "audio.wav", 0.2)
+        change_manifest(rich, lambda value: value.update(audio=file_entry(rich / "sound.mp4") | {"mime": AAC_MIME}))
+    export("gltf", rich, tmp_path / "face.glb", None)
+    document, binary = opened(tmp_path / "face.glb")
+    [video] = document["extensions"]["KHR_texture_video"]["videos"]
+    data, level = part(document, binary, video["bufferView"]), read_asset(rich).full
+    assert video["mimeType"].startswith('video/mp4; codecs="avc1') and video["mimeType"].endswith(', mp4a.40.2"')
+    assert packets(data, "video") == packets((rich / level.entry.texture.videos[0].file).read_bytes(), "video")
+    heard = packets(data, "audio")
+    assert sum(len(one) for one, _ in heard) > 500
+    if encoded:
+        assert heard == packets((rich / "sound.mp4").read_bytes(), "audio")
+    assert check_glb(tmp_path / "face.glb") == []

@@ -76,6 +76,14 @@ MISTAKES: dict[str, tuple[Callable[[Document], Any], str]] = {
         lambda d: d["animations"][0]["channels"][1]["target"].update(node=1),
         "/animations/0/channels/1/target: not this node's",
     ),
+    "another checksum": (
+        lambda d: layered(d)["checksums"][2].update(sha256=64 * "0"),
+        "/bufferViews/2: damaged: another SHA-256 than",
+    ),
+    "no such part": (
+        lambda d: layered(d)["checksums"][2].update(bufferView=10**4),
+        f"/nodes/0/extensions/{NAME}/checksums/2/bufferView: there is no bufferViews[10000]",
+    ),
     "maps beyond": (
         lambda d: layered(d)["reflection"].update(glossRectangle=[0, 0, 4000, 1]),
         f"/nodes/0/extensions/{NAME}/reflection/glossRectangle: ",

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-MOST = 2860
+MOST = 3006
 """Lines of Python. The aim is 2200: lower it with them, never raise it but for a new command that an issue asks for:
-`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), and `start`, 134."""
+`gate`, 220 lines, which took over from `rooms`, `large`, 88 (2400 before them), `start`, 134, and
+`equal_bytes`, 146."""
 
 
 def test_the_benchmarks_stay_small(project_root: Path) -> None:

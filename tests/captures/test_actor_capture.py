@@ -46,6 +46,7 @@ def read_mesh(folder: Path, frame: str) -> np.ndarray:
 
 def test_all_files_are_there(written: Path) -> None:
     files = {str(p.relative_to(written)) for p in written.rglob("*") if p.is_file()}
+    files -= {f"audio/{SEGMENT}.wav"}  # where espeak-ng is installed
     expected = {"KRT", "frame_list.txt"}
     for frame in ("000001", "000002"):
         expected |= {f"tracked_mesh/{SEGMENT}/{frame}{end}" for end in (".obj", ".bin", "_transform.txt")}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.results import commit_name
 from docs.tools import hero
 from facefolds_core.asset import read_asset
 from facefolds_core.config.params_file import load_params
@@ -51,4 +52,5 @@ def test_what_is_packed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
         assert "26.50 dB of the subject" in zipped.read("README.txt").decode()
     assert read_asset(tmp_path / "there" / "asset").num_frames == read_asset(folders.asset).num_frames
     assert (tmp_path / "there" / "hero.html").read_text() == page.read_text()
+    assert (tmp_path / "out" / "commit.txt").read_text() == commit_name()
     assert {"LICENSE", "metrics.json"} <= {path.name for path in (tmp_path / "there").iterdir()}

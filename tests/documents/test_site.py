@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
 
 import facefolds_core
-from docs.tools.site import ACTOR, FRAME, HERO, api_page, first_page, playing_page, relinked
+from docs.tools.site import ACTOR, FRAME, HERO, HERO_COMMIT, api_page, first_page, hero_age, playing_page, relinked
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 
@@ -65,6 +66,28 @@ def test_the_first_page_plays_the_hero_or_else_the_actor(tmp_path: Path) -> None
     (tmp_path / HERO).parent.mkdir(parents=True)
     (tmp_path / HERO).write_text("the hero")
     assert playing_page(tmp_path, (player,)) == "the hero"
+
+
+def test_the_hero_says_its_age(tmp_path: Path) -> None:
+    def git(*words: str) -> str:
+        who = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        command = ["git", "-C", str(tmp_path), *who, *words]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    assert hero_age(tmp_path) == ""
+    git("init", "-q")
+    git("commit", "-q", "--allow-empty", "-m", "made")
+    (tmp_path / HERO_COMMIT).parent.mkdir(parents=True)
+    made = git("rev-parse", "--short=12", "HEAD")
+    (tmp_path / HERO_COMMIT).write_text(f"{made}+")
+    for name in ("params.yaml", "README.md"):  # the second is none of its code
+        (tmp_path / name).write_text("changed")
+        git("add", name)
+        git("commit", "-q", "-m", name)
+    assert hero_age(tmp_path) == f"Made by {made}+, 1 changes of its code ago."
+    (tmp_path / HERO_COMMIT).write_text("0123456789ab")
+    assert hero_age(tmp_path) == "Made by 0123456789ab, which is not in this history."
+    assert f"{FRAME}<p><small>old</small></p>" in first_page("![x](y)", True, "old")
 
 
 def test_the_librarys_page_has_every_name() -> None:

@@ -124,7 +124,11 @@ def test_the_code_to_embed_plays(player: Player) -> None:
     """From this machine: the code is for what is uploaded as player/ and player/asset/."""
     frame, element = embed_code(player)
     assert player.page.get_by_text("Only this machine can reach").is_visible()
-    assert "facefolds export-html data/caps/asset --out caps.html" in player.page.get_by_label("One file").input_value()
+    command = "facefolds export-html data/caps/asset --out caps.html"
+    assert player.page.get_by_label("One file").input_value() == command  # what a shell takes, and nothing else
+    assert player.page.get_by_label("and this code plays it").input_value().startswith('<iframe src="caps.html"')
+    hidden = "[...e.shadowRoot.querySelectorAll('textarea')].filter((one) => one.scrollHeight > one.clientHeight)"
+    assert player.run(f"return {hidden}.length") == 0
     player.page.keyboard.press("Escape")
     assert player.run("return [e.shadowRoot.querySelector('dialog').open]") == [False]
     assert "view=12,3,1.1,0,0,0" in frame
@@ -150,6 +154,41 @@ def test_the_code_to_embed_from_a_server_has_its_address_and_what_it_must_allow(
     assert 'src="https://faces.example/facefolds-player.js"' in element
     assert player.page.get_by_text("frame-ancestors").is_visible()
     assert not player.page.get_by_label("One file").is_visible()
+
+
+def test_rows_of_the_settings_go_under_their_title(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 390, "height": 700})
+    player.open("asset", "frame=0&background=%23ffffff")
+    player.button("Settings")
+    box = player.page.locator(".panel .head").bounding_box()
+    assert box
+    title = {"x": box["x"] + 2, "y": box["y"] + 8, "width": 240, "height": box["height"] - 10}
+    before = player.page.screenshot(clip=title)
+    player.run("e.shadowRoot.querySelector('.panel').scrollTop = 170")
+    assert player.page.screenshot(clip=title) == before
+
+
+def test_backgrounds_stand_in_one_row(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich})
+    player.open("asset")
+    for width in (390, 760):
+        player.page.set_viewport_size({"width": width, "height": 600})
+        if not player.page.locator(".panel").is_visible():
+            player.button("Settings")
+        boxes = [one.bounding_box() for one in player.page.locator(".swatches div > *").all()]
+        sizes = [(box["y"], box["width"], box["height"]) for box in boxes if box]
+        assert len(sizes) == 9 and len({y for y, _, _ in sizes}) == 1
+        assert min(min(size[1:]) for size in sizes) >= 24  # for fingers
+
+
+def test_words_and_figures_fit_a_small_player(new_player: NewPlayer, rich: Path) -> None:
+    player = new_player({"asset": rich}, viewport={"width": 360, "height": 240})
+    player.open("asset")
+    player.run("e.overlays.say('Cameras saw too little from further round'); e.overlays.showStatistics(true)")
+    toast, stats, bar = (player.page.locator(name).bounding_box() for name in (".toast", ".stats", ".bar"))
+    assert toast and stats and bar
+    assert toast["height"] < 50 and toast["x"] >= 0 and toast["x"] + toast["width"] <= 360
+    assert stats["y"] >= 0 and stats["y"] + stats["height"] <= bar["y"]
 
 
 def test_escape_closes_what_is_open(player: Player) -> None:

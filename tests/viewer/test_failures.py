@@ -86,6 +86,7 @@ def test_no_asset_at_the_address(new_player: NewPlayer, asset: Path) -> None:
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("nowhere", wait=False)
     assert "manifest.json is missing" in player.message()
+    assert not player.page.locator(".bar").is_visible()
 
 
 @pytest.mark.parametrize("version", [1, 2])

@@ -14,7 +14,9 @@ from playwright.sync_api import Browser
 
 from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.glb import container
+from facefolds_core.asset.gltf.extension import NAME
 from facefolds_core.asset.gltf.writing import write_layered
+from facefolds_core.cli.export import export
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.track import Track
 from facefolds_core.rendering.pixels import render
@@ -22,7 +24,7 @@ from tests.assets import SOURCE, make_asset
 from tests.geometry.test_track import SHIFTS, TURNS
 from tests.gltf_files import opened
 from tests.pictures import GREY_VALUE, expected_means, five_cameras, psnr
-from tests.viewer.fixtures import add_reflection
+from tests.viewer.fixtures import add_reflection, rich_asset
 from tests.viewer.gltf_viewers import GltfViewer, build, page_with, pictures
 
 SIZE, FRAME = 96, 2
@@ -80,13 +82,24 @@ def test_the_video_plays(browser: Browser, reader: Path, tmp_path: Path) -> None
         assert sorted(page.evaluate("play('head.glb')")) == [0, 1, 2]
 
 
-def test_a_video_that_cannot_be_decoded_leaves_the_still(browser: Browser, reader: Path, tmp_path: Path) -> None:
+def test_its_sound_is_heard_with_it(browser: Browser, reader: Path, tmp_path: Path) -> None:
+    export("gltf", rich_asset(tmp_path / "asset"), tmp_path / "face.glb", None)
+    with page_with(browser, reader, tmp_path / "face.glb") as page:
+        assert page.evaluate("sound('head.glb')") > 0
+
+
+@pytest.mark.parametrize(("sums", "words"), [(False, "no video can be decoded"), (True, "is damaged")])
+def test_a_damaged_video_leaves_the_still(
+    browser: Browser, reader: Path, tmp_path: Path, sums: bool, words: str
+) -> None:
     _, glb = exported(tmp_path)
     document, binary = opened(glb)
     view = document["bufferViews"][document["extensions"]["KHR_texture_video"]["videos"][0]["bufferView"]]
     start = view["byteOffset"]
+    if not sums:
+        del document["nodes"][0]["extensions"][NAME]["checksums"]
     glb.write_bytes(container(document, binary[:start] + bytes(view["byteLength"])))
     with page_with(browser, reader, glb) as page:
         found = page.evaluate("fallback('head.glb')")
     assert found["videos"] == 0 and found["meshes"] == 2
-    assert "no video can be decoded" in found["said"][0]
+    assert words in found["said"][0]

@@ -57,9 +57,9 @@ def test_what_was_measured_bounds_the_view(new_player: NewPlayer, rich_copy: Pat
     assert [view["azimuth"], view["elevation"]] == pytest.approx([-29, 12])
 
 
-def opaque_half_round(folder: Path) -> Path:
-    """One opaque layer that goes 126 degrees to each side, past the middle of a head."""
-    window = (-0.5, 0.5, -0.7, 0.7)
+def opaque_all_round(folder: Path) -> Path:
+    """One opaque layer that goes 171 degrees to each side."""
+    window = (-0.5, 0.5, -0.95, 0.95)
     texture = cap_texture(0, 0, 32)
     texture[..., 3] = 255
     store = write_store(folder.with_name("textures"), texture[None, None])
@@ -68,21 +68,33 @@ def opaque_half_round(folder: Path) -> Path:
     return folder
 
 
-def test_hems_fade_beyond_what_is_good_and_nothing_does_within(new_player: NewPlayer, tmp_path: Path) -> None:
-    """Beside pictures of the same view without any limit: the far side (right) dissolves, the near one stays."""
-    asset = opaque_half_round(tmp_path / "asset")
-    player = new_player({"asset": asset}, viewport={"width": 400, "height": 300})
+def dissolved(player: Player, azimuth: float, elevation: float) -> np.ndarray:
+    """(H, W) opacity that is missing from there, beside the same view without any limit."""
+    set_view = "const { view } = e.player; for (const orbit of [view.now, view.goal]) Object.assign(orbit, v)"
+    player.run(set_view, {"azimuth": azimuth, "elevation": elevation})
+    limited = player.capture()[..., 3]
+    player.run("e.player.view.setFilmed(null)")
+    whole = player.capture()[..., 3]
+    player.run("e.player.view.setFilmed(v)", {**FILMED, "good": FILMED})
+    return whole - limited
+
+
+@pytest.fixture
+def round_player(new_player: NewPlayer, tmp_path: Path) -> Player:
+    player = new_player({"asset": opaque_all_round(tmp_path / "asset")}, viewport={"width": 400, "height": 300})
     player.open("asset")
     player.run("e.background = 'transparent'")
-    gone = []
-    for azimuth in (-30, 40, 44.5):
-        player.run("const { view } = e.player; view.now.azimuth = view.goal.azimuth = v", azimuth)
-        limited = player.capture()[..., 3]
-        player.run("e.player.view.setFilmed(null)")
-        gone.append(player.capture()[..., 3] - limited)
-        player.run("e.player.view.setFilmed(v)", {**FILMED, "good": FILMED})
-    assert np.abs(gone[:2]).max() == 0
-    assert gone[2].min() == 0 and gone[2][:, 200:].max() > 0.5 and gone[2][:, :200].max() == 0
+    return player
+
+
+def test_hems_fade_beyond_what_is_good_and_nothing_does_within(round_player: Player) -> None:
+    """Too far round, the far side (right) dissolves and the near one stays; from above the back does, not the front."""
+    for azimuth, elevation in ((-30, 0), (40, 0), (0, 20), (0, -10)):
+        assert np.abs(dissolved(round_player, azimuth, elevation)).max() == 0, (azimuth, elevation)
+    beside = dissolved(round_player, 44.5, 0)
+    assert beside.min() == 0 and beside[:, 200:].max() > 0.5 and beside[:, :200].max() == 0
+    above = dissolved(round_player, 0, 60)
+    assert above.min() == 0 and above[:150].max() > 0.5 and above[150:].max() == 0
 
 
 def test_layers_that_are_pulled_apart_can_be_seen_from_the_side(player: Player) -> None:

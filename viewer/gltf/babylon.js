@@ -6,6 +6,8 @@
  *     const result = await ImportMeshAsync("face.glb", scene);
  *     const [face] = scene.metadata.volumetricVideos; // face.video is the HTMLVideoElement; face.seek(frame), face.dispose()
  *
+ * The video's sound, if it has one, is heard after `face.video.muted = false`, upon a click.
+ *
  * Layers are blended as the page is shown, in stored values. They have the alpha indices 1 to N: what is transparent
  * elsewhere in the scene is drawn after them. For WebGL.
  */
@@ -15,7 +17,7 @@ import { HtmlElementTexture } from "@babylonjs/core/Materials/Textures/htmlEleme
 import { ShaderMaterial } from "@babylonjs/core/Materials/shaderMaterial.js";
 import { Quaternion, Vector2, Vector3, Vector4 } from "@babylonjs/core/Maths/math.vector.js";
 import { registerGLTFExtension } from "@babylonjs/loaders/glTF/2.0/glTFLoaderExtensionRegistry.js";
-import { LAYER, NAME, depths, follow, openVideo, released, seek, slice } from "./video.js";
+import { LAYER, NAME, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
 
 const vertexSource = `
 precision highp float;
@@ -58,7 +60,7 @@ class LayeredVolumetricVideo {
     this.loader = null;
   }
 
-  /** In the place of a node's still; the still where no video can be decoded. */
+  /** In the place of a node's still; the still where something is damaged, or no video can be decoded. */
   loadNodeAsync(context, node, assign) {
     const said = node.extensions?.[NAME];
     if (!said || this.seen.has(node)) return null;
@@ -70,7 +72,9 @@ class LayeredVolumetricVideo {
   async load(context, node, said, assign) {
     const { loader } = this;
     const bytes = (index) => loader.loadBufferViewAsync(`/bufferViews/${index}`, loader.gltf.bufferViews[index]);
-    const video = await openVideo(loader.gltf, said, bytes).catch((error) => void console.warn(error.message));
+    const video = await check(said, bytes)
+      .then(() => openVideo(loader.gltf, said, bytes))
+      .catch((error) => void console.warn(error.message));
     if (!video) return loader.loadNodeAsync(context, node, assign);
     const still = node.mesh;
     node.mesh = said.mesh;

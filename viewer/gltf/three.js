@@ -7,12 +7,14 @@
  *     const { scene, userData } = await loader.loadAsync("face.glb");
  *     const [face] = userData.volumetricVideos; // face.video is the HTMLVideoElement; face.seek(frame), face.dispose()
  *
+ * The video's sound, if it has one, is heard after `face.video.muted = false`, upon a click.
+ *
  * Layers are blended as the page is shown, in stored values: draw to the canvas, not to a linear target. A pixel is the
  * mean that the extension asks for where `renderer.setPixelRatio` is twice the screen's.
  */
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
-import { LAYER, NAME, depths, follow, openVideo, released, seek, slice } from "./video.js";
+import { LAYER, NAME, check, depths, follow, openVideo, released, seek, slice } from "./video.js";
 
 const VERTEX = `
 invariant gl_Position;
@@ -43,7 +45,7 @@ export class LayeredVolumetricVideo {
     this.shown = [];
   }
 
-  /** In the place of a node's still; the still where no video can be decoded. */
+  /** In the place of a node's still; the still where something is damaged, or no video can be decoded. */
   createNodeMesh(index) {
     const said = this.parser.json.nodes[index].extensions?.[NAME];
     if (!said) return null;
@@ -55,11 +57,13 @@ export class LayeredVolumetricVideo {
 
   async load(index, said) {
     const { parser } = this;
+    const bytes = (view) => parser.getDependency("bufferView", view);
+    await check(said, bytes);
     const layers = await parser.getDependency("mesh", said.mesh);
     const geometries = (layers.isGroup ? layers.children : [layers]).map((one) => one.geometry);
     const maps = said.reflection && (await parser.getDependency("texture", said.reflection.texture));
     const track = said.animation === undefined ? {} : await trackOf(parser, parser.json.animations[said.animation]);
-    const video = await openVideo(parser.json, said, (view) => parser.getDependency("bufferView", view));
+    const video = await openVideo(parser.json, said, bytes);
     const mesh = new LayeredVideoMesh(said, geometries, video, maps, track);
     this.shown.push(mesh);
     return mesh;

@@ -4,11 +4,26 @@ export const NAME = "EXT_layered_volumetric_video";
 const TEXTURE_VIDEO = "KHR_texture_video";
 
 /**
+ * Holds what was loaded against the extension's checksums, where the page may (over HTTPS).
+ * @param {object} said the extension's object
+ * @param {(bufferView: number) => Promise<BufferSource>} load
+ * @throws {Error} if something is damaged
+ */
+export async function check(said, load) {
+  if (!globalThis.crypto?.subtle) return;
+  for (const { bufferView, sha256 } of said.checksums ?? []) {
+    const found = new Uint8Array(await crypto.subtle.digest("SHA-256", await load(bufferView)));
+    const digits = Array.from(found, (byte) => byte.toString(16).padStart(2, "0"));
+    if (digits.join("") !== sha256) throw new Error(`${NAME}: bufferViews[${bufferView}] is damaged`);
+  }
+}
+
+/**
  * The first of the extension's videos that this browser decodes, ready to be drawn.
  * @param {object} json of the glTF file
  * @param {object} said the extension's object
  * @param {(bufferView: number) => Promise<BufferSource>} load
- * @returns {Promise<HTMLVideoElement>} muted; `released` lets its memory go
+ * @returns {Promise<HTMLVideoElement>} muted, its sound with it; `released` lets its memory go
  * @throws {Error} if none can be decoded
  */
 export async function openVideo(json, said, load) {

@@ -54,6 +54,12 @@ function kept([low, high]) {
 
 export const clamp = (value, [low, high]) => Math.max(low, Math.min(high, value));
 
+/** From 0 to 1, gently at both ends. */
+function smooth(part) {
+  const t = clamp(part, [0, 1]);
+  return t * t * (3 - 2 * t);
+}
+
 /** Where a movement to `value` ends: the further beyond, the harder it gets. */
 export function resisted(value, range) {
   const inside = clamp(value, range);
@@ -67,28 +73,27 @@ export function strength({ azimuth, elevation }, range) {
     Math.abs(azimuth - clamp(azimuth, range.azimuth)),
     Math.abs(elevation - clamp(elevation, range.elevation)),
   );
-  const t = Math.min(1, beyond / SOFT);
-  return 1 - (1 - FAINTEST) * t * t * (3 - 2 * t);
+  return 1 - (1 - FAINTEST) * smooth(beyond / SOFT);
 }
 
 /**
- * What fades where the view is further round than it is good, or than any camera stood: there the back of the head comes into
- * sight, which the cameras saw aslant at best, and which ends in a hard edge.
- * @typedef {{side: number, from: number}} Hems to the subject's left (1) or right (-1); radians about the upright axis
- * @param {number} azimuth of the view @param {Filmed | null} filmed @param {Range} range its good part
+ * What fades where the view is further round, higher or lower than it is good, or than any camera stood: the back of the
+ * head, which the cameras saw aslant at best, and which ends in a torn edge.
+ * @typedef {[number, number]} Hems from how far round, to the subject's right and left: radians about the upright axis
+ * @param {{azimuth: number, elevation: number}} view @param {Filmed | null} filmed @param {Range} range its good part
  * @returns {Hems | null} null: nothing does
  */
-export function hemsFrom(azimuth, filmed, range) {
+export function hemsFrom(view, filmed, range) {
   if (!filmed || !Number.isFinite(range.azimuth[0])) return null;
-  const seen = unwound(azimuth, range.azimuth);
-  const [right, left] = [-1, 1].map((side, i) => {
-    const [filmedSo, goodSo] = [side * filmed.azimuth[i], side * range.azimuth[i]];
-    const t = clamp((side * seen - Math.min(filmedSo, goodSo)) / HEMS.over, [0, 1]);
-    const from = Math.min(180, Math.max(HEMS.back, filmedSo + HEMS.from));
-    return { side, t, from: ((180 + t * t * (3 - 2 * t) * (from - 180)) * Math.PI) / 180 };
+  const seen = { ...view, azimuth: unwound(view.azimuth, range.azimuth) };
+  const past = (angle, side, i) => side * seen[angle] - Math.min(side * filmed[angle][i], side * range[angle][i]);
+  const beyond = Math.max(...["azimuth", "elevation"].flatMap((angle) => [past(angle, -1, 0), past(angle, 1, 1)]));
+  if (beyond <= 0) return null;
+  const part = smooth(beyond / HEMS.over);
+  return [-1, 1].map((side, i) => {
+    const from = clamp(side * filmed.azimuth[i] + HEMS.from, [HEMS.back, 180]);
+    return ((180 + part * (from - 180)) * Math.PI) / 180;
   });
-  const { t, ...hems } = right.t > left.t ? right : left;
-  return t > 0 ? hems : null;
 }
 
 /** The same direction, as near to the middle of the range as whole turns allow. */

@@ -296,10 +296,8 @@ export class LayerRenderer {
     gl.bindTexture(gl.TEXTURE_2D, upload.picture);
     gl.uniform1i(at.picture, 0);
     gl.uniform1f(at.exposure, this.exposure);
-    const { side, from } = this.hems ?? { side: 1, from: Math.PI };
-    gl.uniform2f(at.axis, ...this.bounds().centre.slice(0, 2));
-    gl.uniform1f(at.side, side);
-    gl.uniform1f(at.hems, from);
+    gl.uniform3fv(at.centre, this.bounds().centre);
+    gl.uniform2fv(at.hems, this.hems ?? [Math.PI, Math.PI]);
     gl.uniform1i(at.kind, KINDS.indexOf(this.kind));
     gl.uniform2f(at.range, ...(this.range ?? this.#wholeRange(eye)));
     if (upload.reflection) {

@@ -34,9 +34,8 @@ uniform vec2 alphaOffset; // from its colour to its alpha
 uniform vec3 eye; // where the picture is seen from, shift of the layer taken off
 uniform int kind; // of KINDS
 uniform float exposure; // factor of the light
-uniform vec2 axis; // x, y of the upright line about which hems are told by their direction
-uniform float hems; // from how far round layers fade, radians
-uniform float side; // on the subject's left (1) or right (-1)
+uniform vec3 centre; // from which hems are told by their direction
+uniform vec2 hems; // from how far round layers fade, to the subject's right and left, radians
 uniform vec2 range; // distances from the eye that are shown bright and dark, for depth
 #ifdef REFLECTION
 uniform sampler2D reflection;
@@ -87,9 +86,11 @@ void main() {
   colour = clamp(colour + reflected(), 0.0, 1.0);
 #endif
   if (exposure != 1.0) colour = exposed(colour);
-  if (hems < 3.14) {
-    vec2 off = point.xy - axis;
-    alpha *= smoothstep(hems + 0.5, hems, side * atan(off.y, off.x));
+  if (hems.x < 3.14) {
+    vec3 off = point - centre;
+    float from = off.y < 0.0 ? hems.x : hems.y;
+    float behind = atan(length(vec2(off.y, max(off.z, 0.0))), off.x); // the crown is not behind
+    alpha *= 1.0 - smoothstep(from, from + 0.5, behind);
   }
   if (kind == 1) colour = vec3(1.0);
   if (kind == 2) colour = vec3(1.0 - clamp((distance(eye, point) - range.x) / (range.y - range.x), 0.0, 1.0));

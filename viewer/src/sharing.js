@@ -15,7 +15,7 @@ const isOwn = (address) => /^(localhost|127\..*|\[::1\])$/.test(new URL(address)
 /**
  * HTML for a page of somebody else's. An address of this machine would be of no use there: then for the player and the
  * asset uploaded beside the page, and for one file.
- * @returns {{file: string, frame: string, element: string, own: boolean}} `own`: nobody else can reach what plays here
+ * @returns {{command: string, page: string, frame: string, element: string, own: boolean}} `own`: nobody else can reach what plays here
  */
 export function embedCode(element) {
   const quoted = (text) => text.replace(/&/g, "&amp;").replace(/"/g, "&quot;");
@@ -28,7 +28,8 @@ export function embedCode(element) {
   const frame = (address) =>
     `<iframe src="${quoted(address)}" title="${name}" width="640" height="480" style="border: 0" loading="lazy" allow="fullscreen; clipboard-write"></iframe>`;
   return {
-    file: `facefolds export-html data/${name}/asset --out ${name}.html\n${frame(`${name}.html`)}`,
+    command: `facefolds export-html data/${name}/asset --out ${name}.html`,
+    page: frame(`${name}.html`),
     frame: frame(link),
     element: `<script type="module" src="${quoted(script)}"></script>\n<facefolds-player src="${quoted(source)}" loading="lazy" style="height: 480px"></facefolds-player>`,
     own,

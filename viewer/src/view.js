@@ -117,6 +117,10 @@ export class View {
     return toAndFro(this.swaying, this.rotates ? ROTATION : SWAY, room);
   }
 
+  #swayed() {
+    return { ...this.now, azimuth: this.now.azimuth + this.#sway() };
+  }
+
   /** @param {import("./attributes.js").Asked} first @param {number} field of view, degrees */
   setFirst(first, field) {
     [this.first, this.half] = [first, halfOf(field)];
@@ -305,12 +309,12 @@ export class View {
 
   /** How strong the picture is: less where nothing was filmed. */
   get strength() {
-    return this.exact ? 1 : strength({ ...this.now, azimuth: this.now.azimuth + this.#sway() }, this.range);
+    return this.exact ? 1 : strength(this.#swayed(), this.range);
   }
 
   /** What fades of what lies far round; nothing from an exact camera. */
   get hems() {
-    return this.exact || this.free ? null : hemsFrom(this.now.azimuth + this.#sway(), this.filmed, this.range);
+    return this.exact || this.free ? null : hemsFrom(this.#swayed(), this.filmed, this.range);
   }
 
   /**
@@ -318,8 +322,7 @@ export class View {
    * @param {typeof this.exact} [camera] instead of the view's own
    */
   matrices(width, height, bounds, camera = this.exact) {
-    const orbit = { ...this.now, azimuth: this.now.azimuth + this.#sway() };
-    const view = camera ? viewOf(camera.w2c) : orbitView(orbit);
+    const view = camera ? viewOf(camera.w2c) : orbitView(this.#swayed());
     const depth = -transformed(view, bounds.centre)[2];
     const far = Math.max(0.1, depth + 1.05 * bounds.radius);
     const near = Math.max(0.005, far / 500, depth - 1.05 * bounds.radius);

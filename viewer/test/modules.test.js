@@ -5,7 +5,7 @@ import { fitted, orbitView, positionOf, projectionOf, viewOf } from "../src/came
 import { eyeOf, transformed } from "../src/matrices.js";
 import { fieldOfView, orbitOf } from "../src/attributes.js";
 import { Adaptation } from "../src/adapt.js";
-import { bounded, resisted, strength, unwound } from "../src/limits.js";
+import { bounded, hemsFrom, resisted, strength, unwound } from "../src/limits.js";
 import { parseManifest } from "../src/manifest.js";
 import { Pace } from "../src/pace.js";
 import { Playback } from "../src/playback.js";
@@ -317,6 +317,18 @@ const played = (adaptation, total, seconds, work, budget = 1 / 30) => {
   }
   return said;
 };
+
+test("hems fade on both sides, beyond what is good in any direction", () => {
+  const filmed = { azimuth: [-30, 120], elevation: [-10, 20] };
+  const good = { azimuth: [-30, 110], elevation: [-8, 24] };
+  const at = (azimuth, elevation) =>
+    hemsFrom({ azimuth, elevation }, filmed, good)?.map((angle) => Math.round((angle * 180) / Math.PI)) ?? null;
+  for (const [azimuth, elevation] of [[0, 0], [110, 20], [-30, -8]]) assert.equal(at(azimuth, elevation), null); // prettier-ignore
+  for (const [azimuth, elevation] of [[-34, 0], [114, 0], [0, 24], [0, -12]])
+    assert.deepEqual(at(azimuth, elevation), [100, 146]); // prettier-ignore
+  assert.deepEqual(at(0, 22), [140, 163]);
+  assert.equal(hemsFrom({ azimuth: 170, elevation: 80 }, filmed, bounded(null)), null);
+});
 
 test("a level that is too much is left, and tried again after a longer wait", () => {
   const adaptation = new Adaptation();

@@ -8,12 +8,14 @@ from __future__ import annotations
 import io
 import tempfile
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field, ValidationError
 
+from facefolds_core.asset.audio import sound_problem
 from facefolds_core.asset.checks import FARTHEST, FPS_RANGE, MOST_FRAMES
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.gltf.document import Glb, GlbError, Loose, Primitive, in_words, validated
@@ -89,12 +91,26 @@ def _node_problems(glb: Glb, index: int) -> list[str]:
         problems.append(f"/nodes/{index}: no mesh for viewers without the extension, which is not required")
     if len({round(abs(part), 6) for part in node.scale}) != 1:
         problems.append(f"/nodes/{index}/scale: uneven")
-    for check in (_layout_problems, _layer_problems, _motion_problems, _reflection_problems, _video_problems):
+    for check in (
+        _checksum_problems,
+        _layout_problems,
+        _layer_problems,
+        _motion_problems,
+        _reflection_problems,
+        _video_problems,
+    ):
         try:
             problems += check(glb, said, place, index)
         except GlbError as problem:
             problems.append(str(problem))
     return problems
+
+
+def _checksum_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterator[str]:
+    """Bytes that are not those that were written."""
+    for number, one in enumerate(said.checksums or ()):
+        if sha256(glb.view(one.buffer_view, f"{place}/checksums/{number}/bufferView")).hexdigest() != one.sha256:
+            yield f"/bufferViews/{one.buffer_view}: damaged: another SHA-256 than {place}/checksums/{number} says"
 
 
 def _layout_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterator[str]:
@@ -264,12 +280,12 @@ def _video_problems(glb: Glb, said: LayeredVideo, place: str, _: int) -> Iterato
             yield f"{at}/mimeType: neither video/mp4 nor video/webm"
         data = glb.view(videos[source].buffer_view, f"{at}/bufferView")
         if said.frames <= min(MOST_FRAMES, len(data)):
-            yield from (f"{at}: {problem}" for problem in _picture_problems(data, said))
+            yield from (f"{at}: {problem}" for problem in _picture_problems(data, videos[source].mime_type, said))
         else:
             yield f"{at}: {said.frames} frames in {len(data)} bytes"
 
 
-def _picture_problems(data: bytes, said: LayeredVideo) -> Iterator[str]:
+def _picture_problems(data: bytes, mime: str, said: LayeredVideo) -> Iterator[str]:
     count, size = 0, (said.width, said.height)
     try:
         with tempfile.NamedTemporaryFile() as file:
@@ -278,6 +294,8 @@ def _picture_problems(data: bytes, said: LayeredVideo) -> Iterator[str]:
             facts = probe_video(Path(file.name), io.BytesIO(data), said.rate, said.frames)
             if facts.pixel_format != "yuv420p" or facts.tags != BT709_LIMITED:
                 yield f"{facts.pixel_format}, matrix and range {facts.tags}: 4:2:0, BT.709, limited range are needed"
+            if "mp4a" in mime and (problem := sound_problem(Path(file.name), said.frames / float(said.rate))):
+                yield f"sound: {problem}"
             for _ in decode_video(Path(file.name), size, float(said.rate), part=io.BytesIO(data)):
                 count += 1
     except UserError as error:

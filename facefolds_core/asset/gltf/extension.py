@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
-from facefolds_core.asset.manifest_base import Count, Maybe, Part, RateTerm, Rect, Row, Scale, without_absent
+from facefolds_core.asset.manifest_base import Count, Maybe, Part, RateTerm, Rect, Row, Scale, Sha256, without_absent
 from facefolds_core.files.writing import write_text
 
 NAME = "EXT_layered_volumetric_video"
@@ -61,6 +61,18 @@ class Reflection(GltfPart):
         return {to_camel(name): getattr(self, name) for name in names}
 
 
+class Checksum(GltfPart):
+    """What a part of the file must be.
+
+    Attributes:
+        buffer_view: index of the buffer view.
+        sha256: of its bytes, in hexadecimal.
+    """
+
+    buffer_view: Index
+    sha256: Sha256
+
+
 class LayeredVideo(GltfPart):
     """Nested, semi-transparent meshes and a video with the color and opacity of each.
 
@@ -77,6 +89,7 @@ class LayeredVideo(GltfPart):
         still_frame: the frame that the node's own mesh shows.
         animation: index of the animation that moves the node with the video.
         reflection: gloss.
+        checksums: of buffer views of this file.
     """
 
     mesh: Index
@@ -91,6 +104,7 @@ class LayeredVideo(GltfPart):
     still_frame: Annotated[int, Field(ge=0)] = 0
     animation: Maybe[Index] = None
     reflection: Maybe[Reflection] = None
+    checksums: Maybe[Annotated[tuple[Checksum, ...], Field(min_length=1)]] = None
 
     @property
     def rate(self) -> Fraction:

@@ -8,6 +8,7 @@ decode, are the asset's own Draco meshes: bytes compared in docs/research/engine
 from __future__ import annotations
 
 from collections.abc import Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +33,11 @@ from facefolds_core.asset.glb import (
     pose_of,
     triangles_of,
 )
-from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, LayeredVideo, Reflection
+from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection
+from facefolds_core.asset.gltf.sound import mime_with_sound, with_sound
 from facefolds_core.asset.manifest import REMEDY, Video
 from facefolds_core.asset.manifest_base import StoredFile
+from facefolds_core.asset.manifest_extras import Audio
 from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.asset.stored import read_slice
@@ -50,13 +53,21 @@ STILL_IMAGE, VIDEO, MAPS = 0, 1, 2
 """Indices of the textures."""
 
 
-def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0, fallback: AssetLevel | None = None) -> int:
+def write_layered(
+    path: Path,
+    level: AssetLevel,
+    name: str,
+    still: int = 0,
+    fallback: AssetLevel | None = None,
+    sound: Audio | None = None,
+) -> int:
     """Write a level; returns the bytes of the file.
 
     Args:
         name: of the root node.
         still: the frame that viewers without the extension show.
         fallback: the level of the same asset that they show; by default that of the layers.
+        sound: of the asset.
 
     Raises:
         IndexError: if there is no such frame.
@@ -80,9 +91,9 @@ def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0, fall
     if level.track is not None:
         node |= pose_of(level.track, still)
         animations.append(_animation(builder, level.track, level.entry.texture.fps))
-    node["extensions"] = {NAME: _said(level, still).model_dump(mode="json", exclude_none=True)}
-    video = _chosen(level.entry.texture.videos)
-    videos = [{"bufferView": builder.view(_stored(level, video)), "mimeType": video.mime}]
+    videos = [_video(builder, level, sound)]
+    said = _said(level, still).model_copy(update={"checksums": _checksums(builder)})
+    node["extensions"] = {NAME: said.model_dump(mode="json", exclude_none=True)}
     document = {
         "asset": {"version": "2.0", "generator": "facefolds"},
         "extensionsUsed": [UNLIT, DRACO, TEXTURE_VIDEO, NAME],
@@ -104,6 +115,24 @@ def write_layered(path: Path, level: AssetLevel, name: str, still: int = 0, fall
     with atomic_file(path) as temporary:
         temporary.write_bytes(data)
     return len(data)
+
+
+def _checksums(builder: Builder) -> tuple[Checksum, ...]:
+    """Of all that was stored so far."""
+    parts = [builder.binary[view["byteOffset"] :][: view["byteLength"]] for view in builder.views]
+    return tuple(Checksum(buffer_view=i, sha256=sha256(part).hexdigest()) for i, part in enumerate(parts))
+
+
+def _video(builder: Builder, level: AssetLevel, sound: Audio | None) -> dict[str, Any]:
+    """The entry of the video, with the sound in it."""
+    video, texture = _chosen(level.entry.texture.videos), level.entry.texture
+    data = _stored(level, video)
+    if sound is None:
+        return {"bufferView": builder.view(data), "mimeType": video.mime}
+    _stored(level, sound)
+    files = level.folder / video.file, level.folder / sound.file
+    data = with_sound(*files, sound.mime, texture.frames / texture.fps)
+    return {"bufferView": builder.view(data), "mimeType": mime_with_sound(video.mime)}
 
 
 def _said(level: AssetLevel, still: int) -> LayeredVideo:

@@ -1,4 +1,7 @@
-"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity, clean plates."""
+"""Write the actor as a capture in the Multiface layout, with what Multiface lacks: true opacity, clean plates.
+
+Where espeak-ng is installed she has a voice, as Multiface's people do: `audio/PERFORMANCE.wav`.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
 from facefolds_core.captures.actor.motion import head_pose
 from facefolds_core.captures.actor.render import ActorOptions, Picture, render
 from facefolds_core.captures.actor.rig import ActorRig, make_rig
+from facefolds_core.captures.actor.voice import speak
 from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import CaptureParams
@@ -104,6 +108,7 @@ def write_capture(
             for camera in rig.cameras:
                 plate = render(camera, 0.0, replace(options, away=1.0))
                 _write_png(temporary / "plates" / f"{camera.name}.png", plate.rgb[..., ::-1])
+        speak(temporary / "audio" / f"{SEGMENT}.wav", params.seconds)
         for name, time in frames:
             rotation, translation = head_pose(time, options.head_motion)
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)

@@ -39,6 +39,9 @@ _SOUNDS = (
     (3.54, 0.14, 0.00, 0.35, 0.9),  # ne
 )
 
+PHRASES = (("Hello there.", 0.08, 0.95), ("How do you do?", 1.62, 2.75), ("I'm fine.", 2.96, 3.66))
+"""The words, and the seconds from and to which the mouth says them."""
+
 
 def mouth_at(time: float, period: float) -> tuple[float, float, float]:
     """How far the mouth is opened, rounded and stretched, each in [0, 1], at a time in seconds (periodic)."""

@@ -51,6 +51,20 @@ window.play = async (file) => {
   return [...seen];
 };
 
+/** Bytes of sound that were decoded once it plays. */
+window.sound = async (file) => {
+  const { userData } = await opened(file);
+  const [face] = userData.volumetricVideos;
+  face.video.muted = false;
+  await face.video.play();
+  const end = performance.now() + 20000;
+  while (!face.video.webkitAudioDecodedByteCount && performance.now() < end)
+    await new Promise((done) => requestAnimationFrame(done));
+  const found = face.video.webkitAudioDecodedByteCount;
+  face.dispose();
+  return found;
+};
+
 /** What is said of a GLB whose video cannot be decoded, and how many meshes show it. */
 window.fallback = async (file) => {
   const said = [];

@@ -57,7 +57,7 @@ export const PICTURE =
 
 /** A text to copy. */
 const field = ([name, label]) =>
-  `<div class="${name}"><label>${label}<textarea name="${name}" rows="4" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button></div>`;
+  `<div class="${name}"><label>${label}<textarea name="${name}" rows="3" readonly spellcheck="false"></textarea></label><button type="button" data-copy="${name}">Copy</button></div>`;
 
 export const TEMPLATE = `<div class="stage">
   <canvas tabindex="0" role="img" part="canvas"></canvas>
@@ -108,7 +108,8 @@ export const TEMPLATE = `<div class="stage">
     <div class="row head"><b>Put it on a page of yours</b>${button("", "Close").replace("<button", "<button data-close").replace("></button>", `>${ICONS.close}</button>`)}</div>
     <p class="if-own">Only this machine can reach the address of this page, and its server lets no other page show it. Upload one of these to a server of yours.</p>
     <p class="unless-own">A page of another site can show it where this server lets it: no <code>X-Frame-Options</code> or <code>frame-ancestors</code> against the frame; <code>Access-Control-Allow-Origin</code> for the element, on the player's files and the asset's.</p>
-    ${field(["file", "One file that plays by itself: this command makes it"])}
+    ${field(["command", "One file that plays by itself: this command makes it"])}
+    ${field(["page", "and this code plays it"])}
     <p class="if-own">Or the folders: what <code>viewer/dist</code> holds as <code>player/</code>, and the asset's folder as <code>player/asset/</code>, beside the page.</p>
     ${[["frame", "As a frame, with this view"], ["element", "As an element"]]
       .map(field)

@@ -1,0 +1,146 @@
+"""At equal bytes: ours, one mesh with a video, and splats: `python -m bench.equal_bytes data/actor .equal_bytes`.
+
+The mesh is what the pipeline makes with one layer. Splats are fitted to the same cut-outs, as many as our full level's
+bytes hold: all for one still, or shared out among the frames, each fitted by itself. Held-out cameras, true opacity.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from PIL import Image
+
+from bench.results import ROOT
+from bench.run import Project, own_params
+from bench.tables import markdown
+from facefolds_core.asset import Asset, read_asset
+from facefolds_core.captures.cutout import cut_from
+from facefolds_core.captures.found_scene import found_scene
+from facefolds_core.captures.scene import Scene
+from facefolds_core.files.paths import SubjectFolders
+from facefolds_core.geometry.cameras import Camera
+from facefolds_core.rendering.pixels import render
+from facefolds_core.scoring.backgrounds import Cutout, squared_error, worst_patch
+from facefolds_core.scoring.metrics import decibels
+from facefolds_core.spacing import spread
+from facefolds_core.subject import drawing
+from facefolds_core.subject.fit import fit_pictures
+from facefolds_core.subject.gaussians import GaussianParams
+from facefolds_core.subject.splats import Splats
+
+SPLAT_BYTES = 20
+"""Of SPZ with view dependence of the first degree: 28, of which gzip leaves 20.5. Scored are unrounded ones."""
+FRAMES, SHOWN = 3, 3
+"""That are looked at, evenly spread; how many times as large pictures are drawn."""
+STAGES = ("configure", "train", "sample", "reconstruct", "decimate", "texture", "bake", "compress")
+Array = NDArray[np.float64]
+Look = Callable[[Camera, int], tuple[Array, Array]]
+"""(camera, frame) -> colours over black (H, W, 3) and opacity (H, W)."""
+
+
+def one_layer(folders: SubjectFolders, out: Path) -> Asset:
+    """The asset with one layer, of the same scene and subject; made once."""
+    project = Project(out, "actor")
+    if not (project.folders.asset / "manifest.json").exists():
+        project.write(own_params("actor", {"train": {"layers": 1}}))
+        for name in ("capture", "scene", "subject"):
+            shutil.copytree(getattr(folders, name), getattr(project.folders, name), dirs_exist_ok=True)
+        project.run(*STAGES)
+    return read_asset(project.folders.asset)
+
+
+def splats_of(scene: Scene, frame: int, count: int) -> Splats:
+    """So many, of one frame's training pictures, cut out."""
+    frames, mattes, plates = scene.open_frames(), scene.open_mattes(), scene.open_plates()
+    assert mattes is not None and plates is not None
+    cameras, pictures, opacities = [], [], []
+    for index in scene.indices("train"):
+        opacity = mattes.image(index, frame)[..., 0].astype(np.float32) / 255
+        photo, plate = (
+            store.image(*key) / np.float32(255) for store, key in ((frames, (index, frame)), (plates, (index, 0)))
+        )
+        cameras.append(scene.camera_in_head(index, frame))
+        pictures.append(np.asarray(cut_from(photo, opacity, plate), np.float32))
+        opacities.append(np.asarray(opacity, np.float32))
+    return fit_pictures(cameras, pictures, replace(GaussianParams(), fewest=count, most=count), 0, opacities)
+
+
+def look_at_splats(scene: Scene, frames: list[int], count: int) -> Look:
+    fitted = {frame: splats_of(scene, frame, count) for frame in frames}
+    return lambda camera, frame: _exact(*drawing.render(fitted[frame], camera)[:2])
+
+
+def _exact(rgb: NDArray[np.float32], alpha: NDArray[np.float32]) -> tuple[Array, Array]:
+    return rgb.astype(np.float64), np.clip(alpha.astype(np.float64), 0, 1)
+
+
+def truths(scene: Scene, frames: list[int]) -> dict[tuple[int, int], Cutout]:
+    """Of the held-out cameras."""
+    photos, masks, plates = scene.open_frames(), scene.open_masks(), scene.open_plates()
+    assert masks is not None and plates is not None
+    keys = [(index, frame) for index in scene.indices("holdout") for frame in frames]
+    return {
+        key: Cutout.of(photos.image(*key) / 255, masks.image(*key)[..., 0] / 255, plates.image(key[0], 0) / 255)
+        for key in keys
+    }
+
+
+def scores(look: Look, scene: Scene, truth: dict[tuple[int, int], Cutout]) -> list[str]:
+    """PSNR over any background and of the worst patch, dB."""
+    errors, patches = [], []
+    for (index, frame), one in truth.items():
+        error = squared_error(*look(scene.camera_in_head(index, frame), frame), one)
+        patch = worst_patch(error, one.opacity)
+        errors.append(decibels(float(error.mean())))
+        patches += [] if patch is None else [patch.psnr]
+    return [f"{np.mean(errors):.1f}", f"{min(patches):.1f}"]
+
+
+def picture(looks: list[Look], scene: Scene, key: tuple[int, int], truth: Cutout) -> Image.Image:
+    """The truth, then each of them, over grey."""
+    shots = [truth.over(0.5)]
+    for look in looks:
+        rgb, alpha = look(scene.camera_in_head(*key), key[1])
+        shots.append(np.clip(rgb + (1 - alpha)[..., None] * 0.5, 0, 1))
+    image = Image.fromarray(np.rint(255 * np.concatenate(shots, 1)).astype(np.uint8))
+    return image.resize((SHOWN * image.width, SHOWN * image.height), Image.Resampling.LANCZOS)
+
+
+def main(
+    subject: Annotated[Path, typer.Argument(help="Folder of the subject, e.g. data/actor: all stages have run.")],
+    out: Annotated[Path, typer.Argument(help="Folder for the mesh's run.")],
+) -> None:
+    """Print the table, and draw docs/images/equal_bytes.jpg."""
+    folders = SubjectFolders(subject)
+    scene, ours, mesh = found_scene(folders), read_asset(folders.asset), one_layer(folders, out)
+    frames, size = spread(range(scene.num_frames), FRAMES), ours.full.entry.bytes
+    still, each = size // SPLAT_BYTES, size // SPLAT_BYTES // scene.num_frames
+    rows: dict[str, tuple[int, Look, list[int]]] = {
+        f"ours, {ours.num_layers} layers": (size, lambda *view: _exact(*render(ours, *view)), frames),
+        "one mesh with a video": (mesh.full.entry.bytes, lambda *view: _exact(*render(mesh, *view)), frames),
+        f"{still:,} splats, a still": (still * SPLAT_BYTES, look_at_splats(scene, frames[:1], still), frames[:1]),
+        f"{each:,} splats a frame": (
+            scene.num_frames * each * SPLAT_BYTES,
+            look_at_splats(scene, frames, each),
+            frames,
+        ),
+    }
+    table = [
+        [name, f"{count / 1000:.0f} KB", *scores(look, scene, truths(scene, seen))]
+        for name, (count, look, seen) in rows.items()
+    ]
+    typer.echo(markdown(["", "bytes", "PSNR over any background, dB", "worst patch, dB"], table))
+    key, truth = list(truths(scene, frames[:1]).items())[-1]
+    looks = [look for _, look, _ in rows.values()]
+    picture(looks, scene, key, truth).save(ROOT / "docs" / "images" / "equal_bytes.jpg", quality=85, optimize=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)
