@@ -191,8 +191,8 @@ def films(subject: Subject) -> dict[str, Any]:
         room -= size
         labels = [words.frame_label(scene.frame_ids if scene else (), name) for name in film.frames]
         kept.append({**asdict(film), "labels": labels, "src": pictures.stored(path)})
-    size = (2 * scene.width, scene.height) if scene else (2, 1)
-    return {"films": kept, "films_left": left, "film_size": size}
+    both = (2 * scene.width, scene.height) if scene else (2, 1)
+    return {"films": kept, "films_left": left, "film_size": both}
 
 
 def textures(subject: Subject) -> dict[str, Any]:
