@@ -27,6 +27,7 @@ def fitted() -> Fit:
         (-0.5, 0.5, -0.5, 0.5),
         ones,
         ones,
+        np.zeros((4, 4)),
         ones,
         ones,
         np.ones((4, 4, 3)),

@@ -35,7 +35,7 @@ def recentred(count: int) -> Tensor:
         middle=middle,
         manifolds=lambda: SimpleNamespace(radii=lambda: radii),
         params=ExplicitParams(),
-        fit=SimpleNamespace(middle=0.3 * whole, halfwidth=0.05 * whole, trust=0 * whole),
+        fit=SimpleNamespace(middle=0.3 * whole, halfwidth=0.05 * whole, reach=0 * whole, trust=0 * whole),
     )
     Trainer._recentre(cast(Trainer, trainer))
     return cast(Tensor, trainer.middle)

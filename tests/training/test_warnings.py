@@ -22,6 +22,7 @@ WELL = Fit(
     window=(-0.5, 0.5, -0.5, 0.5),
     middle=np.zeros((2, 2)),
     halfwidth=np.zeros((2, 2)),
+    reach=np.zeros((2, 2)),
     trust=np.zeros((2, 2)),
     opacity=np.zeros((2, 2)),
     rgb=np.zeros((2, 2, 3)),
