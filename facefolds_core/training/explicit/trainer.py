@@ -73,7 +73,8 @@ class Trainer:
         self.usual = np.zeros((0, 3), np.float32)
 
     def manifolds(self) -> RadialManifolds:
-        halfwidth = torch.from_numpy(self.geometry * self.fit.halfwidth + self.fit.reach).float()
+        halfwidth, reach = (torch.from_numpy(part).float() for part in (self.fit.halfwidth, self.fit.reach))
+        halfwidth = self.geometry * halfwidth + reach
         return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
