@@ -18,7 +18,7 @@ from pathlib import Path
 from aiohttp import web
 
 from facefolds_core.errors import UserError
-from facefolds_core.serving.files import answer, asset_file, player_file
+from facefolds_core.serving.files import asset_file, player_file, send
 
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost", "[::1]")
@@ -55,7 +55,8 @@ def player_app(player: Path, assets: Mapping[str, Path]) -> web.Application:
             file = await asyncio.to_thread(player_file, player, rest)
         if file is None:
             raise web.HTTPNotFound
-        return answer(file, rest)
+        with file:
+            return await send(request, file, rest)
 
     async def describe(_: web.Request, response: web.StreamResponse) -> None:
         response.headers.update(HEADERS)
