@@ -62,6 +62,12 @@ def test_all_panels_are_there_and_fit(open_report: Open, viewport: dict[str, int
     assert page.evaluate(outside) == 0
 
 
+def test_the_worst_place_fills_its_column(open_report: Open) -> None:
+    page = open_report()
+    width = "document.querySelector('.worst{}').getBoundingClientRect().width"
+    assert page.evaluate(width.format(" img")) == page.evaluate(width.format("")) > 200
+
+
 def test_it_follows_light_and_dark(open_report: Open) -> None:
     colours = []
     for scheme in ("light", "dark"):
