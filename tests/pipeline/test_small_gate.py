@@ -50,7 +50,7 @@ TRAIN: dict[str, Any] = {
 }
 EXPORT: dict[str, Any] = {
     "sample": {"resolution": 96},
-    "decimate": {"resolution": 24},
+    "decimate": {"resolution": 32},
     "texture": {"resolution": 96},
     "compress": PLAIN.model_dump(mode="json"),
 }
