@@ -210,7 +210,10 @@ def moves(radius: Array, others: Sequence[Array], halfwidth: Array) -> tuple[Arr
     Args:
         radius: (rows, columns) of the surface in the frame of the start; NaN where there is none.
         others: the same of other frames.
-        halfwidth: of the layers there.
+        halfwidth: (rows, columns) of the layers there, units.
+
+    Returns:
+        (rows, columns) each, smooth; 0 where no other frame goes beyond a halfwidth, or no surface is known.
     """
     found = []
     for sign in (1.0, -1.0):
