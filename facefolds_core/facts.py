@@ -53,6 +53,8 @@ WORDS = {
     "middle_from_mesh": "middle radius: the tracked mesh, mean over frames, but where the subject lies over {reach} "
     "outside it",
     "halfwidth_chosen": "halfwidth: {least}, more where the subject is blurred or far from the middle, at most {most}",
+    "second_surface": "second surface: {layers} layers beneath the first in {share:.1%} of the directions, where "
+    "cameras see something under an overhang",
     "texels_chosen": "texels: {pixels:g} pixels each, seen head on from the median training camera",
     "resolution_chosen": "{what}: auto took {chosen} of {tried}: {below:.2f} dB below the best of them on {views} "
     "views of cameras of the split {split}, {to_finest:.1f} dB to the finest one's pictures",

@@ -38,19 +38,30 @@ class RadialManifolds(nn.Module):
         window: (u0, u1, v0, v1).
         middle: [rows, columns] radii, units.
         halfwidth: [rows, columns], positive, units.
-        num_layers: N.
+        num_layers: of these.
+        second: [rows, columns, M] radii of layers beneath them, outermost first, 0 where they have no surface.
     """
 
     centre: Tensor
+    second: Tensor | None
 
-    def __init__(self, chart: Chart, window: Window, middle: Tensor, halfwidth: Tensor, num_layers: int) -> None:
+    def __init__(
+        self,
+        chart: Chart,
+        window: Window,
+        middle: Tensor,
+        halfwidth: Tensor,
+        num_layers: int,
+        second: Tensor | None = None,
+    ) -> None:
         super().__init__()
         self.chart = chart
         self.register_buffer("centre", torch.tensor(chart.centre, dtype=torch.float32))
         self.window = window
-        self.num_layers = num_layers
+        self.num_layers = num_layers + (0 if second is None else second.shape[-1])
         self.middle = nn.Parameter(middle.clone())
         self.halfwidth = nn.Parameter(halfwidth.clone())
+        self.register_buffer("second", None if second is None else second.clone())
 
     @property
     def radius(self) -> float:
@@ -65,10 +76,13 @@ class RadialManifolds(nn.Module):
         return float((points - self.centre).norm(dim=-1).max()) + MARGIN
 
     def radii(self) -> Tensor:
-        """[rows, columns, N], outermost first."""
-        n = self.num_layers
+        """[rows, columns, N], outermost first; NaN where a layer of the second surface has none."""
+        n = self.num_layers if self.second is None else self.num_layers - self.second.shape[-1]
         offsets = torch.linspace(1, -1, n) if n > 1 else torch.zeros(1)
-        return self.middle[..., None] + self.halfwidth[..., None] * offsets.to(self.middle)
+        first = self.middle[..., None] + self.halfwidth[..., None] * offsets.to(self.middle)
+        if self.second is None:
+            return first
+        return torch.cat([first, torch.where(self.second > 0, self.second, torch.nan)], -1)
 
     def regularisation(self) -> Tensor:
         return self.middle.new_zeros(())
@@ -106,7 +120,8 @@ class RadialManifolds(nn.Module):
         rows, columns = self.middle.shape
         at = torch.stack([x / (columns - 1), y / (rows - 1)], -1) * 2 - 1
         rho = torch.nn.functional.grid_sample(n, at[None, None].to(n), padding_mode="border", align_corners=True)
-        return rho[0, :, 0].T, inside[:, None].expand(-1, self.num_layers)
+        rho = rho[0, :, 0].T
+        return rho.nan_to_num(), inside[:, None] & rho.isfinite()
 
     def _position(self, uv: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Rows and columns (continuous) of directions (u, v) [..., 2], and whether they lie inside the window."""
@@ -147,7 +162,8 @@ class RadialManifolds(nn.Module):
         s = near[:, None] + (far - near)[:, None] * fraction
         height, inside = self._heights(rho, origins[:, None] + s[..., None] * directions[:, None], all_layers=True)
         above = height >= 0
-        both = (inside[:, 1:] & inside[:, :-1] & valid[:, None])[..., None]
+        there = height.isfinite()
+        both = (inside[:, 1:] & inside[:, :-1] & valid[:, None])[..., None] & there[:, 1:] & there[:, :-1]
         hit, first = ((above[:, 1:] != above[:, :-1]) & both).max(1)
         a, b = s.gather(1, first), s.gather(1, first + 1)
         start = above.gather(1, first[:, None]).squeeze(1)
@@ -156,7 +172,10 @@ class RadialManifolds(nn.Module):
             height, _ = self._heights(rho, origins[:, None] + m[..., None] * directions[:, None])
             same = (height >= 0) == start
             a, b = torch.where(same, m, a), torch.where(same, b, m)
-        return torch.where(hit, 0.5 * (a + b), 0.0), hit
+        middle = 0.5 * (a + b)
+        height, _ = self._heights(rho, origins[:, None] + middle[..., None] * directions[:, None])
+        hit &= height.isfinite()  # not at the edge of a second surface
+        return torch.where(hit, middle, 0.0), hit
 
     def _heights(self, rho: Tensor, points: Tensor, all_layers: bool = False) -> tuple[Tensor, Tensor]:
         """r - rho_i at points [R, S, 3], and whether they lie inside the window [R, S].

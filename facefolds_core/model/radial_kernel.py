@@ -57,7 +57,7 @@ def ceiling(rho: Array, window: Array, belt: Array) -> Array:
     rows, columns = rho.shape[:2]
     stride = SKIP * belt[2]
     sliding = stride * belt[3] if math.isfinite(belt[1]) else 0.0
-    reach = max(math.asin(stride / max(float(rho.min()) - stride, stride)), sliding)
+    reach = max(math.asin(stride / max(float(rho[..., 0].min()) - stride, stride)), sliding)
     reach = _TO_UV * reach + 4.0 / CEILING_CELLS
     top = np.zeros((CEILING_CELLS, CEILING_CELLS), np.float32)
     u = np.linspace(window[1], window[0], rows)
@@ -82,7 +82,7 @@ def ceiling(rho: Array, window: Array, belt: Array) -> Array:
 def crossing_distances(
     offsets: Array,  # (R, 3) ray origins minus c, float64
     directions: Array,  # (R, 3) unit, float64
-    rho: Array,  # (rows, columns, N) radii, outermost first, float32
+    rho: Array,  # (rows, columns, N) radii, outermost first, NaN where a layer has none, float32
     window: Array,  # (4,) u0, u1, v0, v1
     belt: Array,  # (4,) of `Chart.numbers`
     ceiling: Array,  # of `ceiling`
@@ -174,6 +174,8 @@ def cross(
                 bend_row = 2.0 * (row_before + row) - 4.0 * mid_row
                 bend_column = 2.0 * (column_before + column) - 4.0 * mid_column
                 for n in range(layers):
+                    if math.isnan(previous[n] + current[n]):  # no surface there
+                        continue
                     if result[ray, n] == 0.0 and (previous[n] >= 0.0) != (current[n] >= 0.0):
                         fa, fb, ga, gb = 0.0, 1.0, previous[n], current[n]
                         f = 0.0
@@ -185,7 +187,7 @@ def cross(
                             at_column = column_before + f * (column - column_before + bend_column * (f - 1.0))
                             _, _, at_radius = chart_position(x, y, z, belt)
                             gm = at_radius - _look_up(rho, at_row, at_column, n)
-                            if abs(gm) < 1e-6:
+                            if abs(gm) < 1e-6 or math.isnan(gm):
                                 break
                             if (gm >= 0.0) == (ga >= 0.0):
                                 fa, ga = f, gm

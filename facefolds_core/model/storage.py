@@ -84,6 +84,7 @@ class ExplicitSpec(BaseModel):
         nodes: rows and columns of the radius maps.
         texels: H and W of the textures.
         num_layers, num_frames: N and K.
+        second_layers: how many of the N lie on a second surface; absent where there are none.
         reflection: rows and columns of its maps, texels a side of its environment; absent where there is none.
         segments: frames in each file of `segmented.py`; absent where all frames are in model.safetensors.
         fingerprint: of the configuration and scene that it was trained with (training/checkpoints.py).
@@ -101,6 +102,7 @@ class ExplicitSpec(BaseModel):
     texels: tuple[Count, Count]
     num_layers: Annotated[int, Field(ge=1)]
     num_frames: Annotated[int, Field(ge=1)]
+    second_layers: Annotated[int, Field(ge=0, exclude_if=lambda count: count == 0)] = 0
     reflection: Annotated[tuple[Count, Count, Count] | None, Field(exclude_if=lambda shape: shape is None)] = None
     segments: Annotated[
         tuple[Annotated[int, Field(ge=1)], ...] | None, Field(min_length=1, exclude_if=lambda shape: shape is None)
@@ -108,9 +110,11 @@ class ExplicitSpec(BaseModel):
     fingerprint: str = ""
 
     @model_validator(mode="after")
-    def _all_frames(self) -> ExplicitSpec:
+    def _sound(self) -> ExplicitSpec:
         if self.segments is not None and sum(self.segments) != self.num_frames:
             raise ValueError(f"segments of {sum(self.segments)} frames, but num_frames is {self.num_frames}")
+        if self.second_layers >= self.num_layers:
+            raise ValueError(f"second_layers under num_layers, {self.num_layers}")
         return self
 
 
@@ -138,7 +142,9 @@ def build_explicit(spec: ExplicitSpec) -> RadianceManifolds:
         textures = GridTextures(spec.window, spec.texels, spec.num_layers, spec.num_frames, reflection)
     else:
         textures = SegmentedTextures(spec.window, spec.texels, spec.num_layers, spec.segments, reflection)
-    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, spec.num_layers)
+    second = torch.ones(*spec.nodes, spec.second_layers) if spec.second_layers else None
+    first = spec.num_layers - spec.second_layers
+    manifolds = RadialManifolds(Chart(spec.centre, spec.belt), spec.window, blank, blank, first, second)
     return RadianceManifolds(manifolds, textures)
 
 

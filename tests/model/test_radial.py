@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -9,6 +11,7 @@ import torch
 from facefolds_core.geometry.chart import Chart
 from facefolds_core.geometry.sphere_uv import points_to_uv, uv_to_directions
 from facefolds_core.model.radial import RadialManifolds
+from facefolds_core.model.storage import ExplicitSpec, build_model, load_model, read_spec, save_model
 
 C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
@@ -118,3 +121,59 @@ def test_radii_in_a_direction_are_where_a_ray_along_it_crosses() -> None:
     assert valid[:-1].all() and not valid[-1].any()
     assert (found.hit == valid).all()
     torch.testing.assert_close(radii[:-1], (manifolds.radius - found.distance)[:-1], atol=1e-5, rtol=0)
+
+
+def _two_surfaces() -> RadialManifolds:
+    """Spheres, and beneath them two more in the upper half of the window only."""
+    second = torch.zeros(24, 20, 2)
+    second[:12] = torch.tensor([0.2, 0.19])
+    middle, halfwidth = torch.full((24, 20), 0.3), torch.full((24, 20), 0.03)
+    return RadialManifolds(Chart(C), WINDOW, middle, halfwidth, 3, second)
+
+
+@pytest.mark.parametrize("grad", [False, True])
+def test_a_second_surface_is_met_where_it_is(grad: bool) -> None:
+    manifolds = _two_surfaces()
+    origins, directions = _rays(400, seed=3)
+    offset = origins - manifolds.centre
+    b = (offset * directions).sum(1)
+    with torch.set_grad_enabled(grad):
+        found = manifolds.crossings(origins, directions)
+    assert found.hit.shape == (400, 5) and manifolds.num_layers == 5
+    for layer, radius in enumerate((0.33, 0.30, 0.27, 0.2, 0.19)):
+        expected = -b - (b**2 - offset.square().sum(1) + radius**2).sqrt()
+        points = origins + expected[:, None] * directions
+        u = points_to_uv(points, manifolds.centre)[0][:, 0]
+        there = expected.isfinite() & (u.abs() < 0.55) & (points_to_uv(points, manifolds.centre)[0][:, 1].abs() < 0.55)
+        above, below = there & (u > 0.06), there & (u < -0.03)
+        assert above.sum() > 20 and below.sum() > 20
+        assert found.hit[above, layer].all()
+        torch.testing.assert_close(found.distance[above, layer], expected[above], atol=1e-5, rtol=0)
+        assert bool(found.hit[below, layer].any()) == (layer < 3)
+
+
+def test_a_second_surface_has_points_where_it_is() -> None:
+    manifolds = _two_surfaces()
+    radii, valid = manifolds.radii_at(torch.tensor([[0.3, 0.1], [-0.3, 0.1]]))
+    assert valid.tolist() == [[True] * 5, [True] * 3 + [False] * 2]
+    torch.testing.assert_close(radii[0], torch.tensor([0.33, 0.30, 0.27, 0.2, 0.19]))
+    assert radii.isfinite().all()
+
+
+@pytest.mark.parametrize("second", [0, 2])
+def test_a_saved_model_keeps_its_second_surface(second: int, tmp_path: Path) -> None:
+    shape = {"nodes": (24, 20), "texels": (8, 9), "num_frames": 1}
+    spec = ExplicitSpec(centre=C, window=WINDOW, num_layers=3 + second, second_layers=second, **shape)
+    model = build_model(spec)
+    model.manifolds = _two_surfaces() if second else _spheres()
+    save_model(model, spec, tmp_path)
+    assert ("second_layers" in (tmp_path / "model.json").read_text()) == bool(second)
+    assert read_spec(tmp_path) == spec
+    loaded = load_model(tmp_path).manifolds
+    assert isinstance(loaded, RadialManifolds)
+    torch.testing.assert_close(loaded.radii(), model.manifolds.radii(), rtol=0, atol=0, equal_nan=True)
+
+
+def test_there_is_a_first_surface() -> None:
+    with pytest.raises(ValueError, match="second_layers under num_layers"):
+        ExplicitSpec(centre=C, window=WINDOW, nodes=(8, 8), texels=(8, 8), num_layers=4, num_frames=1, second_layers=4)

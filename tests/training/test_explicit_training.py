@@ -144,7 +144,7 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
 def test_plan_spends_all_iterations() -> None:
     ones = np.ones((4, 4))
     window = (-0.5, 0.5, -0.5, 0.5)
-    maps = ones, ones, 0 * ones, ones, ones, np.ones((4, 4, 3))
+    maps = ones, ones, 0 * ones, 0 * ones, ones, ones, np.ones((4, 4, 3))
     volume = Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
     chosen = fit.Fit(Chart((0, 0, 0)), window, *maps, (128, 96), (), (), volume, {}, 30.0)
     levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)

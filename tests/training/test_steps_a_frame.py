@@ -28,6 +28,7 @@ def fitted() -> Fit:
         ones,
         ones,
         np.zeros((4, 4)),
+        np.zeros((4, 4)),
         ones,
         ones,
         np.ones((4, 4, 3)),

@@ -23,6 +23,7 @@ WELL = Fit(
     middle=np.zeros((2, 2)),
     halfwidth=np.zeros((2, 2)),
     reach=np.zeros((2, 2)),
+    second=np.zeros((2, 2)),
     trust=np.zeros((2, 2)),
     opacity=np.zeros((2, 2)),
     rgb=np.zeros((2, 2, 3)),

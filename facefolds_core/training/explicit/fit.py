@@ -31,6 +31,7 @@ from facefolds_core.subject.sight import seen_by
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
+from facefolds_core.training.explicit.second_surface import LAYERS, second_surface
 from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
@@ -60,6 +61,7 @@ class Fit:
         middle: starting radii of the middle of the layers, units.
         halfwidth: half the space between the outermost and the innermost layer, units, where the surface stands still.
         reach: half of how far it moves beyond that over the frames, units; added to any multiple of the halfwidth.
+        second: middle radii of a second surface beneath the first, units; 0 where there is none.
         trust: offsets of the layers from the start are shrunk by this much towards 0, units.
         opacity, rgb: of the start, (rows, columns) and (rows, columns, 3).
         texels: (H, W) of the finest textures.
@@ -75,6 +77,7 @@ class Fit:
     middle: Array
     halfwidth: Array
     reach: Array
+    second: Array
     trust: Array
     opacity: Array
     rgb: Array
@@ -126,17 +129,19 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     middle = np.maximum(middle, least_middle(widths, geometry) + reach)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
     texels = texel_count(scene, window, radius, params.textures.pixels_per_texel)
+    second = second_surface(volume, chart, window, middle - widths - reach, cameras)
     return Fit(
         chart=chart,
         window=window,
         middle=middle,
         halfwidth=widths,
         reach=reach,
+        second=second,
         trust=TRUST * kept + reach,
         opacity=opacity,
         rgb=seen.rgb.astype(np.float64),
         texels=texels,
-        reasons=(*_reasons(params, losses[chart], source, most), *notes),
+        reasons=(*_reasons(params, losses[chart], source, most, second), *notes),
         notes=notes,
         volume=volume,
         losses=losses,
@@ -144,7 +149,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     )
 
 
-def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float) -> tuple[Fact, ...]:
+def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, second: Array) -> tuple[Fact, ...]:
     """One a choice."""
     start, geometry = params.start, params.geometry
     return (
@@ -152,6 +157,7 @@ def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float) -> 
         fact("window_chosen", opacity=start.subject_opacity, margin=WINDOW_MARGIN),
         middle,
         fact("halfwidth_chosen", least=geometry.halfwidth, most=most),
+        *([fact("second_surface", layers=LAYERS, share=float((second > 0).mean()))] if second.any() else []),
         fact("texels_chosen", pixels=params.textures.pixels_per_texel),
     )
 

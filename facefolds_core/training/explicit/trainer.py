@@ -18,7 +18,7 @@ from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
-from facefolds_core.subject.outline import shells, texel_uv
+from facefolds_core.subject.outline import texel_uv
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
 from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
@@ -26,6 +26,7 @@ from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Level, epochs
 from facefolds_core.training.explicit.rates import falling, rates_of
+from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import Virtual
@@ -44,6 +45,7 @@ class Trainer:
     """A training under way: geometry in rounds at coarse textures, then textures coarse to fine on stored crossings.
 
     Attributes:
+        layers: of both surfaces.
         usual: (M, 3) mean errors of the texels that no frame is blamed for, once it has ended.
     """
 
@@ -60,6 +62,7 @@ class Trainer:
         self.scene = cameras.scene
         self.pictures, self.virtual = pictures, virtual
         self.random = np.random.default_rng(params.seed)
+        self.layers = params.layers + (LAYERS if fit.second.any() else 0)
         self.middle = torch.from_numpy(fit.middle).float()
         self.geometry = 0.0
         self.views: Rays | None = None
@@ -75,7 +78,9 @@ class Trainer:
     def manifolds(self) -> RadialManifolds:
         halfwidth, reach = (torch.from_numpy(part).float() for part in (self.fit.halfwidth, self.fit.reach))
         halfwidth = self.geometry * halfwidth + reach
-        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers)
+        inner = (self.middle - halfwidth).numpy().astype(np.float64)
+        second = torch.from_numpy(second_layers(self.fit.second, inner)) if self.layers > self.params.layers else None
+        return RadialManifolds(self.fit.chart, self.fit.window, self.middle, halfwidth, self.params.layers, second)
 
     def run(self, level: Level, number: int, live: Live, bar: tqdm) -> None:
         """One level.
@@ -124,7 +129,7 @@ class Trainer:
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
-        shape = (self.params.layers, self.scene.num_frames)
+        shape = (self.layers, self.scene.num_frames)
         return state_on(self.device)(texels, *shape, start, self.params)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
@@ -134,8 +139,8 @@ class Trainer:
         with on_one_thread():
             nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
-        places = radii[0].permute(1, 2, 0).double().numpy()
-        opacity, rgb = shells(self.fit.volume, self.fit.chart, texel_uv(self.fit.window, *shape), places)
+        places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_uv(self.fit.window, *shape)
+        opacity, rgb = shells_of_both(self.fit.volume, self.fit.chart, uv, places, self.params.layers)
         flat = shape[0] * shape[1], places.shape[-1]
         self.state.believe(opacity.reshape(flat))
         if fill:
@@ -145,13 +150,15 @@ class Trainer:
         """Move the middle radius to where this round found opacity, mean over frames."""
         assert self.state is not None
         h, w = self.state.shape
-        alpha = torch.stack([self.state.activated(k)[..., 3].clone() for k in range(self.scene.num_frames)]).mean(0)
-        seen = self.state.layers[2, ..., 3] > 0
+        n = self.params.layers
+        frames = range(self.scene.num_frames)
+        alpha = torch.stack([self.state.activated(k)[:, :n, 3].clone() for k in frames]).mean(0)
+        seen = self.state.layers[2, :, :n, 3] > 0
         alpha = torch.where(seen, alpha, 0.0).view(1, h, w, -1).permute(0, 3, 1, 2)
         size = self.middle.shape[0], self.middle.shape[1]
         with on_one_thread():
             nodes = torch.nn.functional.interpolate(alpha, size=size, mode="bilinear", align_corners=False)
-        radii = self.manifolds().radii().detach().double().numpy()
+        radii = self.manifolds().radii().detach().double().numpy()[..., :n]
         offsets = recentre(radii, nodes[0].permute(1, 2, 0).numpy(), self.params.geometry.blur)
         moved = self.middle + torch.from_numpy(offsets).float()
         start = torch.from_numpy(self.fit.middle).float()
@@ -216,32 +223,38 @@ class Trainer:
         state.forget_moments()
         self.events += clear_texels(state, self.views, self._stride(), self.params.pruning)
         peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
-        kept = [i for i in range(n) if float(peak[i]) >= LAYER_ALPHA] or [n // 2]
-        # Layers stay where they are: the ones kept must still be evenly spaced, so only outer and inner ones go.
+        shows = (peak >= LAYER_ALPHA).tolist()
+        kept = [i for i in range(n) if shows[i]] or [n // 2]
+        # Layers stay where they are: the first surface's must still be evenly spaced, so only outer and inner ones go.
         first, last = kept[0], kept[-1]
+        below = [i for i in range(n, self.layers) if shows[i]]
+        stay = [*range(first, last + 1), *below]
         self.events += [
-            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(n) if not first <= i <= last
+            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(self.layers) if i not in stay
         ]
         radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
         halfwidth = (0.5 * (outer - inner)).clamp(min=1e-6)
-        manifolds = RadialManifolds(self.fit.chart, self.fit.window, 0.5 * (outer + inner), halfwidth, last - first + 1)
+        second = radii[..., below].nan_to_num() if below else None
+        middle = 0.5 * (outer + inner)
+        manifolds = RadialManifolds(self.fit.chart, self.fit.window, middle, halfwidth, last - first + 1, second)
         reflection = self.gloss.model()
-        textures = GridTextures(self.fit.window, (h, w), last - first + 1, self.scene.num_frames, reflection)
+        textures = GridTextures(self.fit.window, (h, w), len(stay), self.scene.num_frames, reflection)
         with torch.no_grad():
             textures.colour.copy_(state.colour[0].view(h, w, 3))
-            textures.layers.copy_(state.layers[0].view(h, w, n, 4)[:, :, first : last + 1])
+            textures.layers.copy_(state.layers[0].view(h, w, -1, 4)[:, :, stay])
             textures.frame_colour.copy_(state.frame_colour[0].view(-1, h, w, 3))
-            textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, n)[..., first : last + 1])
+            textures.frame_alpha.copy_(state.frame_alpha[0].view(-1, h, w, self.layers)[..., stay])
         spec = ExplicitSpec(
             centre=self.fit.chart.centre,
             belt=self.fit.chart.belt,
             window=self.fit.window,
             nodes=(self.middle.shape[0], self.middle.shape[1]),
             texels=(h, w),
-            num_layers=last - first + 1,
+            num_layers=len(stay),
             num_frames=self.scene.num_frames,
+            second_layers=len(below),
             reflection=None if reflection is None else (*reflection.shape.maps, reflection.shape.environment),
             fingerprint=fingerprint,
         )
