@@ -27,7 +27,7 @@ HALFWIDTH = 0.006
 """They lie within this distance of its middle, units."""
 GAP = 0.001
 """Between the innermost layer of the first surface and the outermost of the second, at least, units."""
-RAYS = 40_000
+RAYS = 200_000
 """Of a camera that look for it, at most."""
 MARGIN = 2.0
 """Voxels: what lies deeper beneath the innermost layer at a node, and at those around it, has no place on the first."""
