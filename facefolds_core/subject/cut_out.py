@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -23,6 +24,9 @@ DARK = 8.0
 AROUND = 10
 """Colours of what stands behind are told so far around the subject, in widths of the band: the rest is far away, and
 costs time."""
+
+SAMPLES = 3000
+"""Pixels of each picture, of the subject and of what stands behind, by which their colours are known."""
 
 LOGARITHM = np.rint(255 * np.log1p(np.arange(256) / DARK) / np.log1p(255 / DARK)).astype(np.uint8)
 
@@ -53,28 +57,71 @@ class EdgeParams:
     agreeing: float = 0.65
 
 
-def cut_out(picture: Image, start: Array, camera: Camera, edge: EdgeParams) -> Bool:
+@dataclass(frozen=True)
+class Colours:
+    """What colours the subject has in all pictures, and what stands behind: GrabCut's mixtures of Gaussians.
+
+    Of one picture alone they would be wrong where it shows hair at its edge, whose Gaussians few cameras saw: they are
+    transparent there, and the hair would be taken for the room.
+
+    Attributes:
+        behind, subject: (1, 65) float64 as OpenCV has them.
+    """
+
+    behind: NDArray[np.float64]
+    subject: NDArray[np.float64]
+
+
+def colours_of(seen: Iterable[tuple[Image, Array, Camera]], edge: EdgeParams) -> Colours | None:
+    """Of pictures (H, W, 3), with the opacity (H, W) of the subject's Gaussians in each; None where no pixel is surely
+    the subject's, or none is surely not."""
+    rows, labels, random = list[Image](), list[int](), np.random.default_rng(0)
+    for picture, start, camera in seen:
+        inside, near = _sure(start, camera, edge)
+        image = _logarithmic(picture)
+        for chosen, label in ((inside, cv2.GC_FGD), (~near, cv2.GC_BGD)):
+            if chosen.any():
+                rows.append(random.choice(image[chosen], SAMPLES))
+                labels.append(label)
+    if len(set(labels)) < 2:
+        return None
+    cv2.setRNGSeed(0)  # its clusters begin at random
+    models, known = np.zeros((2, 1, 65)), np.repeat(np.array(labels, np.uint8)[:, None], SAMPLES, 1)
+    cv2.grabCut(np.stack(rows), known, (0, 0, 1, 1), models[0], models[1], 1, cv2.GC_INIT_WITH_MASK)
+    return Colours(*models)
+
+
+def cut_out(picture: Image, start: Array, camera: Camera, colours: Colours | None, edge: EdgeParams) -> Bool:
     """(H, W) silhouette of the subject in a picture (H, W, 3): GrabCut (Rother et al. 2004) between what is surely its
     and surely not.
 
     Args:
         start: (H, W) opacity of its Gaussians.
+        colours: of `colours_of`.
     """
-    radius = pixels(edge.band, camera)
-    inside = grown((start < edge.inside).astype(np.uint8), radius) == 0
-    near = grown((start > edge.outside).astype(np.uint8), radius) > 0
+    inside, near = _sure(start, camera, edge)
     labels = np.where(start > 0.5, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     labels[inside], labels[~near] = cv2.GC_FGD, cv2.GC_BGD
     cut = start > 0.5
-    if near.any() and not near.all() and cut.any():
-        part = around(near, AROUND * radius)
-        own, image = labels[part].copy(), cv2.LUT(np.ascontiguousarray(picture[part][..., ::-1]), LOGARITHM)
-        cv2.setRNGSeed(0)  # its clusters begin at random
-        models, mode = np.zeros((2, 1, 65)), cv2.GC_INIT_WITH_MASK
-        cv2.grabCut(image, own, (0, 0, 1, 1), models[0], models[1], 3, mode)
+    if near.any() and not near.all() and cut.any() and colours is not None:
+        part = around(near, 1)
+        own, models = labels[part].copy(), (colours.behind.copy(), colours.subject.copy())
+        cv2.grabCut(_logarithmic(picture[part]), own, (0, 0, 1, 1), *models, 1, cv2.GC_EVAL_FREEZE_MODEL)
         cut = np.zeros_like(cut)
         cut[part] = (own == cv2.GC_FGD) | (own == cv2.GC_PR_FGD)
     return np.asarray(ndimage.binary_fill_holes(cut))
+
+
+def _sure(start: Array, camera: Camera, edge: EdgeParams) -> tuple[Bool, Bool]:
+    """(H, W) what is surely the subject, and what may be."""
+    radius = pixels(edge.band, camera)
+    inside = grown((start < edge.inside).astype(np.uint8), radius) == 0
+    return inside, grown((start > edge.outside).astype(np.uint8), radius) > 0
+
+
+def _logarithmic(picture: Image) -> Image:
+    """As GrabCut sees it: BGR."""
+    return np.asarray(cv2.LUT(np.ascontiguousarray(picture[..., ::-1]), LOGARITHM), np.uint8)
 
 
 def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:

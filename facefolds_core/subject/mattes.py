@@ -3,8 +3,9 @@ the picture's colours say."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,7 +13,18 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.subject.cut_out import Array, Bool, EdgeParams, agreement, cut_out, grown, pixels, softened
+from facefolds_core.subject.cut_out import (
+    Array,
+    Bool,
+    Colours,
+    EdgeParams,
+    agreement,
+    colours_of,
+    cut_out,
+    grown,
+    pixels,
+    softened,
+)
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.found import background, near_enough, opacity_of, subject_of
 from facefolds_core.subject.plates import from_plate
@@ -85,15 +97,22 @@ class Mattes:
             return Matte(_bytes(from_plate(picture, self._plates.image(key[0], 0))), "plate")
         assert self.body is not None
         camera, (start, behind) = self.scene.camera_in_head(*key), self._seen(key)
-        cut = cut_out(picture, start, camera, self.edge)
+        colours = self._colours
+        cut = cut_out(picture, start, camera, colours, self.edge)
         share = agreement(cut, start > 0.5)
         if share < self.edge.agreeing and self.alone is not None:
             start = np.asarray(1 - draw(self.alone.values, view_of(camera)).picture()[1])
-            cut = cut_out(picture, start, camera, self.edge)
+            cut = cut_out(picture, start, camera, colours, self.edge)
             share = agreement(cut, start > 0.5)
         if share < self.edge.agreeing:
             return Matte(_bytes(start), "gaussians", share)
         return Matte(_bytes(softened(picture, cut, start, behind, camera, self.edge)), "picture", share)
+
+    @cached_property
+    def _colours(self) -> Colours | None:
+        """Of the pictures by which the body was found."""
+        assert self.body is not None
+        return _colours(self.scene, self.body, self.edge)
 
     def _seen(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
@@ -110,16 +129,28 @@ class Mattes:
 def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None = None) -> Body:
     """The body at the centre, as the training pictures of a frame agree on it: what the Gaussians say of each picture
     is said to the pixel by its colours, and these silhouettes vote on the Gaussians."""
-    edge, store = edge or EdgeParams(), scene.open_frames()
-    cameras = {i: scene.camera_in_head(i, frame) for i in scene.indices("train") if (i, frame) in store}
-    subject, possible = subject_of(splats, scene), near_enough(splats, scene)
+    edge = edge or EdgeParams()
+    body, possible = Body(splats, subject_of(splats, scene), frame), near_enough(splats, scene)
     for _ in range(edge.rounds):
-        larger = []
-        for i, one in cameras.items():
-            cut = cut_out(store.image(i, frame), opacity_of(splats, subject, one), one, edge)
-            larger.append((one, grown(cut.astype(np.uint8), pixels(edge.grow, one)) > 0))
-        subject = possible & _voted(splats, larger, edge.share)
-    return Body(splats, subject, frame)
+        colours, larger = _colours(scene, body, edge), []
+        for picture, start, camera in _pictures(scene, body):
+            cut = cut_out(picture, start, camera, colours, edge)
+            larger.append((camera, grown(cut.astype(np.uint8), pixels(edge.grow, camera)) > 0))
+        body = Body(splats, possible & _voted(splats, larger, edge.share), frame)
+    return body
+
+
+def _colours(scene: Scene, body: Body, edge: EdgeParams) -> Colours | None:
+    return colours_of(_pictures(scene, body), edge)
+
+
+def _pictures(scene: Scene, body: Body) -> Iterator[tuple[Image, Array, Camera]]:
+    """Training pictures of the body's frame, the subject's opacity in them, and their cameras."""
+    store = scene.open_frames()
+    for i in scene.indices("train"):
+        if (i, body.frame) in store:
+            camera = scene.camera_in_head(i, body.frame)
+            yield store.image(i, body.frame), opacity_of(body.splats, body.subject, camera), camera
 
 
 def _voted(splats: Splats, cuts: list[tuple[Camera, Bool]], share: float) -> Bool:

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.subject.cut_out import EdgeParams, agreement, around, cut_out
+from facefolds_core.subject.cut_out import EdgeParams, agreement, around, colours_of, cut_out
 from facefolds_core.subject.known_background import PlateParams
 from facefolds_core.subject.plates import from_plate
 from tests.scenes import look_at_origin
 
 
 def cut(image: np.ndarray, rough: np.ndarray) -> np.ndarray:
-    """A silhouette, bool."""
-    return cut_out(image, rough, look_at_origin("c", 0, 0, len(image)), EdgeParams())
+    """A silhouette, bool, by the colours of this picture."""
+    camera = look_at_origin("c", 0, 0, len(image))
+    return cut_out(image, rough, camera, colours_of([(image, rough, camera)], EdgeParams()), EdgeParams())
 
 
 def test_a_cut_out_has_the_pictures_outline_not_the_volumes() -> None:
@@ -44,6 +45,24 @@ def test_a_picture_that_is_all_subject_or_all_room_is_left_alone() -> None:
     image = np.zeros((16, 16, 3), np.uint8)
     assert cut(image, np.ones((16, 16), np.float32)).all()
     assert not cut(image, np.zeros((16, 16), np.float32)).any()
+
+
+def test_hair_that_few_cameras_saw_is_known_by_its_colour_in_other_pictures() -> None:
+    """Dark hair before a dark room: in one picture the Gaussians know a part of it, in another all."""
+    rng, (y, x) = np.random.default_rng(2), np.mgrid[:96, :96]
+    head, face = np.hypot(x - 48, y - 48) < 34, np.hypot(x - 48, y - 60) < 20
+    image = np.where(head[..., None], (48, 34, 28), (14, 15, 16))
+    image = (np.where(face[..., None], (190, 140, 110), image) + rng.integers(-4, 5, (96, 96, 3))).astype(np.uint8)
+    whole = np.clip(0.5 + (34 - np.hypot(x - 48, y - 48)) / 6, 0, 1).astype(np.float32)
+    part = np.where(face, 1, np.where(x < 48, 0.45 * whole, 0.55 * whole)).astype(np.float32)
+    camera, edge = look_at_origin("c", 0, 0, 96), EdgeParams()
+
+    def share(*starts: np.ndarray) -> float:
+        colours = colours_of([(image, start, camera) for start in starts], edge)
+        return agreement(cut_out(image, part, camera, colours, edge), head)
+
+    assert share(part) < 0.8
+    assert share(part, whole) > 0.9
 
 
 def _before_a_plate(opacity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
