@@ -89,7 +89,7 @@ class ExplicitParams(Section):
     """Seed of the draws of rays and frames."""
 
     layers: Annotated[int, Field(ge=1, le=64)] = 12
-    """Number of nested layers, N."""
+    """Number of nested layers, N. Where cameras see beneath an overhang there are four more."""
 
     iterations: Count = 300
     """Adam steps of rounds and textures together. More are made where `geometry` or `textures.steps_per_frame` need

@@ -16,6 +16,7 @@ import facefolds_core as facefolds
 from docs.tools.notebook import NOTEBOOK, run
 from facefolds_core.api import asset as shown
 from facefolds_core.errors import UserError
+from facefolds_core.training.explicit.second_surface import LAYERS
 from tests.hostile.damage import fingerprint
 
 pytestmark = pytest.mark.slow
@@ -68,8 +69,9 @@ def test_each_says_what_it_is(made: Made) -> None:
     assert repr(made.capture).startswith("Capture(anna, actor: 8 cameras, 2 frames at 1.33333 a second")
     assert repr(made.scene).startswith("Scene(anna: 8 cameras, 1 of them not for training, 2 frames")
     assert repr(made.subject).startswith("Subject(anna: ")
-    assert repr(made.model) == "Model(anna: 3 layers, 2 frames)"
-    assert "3 layers" in repr(made.asset) and "2 frames" in repr(made.asset)
+    layers = f"{3 + LAYERS} layers"  # and those of a second surface
+    assert repr(made.model) == f"Model(anna: {layers}, 2 frames)"
+    assert layers in repr(made.asset) and "2 frames" in repr(made.asset)
     assert "PSNR over any background, dB" in repr(made.scores)
 
 
