@@ -41,8 +41,9 @@ class EdgeParams:
         grow: the silhouettes that vote are larger by so many, so that what GrabCut takes away once is not lost.
         share: of the pictures that see a Gaussian and take it for the subject's, at least.
         rounds: how often pictures and Gaussians tell each other.
-        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels.
-        noise: standard deviation of what stands behind, of values in [0, 1].
+        soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels;
+        deep: and so many within it, where a pixel looks like what stands behind, as between locks of hair:
+        alike: where no channel differs by so much, of values in [0, 1].
         agreeing: IoU of a silhouette with the Gaussians', under which it is not believed.
     """
 
@@ -53,7 +54,8 @@ class EdgeParams:
     share: float = 0.6
     rounds: int = 2
     soft: float = 4.0
-    noise: float = 0.1
+    deep: float = 12.0
+    alike: float = 0.05
     agreeing: float = 0.65
 
 
@@ -126,23 +128,33 @@ def _logarithmic(picture: Image) -> Image:
 
 def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
     """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
-    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it.
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it. How
+    far the picture differs from that beside the subject, in the median, is the noise: a dark wall is known well, and
+    opacity goes to 0 within a pixel, clutter is not.
 
     Args:
         start: (H, W) opacity of its Gaussians.
         behind: (H, W, 3) what stands behind them.
     """
     radius = pixels(edge.soft, camera)
-    inside = grown((~cut).astype(np.uint8), radius) == 0
     near = grown(cut.astype(np.uint8), radius) > 0
-    if not inside.any() or near.all():
+    if near.all():
         return cut.astype(np.float32)
-    part, opacity = around(near, AROUND * radius), inside.astype(np.float32)
+    part, opacity = around(near, AROUND * radius), np.zeros(cut.shape, np.float32)
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
-    found = opacity_before(colours, room, inside[part], (near & ~inside)[part], edge.noise, PlateParams())
+    off, near, own = np.abs(colours - room), near[part], cut[part]
+    outside = (~own).astype(np.uint8)
+    deep, alike = grown(outside, pixels(edge.deep, camera)) == 0, off.max(-1) < edge.alike
+    inside = (grown(outside, radius) == 0) & (deep | ~alike)
+    if not inside.any():
+        return cut.astype(np.float32)
+    far = grown(own.astype(np.uint8), 2 * radius) == 0
+    params = PlateParams()
+    noise = max(params.noise, float(np.median(off[far])) if far.any() else 0.0)
+    found = opacity_before(colours, room, inside, near & ~inside, noise, params)
     both = np.sqrt(found * np.clip(start[part], 0, 1))
-    opacity[part] = np.where(inside[part], np.float32(1), np.where(near[part], both, np.float32(0)))
-    return np.asarray(opacity)
+    opacity[part] = np.where(inside, np.float32(1), np.where(near, both, np.float32(0)))
+    return opacity
 
 
 def around(mask: Bool, margin: int) -> tuple[slice, slice]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.subject.cut_out import EdgeParams, agreement, around, colours_of, cut_out
+from facefolds_core.subject.cut_out import EdgeParams, agreement, around, colours_of, cut_out, softened
 from facefolds_core.subject.known_background import PlateParams
 from facefolds_core.subject.plates import from_plate
 from tests.scenes import look_at_origin
@@ -178,3 +178,35 @@ def test_what_is_far_from_the_subject_changes_nothing() -> None:
     found, image[80:, 80:] = cut(image, rough), (200, 150, 120)
     np.testing.assert_array_equal(cut(image, rough), found)
     assert around(disc, 3) == (slice(14, 47), slice(14, 47))
+
+
+def test_opacity_ends_at_an_outline_before_a_wall_and_not_before_clutter() -> None:
+    """Gaussians of a head reach beyond it by a haze, which the picture contradicts where the wall is known."""
+    rng, (y, x) = np.random.default_rng(3), np.mgrid[:96, :96]
+    away = np.hypot(x - 48, y - 48) - 30
+    head, haze = away < 0, np.clip(0.6 - away / 12, 0, 1).astype(np.float32)
+    wall = np.full((96, 96, 3), 0.06, np.float32)
+    clutter = np.clip(wall + rng.normal(0, 0.2, wall.shape), 0, 1).astype(np.float32)
+    camera, edge = look_at_origin("c", 0, 0, 96), EdgeParams()
+
+    def beside(shown: np.ndarray) -> float:
+        image = np.rint(255 * np.where(head[..., None], (0.7, 0.5, 0.4), shown)).astype(np.uint8)
+        return float(softened(image, head, haze, wall, camera, edge)[(away > 0.7) & (away < 1)].mean())
+
+    assert 4 * beside(wall) < beside(clutter)
+
+
+def test_between_locks_one_sees_what_stands_behind() -> None:
+    """A silhouette is filled; its comb of hair is not, where the picture shows the wall."""
+    y, x = np.mgrid[:384, :384]
+    head, comb = np.hypot(x - 192, y - 192) < 100, (abs(y - 192) < 40) & (x > 270) & (x < 330)
+    locks = comb & (y % 8 < 4) & ~head
+    cut = head | comb
+    image = np.full((384, 384, 3), 15, np.uint8)
+    image[head | locks] = (60, 45, 38)
+    behind = np.full((384, 384, 3), 15 / 255, np.float32)
+    start = np.where(head, 1, np.where(comb, 0.5, 0)).astype(np.float32)
+    opacity = softened(image, cut, start, behind, look_at_origin("c", 0, 0, 384), EdgeParams())
+    beside = comb & (x > 316) & (x < 326) & (abs(y - 192) < 30)
+    assert opacity[beside & ~locks].mean() < 0.6 * opacity[beside & locks].mean()
+    assert opacity[head & (x < 180) & (np.hypot(x - 192, y - 192) < 60)].min() == 1
