@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import differentiate, draw
 from facefolds_core.subject.fit import State, Target, improve, target_of
 from facefolds_core.subject.gaussians import GaussianParams
-from facefolds_core.subject.splats import COLOUR, Splats
+from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 
 Array = NDArray[np.float32]
 
@@ -20,6 +21,8 @@ STEPS = 64
 """Of a frame, on one picture each."""
 RATE_COLOUR = 0.015
 """Adam's, of colours: in so few steps they must come from skin to the white of an eye."""
+RIDE = 0.03
+"""Gaussians so far off a tracked mesh, units, stay where they are: a mesh knows no hair. Nearer ones ride in part."""
 CHANGED = 0.02
 """A Gaussian changes in a frame if its pixels err by this much more than in the frame of the start."""
 
@@ -46,6 +49,19 @@ def targets_of(cameras: Sequence[Camera], cut: NDArray[np.uint8]) -> list[Target
         picture = flat.reshape(camera.height, camera.width, 4).astype(np.float32) / np.float32(255)
         found.append(target_of(camera, picture[..., :3], picture[..., 3], 1.0))
     return found
+
+
+def ridden(splats: Splats, start: NDArray[np.float64], now: NDArray[np.float64]) -> Splats:
+    """The Gaussians in another frame, where they ride on a tracked mesh: each moves as the nearest vertex does.
+
+    Args:
+        start, now: (V, 3) vertices in the frame of the Gaussians and in the other, units.
+    """
+    distance, nearest = cKDTree(start).query(splats.means.astype(np.float64))
+    share = np.clip(1 - distance / RIDE, 0, 1)[:, None]
+    values = splats.values.copy()
+    values[:, MEAN] += (share * (now - start)[nearest]).astype(np.float32)
+    return Splats(values, splats.background)
 
 
 def changed_to(splats: Splats, usual: Array, targets: Sequence[Target], seed: int) -> Splats:

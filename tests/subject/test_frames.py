@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.frames import changed_to, mean_errors, targets_of
-from facefolds_core.subject.splats import COLOUR, Splats
+from facefolds_core.subject.frames import RIDE, changed_to, mean_errors, ridden, targets_of
+from facefolds_core.subject.splats import COLOUR, MEAN, Splats
 from tests.scenes import look_at_origin
 from tests.subject.splats import some_splats
 
@@ -45,3 +45,12 @@ def test_what_another_colour_contradicts_follows_and_the_rest_stays_bit_for_bit(
     assert still[splats.means[:, 2] < -0.15].mean() > 0.9
     assert (~still[upper]).sum() > 10
     assert mean_errors(found, after)[upper].mean() < 0.6 * mean_errors(splats, after)[upper].mean()
+
+
+def test_gaussians_ride_on_the_nearest_vertex_and_what_is_far_off_stays() -> None:
+    splats = Splats(some_splats(3), np.zeros(3, np.float32))
+    vertices = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    splats.values[:, MEAN] = [[0, 0, 0], [1, RIDE / 2, 0], [0, 2 * RIDE, 0]]
+    moved = ridden(splats, vertices, np.array([[0, 0, 0.1], [1.2, 0, 0]]))
+    np.testing.assert_allclose(moved.means - splats.means, [[0, 0, 0.1], [0.1, 0, 0], [0, 0, 0]], atol=1e-6)
+    np.testing.assert_array_equal(moved.values[:, MEAN.stop :], splats.values[:, MEAN.stop :])

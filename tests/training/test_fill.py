@@ -32,6 +32,17 @@ def test_layers_begin_with_what_is_given_and_keep_what_they_have_learnt() -> Non
     assert not state.layers[1:].any()
 
 
+def test_a_frame_begins_with_an_opacity_of_its_own() -> None:
+    state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())
+    usual, own = np.random.default_rng(0).uniform(0.1, 0.9, (2, 24, 3)).astype(np.float32)
+    state.fill(usual)
+    state.fill_frame(1, own)
+    for frame, opacity in enumerate((usual, own)):
+        np.testing.assert_allclose(state.activated(frame)[..., 3].numpy(), opacity, atol=1e-5)
+    state.fill(usual)
+    assert not state.frame_alpha.any()
+
+
 def test_steps_draw_opacity_back_to_what_is_believed() -> None:
     """A step on rays that meet nothing changes logits by this alone: of the difference 1 - BELIEF is left."""
     state = TextureState((4, 6), 3, 2, torch.full((2, 2, 4), 0.5), ExplicitParams())

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.scene import Scene
 from facefolds_core.files.frame_store import write_frames
 from facefolds_core.subject.find import reference_frame
+from facefolds_core.subject.splats import MEAN, Splats
 from facefolds_core.training.explicit.targets import CutOuts
 from facefolds_core.training.explicit.teacher import OTHERS, Teacher
 from facefolds_core.training.explicit.warnings import MIN_START_PSNR
@@ -108,6 +109,23 @@ def test_gaussians_that_explain_little_teach_nothing(scene: Scene) -> None:
     bad, good = (Teacher(scene, found(scene, psnr), seed=0) for psnr in (MIN_START_PSNR - 0.1, MIN_START_PSNR))
     assert not bad.virtual.cameras and not bad.others(photos)
     assert good.virtual.cameras and len(good.others(photos)) == min(OTHERS, scene.num_frames - 1)
+
+
+@pytest.mark.parametrize("towards", [1.0, -1.0])
+def test_gaussians_ride_on_a_tracked_mesh_that_the_photos_confirm(towards: float, scene: Scene) -> None:
+    """The Gaussians lie beside the subject; a mesh that comes over to it in all other frames takes them along."""
+    subject, aside = found(scene, 30.0), np.array([0.0, 0.1, 0.0], np.float32)
+    first, mesh = reference_frame(scene), np.repeat(subject.splats.means[None] + aside, scene.num_frames, 0)
+    values = subject.splats.values.copy()
+    values[:, MEAN] += aside
+    for frame in set(range(scene.num_frames)) - {first}:
+        mesh[frame] -= towards * aside
+    np.savez(scene.folder / "surface.npz", vertices=mesh, faces=np.array([[0, 1, 2]], np.int32))
+    teacher = Teacher(scene, replace(subject, splats=Splats(values, subject.splats.background)), seed=0)
+    (other, *_) = teacher.others(CutOuts(scene).photos)
+    assert teacher.moved(first, CutOuts(scene).photos) is None
+    off = np.median(other.means - subject.splats.means, axis=0)[1]
+    assert (off < 0.05) == (towards > 0)
 
 
 def test_pictures_of_a_teacher_that_are_not_kept_are_the_same_again(scene: Scene) -> None:

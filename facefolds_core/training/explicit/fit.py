@@ -32,7 +32,15 @@ from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_surface
-from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
+from facefolds_core.training.explicit.tracked import (
+    OPACITY,
+    REACH,
+    TRUST,
+    blend,
+    mean_radius,
+    mesh_radii,
+    trusted_surface,
+)
 
 Array = NDArray[np.float64]
 
@@ -96,8 +104,8 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         subject: as it was found.
         others: its Gaussians in a few other frames.
     """
-    start, geometry, finest = params.start, params.geometry, FINEST * pixel_size(scene)
-    volume, coarse = (volume_of(subject.splats, cells, finest) for cells in (CELLS, COARSE))
+    start, geometry = params.start, params.geometry
+    volume, coarse = (volume_in(scene, subject.splats, cells) for cells in (CELLS, COARSE))
     cameras = [scene.camera_in_head(i, reference_frame(scene)) for i in scene.indices("train")]
     visible = visible_points(coarse, cameras)
     chart, losses = choose_chart(coarse, visible, start)
@@ -109,22 +117,24 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
-        known, kept = seen.radius, np.zeros((rows, columns))
+        known, kept, tracked = seen.radius, np.zeros((rows, columns)), np.empty((0, rows, columns))
         source = fact("middle_from_volume")
     else:
-        mesh = mesh_radii(vertices, surface[1], chart, uv)
+        tracked = mesh_radii(vertices, surface[1], chart, uv)
+        mesh = mean_radius(tracked)
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, REACH)
+        tracked = np.where(kept == 1, tracked, np.nan)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
         source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)
     most = greatest_halfwidth(geometry, pixel_size(scene))
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
-    volumes = [volume_of(splats, CELLS, finest) for splats in others]
+    volumes = [volume_in(scene, splats) for splats in others]
     radii = [profile(other, chart, uv, start.subject_opacity).radius for other in volumes]
-    outwards, inwards = moves(seen.radius, radii, widths)
+    outwards, inwards = np.maximum(moves(seen.radius, radii, widths), moves(known, list(tracked), widths))
     middle, reach = middle + 0.5 * (outwards - inwards), 0.5 * (outwards + inwards)
     middle = np.maximum(middle, least_middle(widths, geometry) + reach)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))
@@ -147,6 +157,11 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
         losses=losses,
         start_psnr=subject.psnr,
     )
+
+
+def volume_in(scene: Scene, splats: Splats, cells: int = CELLS) -> Volume:
+    """Of the subject in a frame, as fine as the pictures show it."""
+    return volume_of(splats, cells, FINEST * pixel_size(scene))
 
 
 def _reasons(params: ExplicitParams, lost: float, middle: Fact, most: float, second: Array) -> tuple[Fact, ...]:

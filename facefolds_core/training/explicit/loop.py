@@ -82,7 +82,7 @@ def _fit(scene: Scene, params: ExplicitParams, log: Path) -> tuple[Trained, Surr
         warnings = warnings_of(scene, fit)
         for note in (*fit.notes, *warnings):
             bar.write(f"train: {note}")
-        trainer = Trainer(cameras, params, fit, device, pictures, teacher.virtual)
+        trainer = Trainer(cameras, params, fit, device, pictures, teacher)
         trainer.events = [*trainer.events, *warnings]
         pixels = len(cameras.scene.indices("train")) * scene.width * scene.height
         levels = plan(fit, params, scene.num_frames, pixels)

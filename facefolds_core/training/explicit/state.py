@@ -97,6 +97,10 @@ class TextureState:
             own = torch.from_numpy(rgb) - self.colour[0][:, None]
             self.layers[0, ..., :3] = torch.where(torch.from_numpy(opacity)[..., None] > MIN_OPACITY, own, 0.0)
 
+    def fill_frame(self, frame: int, opacity: NDArray[np.float32]) -> None:
+        """Begin one frame with an opacity (M, N) of its own."""
+        self.frame_alpha[0, frame] = _logits(opacity) - self.layers[0, ..., 3]
+
     def believe(self, opacity: NDArray[np.float32]) -> None:
         """Keep the layers' opacity near this, (M, N), where pictures say little."""
         self.believed = _logits(opacity)

@@ -19,7 +19,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.subject.drawing import draw, view_of
 from facefolds_core.subject.find import reference_frame
-from facefolds_core.subject.frames import changed_to, mean_errors, targets_of
+from facefolds_core.subject.frames import changed_to, mean_errors, ridden, targets_of
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.virtual import virtual_cameras
@@ -63,6 +63,7 @@ class Teacher:
         self._first = reference_frame(scene)
         self._usual: NDArray[np.float32] | None = None
         self._known = {self._first: splats}
+        self._mesh: NDArray[np.float32] | None = None
         real = self._real(self._first)
         self._believed = found.psnr >= MIN_START_PSNR
         cameras = virtual_cameras(real, splats, (scene.width, scene.height)) if self._believed else ()
@@ -71,7 +72,8 @@ class Teacher:
         self.virtual = Virtual(cameras, mattes, max(1, math.ceil(len(cameras) / max(1, len(real)))))
 
     def others(self, photos: Callable[[int], Image]) -> list[Splats]:
-        """The Gaussians of the `OTHERS` frames that look least like that of the start and one another.
+        """The Gaussians of the `OTHERS` frames that look least like that of the start and one another. From then on it
+        is known whether Gaussians ride on the tracked mesh.
 
         Args:
             photos: as of `cut`.
@@ -79,7 +81,21 @@ class Teacher:
         if not self._believed or self._scene.num_frames == 1:
             return []
         chosen = farthest_first(comparable(likenesses(self._scene)), 1 + OTHERS, self._first)
-        return [self._at(frame, photos) for frame in chosen if frame != self._first]
+        others = [frame for frame in chosen if frame != self._first]
+        surface = self._scene.load_surface()
+        if surface is not None and all(self._rides(surface[0], frame, photos) for frame in others):
+            self._mesh = surface[0]
+        return [self._at(frame, photos) for frame in others]
+
+    def moved(self, frame: int, photos: Callable[[int], Image]) -> Splats | None:
+        """The Gaussians of a frame, as far as they are known without a fit that nothing else needs; None where they
+        are those of the start.
+
+        Args:
+            photos: as of `cut`.
+        """
+        known = self._at(frame, photos) if self._views or frame in self._known else self._begun(frame)
+        return None if known is self._splats else known
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -95,8 +111,22 @@ class Teacher:
             if self._usual is None:
                 self._usual = mean_errors(self._splats, targets_of(self._real(self._first), photos(self._first)))
             targets = targets_of(self._real(frame), photos(frame))
-            self._known[frame] = changed_to(self._splats, self._usual, targets, self._seed + frame)
+            self._known[frame] = changed_to(self._begun(frame), self._usual, targets, self._seed + frame)
         return self._known[frame]
+
+    def _begun(self, frame: int) -> Splats:
+        """As the tracked mesh says; without one those of the start."""
+        return self._splats if self._mesh is None else self._ridden(self._mesh, frame)
+
+    def _ridden(self, mesh: NDArray[np.float32], frame: int) -> Splats:
+        start, now = (mesh[k].astype(np.float64) for k in (self._first, frame))
+        return ridden(self._splats, start, now)
+
+    def _rides(self, mesh: NDArray[np.float32], frame: int, photos: Callable[[int], Image]) -> bool:
+        """Whether Gaussians that ride on the mesh (K, V, 3) explain the photos of a frame better."""
+        targets = targets_of(self._real(frame), photos(frame))
+        still, riding = (mean_errors(s, targets).mean() for s in (self._splats, self._ridden(mesh, frame)))
+        return bool(riding < still)
 
     def _real(self, frame: int) -> list[Camera]:
         return [self._scene.camera_in_head(i, frame) for i in self._scene.indices("train")]

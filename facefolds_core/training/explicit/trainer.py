@@ -19,9 +19,10 @@ from facefolds_core.model.radiance import RadianceManifolds
 from facefolds_core.model.storage import ExplicitSpec
 from facefolds_core.params import ExplicitParams
 from facefolds_core.subject.outline import texel_uv
+from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit.cameras import CameraChoice
 from facefolds_core.training.explicit.clearing import clear_texels
-from facefolds_core.training.explicit.fit import Fit, least_middle, recentre
+from facefolds_core.training.explicit.fit import Fit, least_middle, recentre, volume_in
 from facefolds_core.training.explicit.follow import follow, follow_rates
 from facefolds_core.training.explicit.gloss import GlossFit
 from facefolds_core.training.explicit.plan import Level, epochs
@@ -29,7 +30,7 @@ from facefolds_core.training.explicit.rates import falling, rates_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_layers, shells_of_both
 from facefolds_core.training.explicit.state import MIN_ALPHA, TextureState, on_one_thread, state_on
 from facefolds_core.training.explicit.targets import CutOuts
-from facefolds_core.training.explicit.teacher import Virtual
+from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Rays, rays_of
 from facefolds_core.training.log import log_metrics
 
@@ -56,11 +57,11 @@ class Trainer:
         fit: Fit,
         device: torch.device,
         pictures: CutOuts,
-        virtual: Virtual,
+        teacher: Teacher,
     ) -> None:
         self.cameras, self.params, self.fit, self.device = cameras, params, fit, device
         self.scene = cameras.scene
-        self.pictures, self.virtual = pictures, virtual
+        self.pictures, self.teacher = pictures, teacher
         self.random = np.random.default_rng(params.seed)
         self.layers = params.layers + (LAYERS if fit.second.any() else 0)
         self.middle = torch.from_numpy(fit.middle).float()
@@ -125,7 +126,9 @@ class Trainer:
         finest = level.texels if level.stride > 1 else self.fit.texels
         share = self.params.textures.rays_per_texel * finest[0] * finest[1]
         self.geometry, self.stride = level.geometry, level.stride
-        self.views = rays_of(self.scene, self.manifolds(), level.stride, share, self.params.moving, self.virtual)
+        self.views = rays_of(
+            self.scene, self.manifolds(), level.stride, share, self.params.moving, self.teacher.virtual
+        )
 
     def _new_state(self, texels: tuple[int, int]) -> TextureState:
         start = torch.from_numpy(np.concatenate([self.fit.rgb, self.fit.opacity[..., None]], -1)).float()
@@ -133,18 +136,28 @@ class Trainer:
         return state_on(self.device)(texels, *shape, start, self.params)
 
     def _begin_with_subject(self, fill: bool, colours: bool) -> None:
-        """Let the layers believe in the opacity of the subject's Gaussians, and begin with it; with their colours."""
+        """Let the layers believe in the opacity of the subject's Gaussians, and begin with it, each frame with its own;
+        with their colours."""
         assert self.state is not None
         shape = self.state.shape
         with on_one_thread():
             nodes = self.manifolds().radii().detach().permute(2, 0, 1)[None]
             radii = torch.nn.functional.interpolate(nodes, size=shape, mode="bilinear", align_corners=False)
         places, uv = radii[0].permute(1, 2, 0).double().numpy(), texel_uv(self.fit.window, *shape)
-        opacity, rgb = shells_of_both(self.fit.volume, self.fit.chart, uv, places, self.params.layers)
         flat = shape[0] * shape[1], places.shape[-1]
-        self.state.believe(opacity.reshape(flat))
+
+        def held(volume: Volume) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+            opacity, rgb = shells_of_both(volume, self.fit.chart, uv, places, self.params.layers)
+            return opacity.reshape(flat), rgb.reshape(*flat, 3)
+
+        opacity, rgb = held(self.fit.volume)
+        self.state.believe(opacity)
         if fill:
-            self.state.fill(opacity.reshape(flat), rgb.reshape(*flat, 3) if colours else None)
+            self.state.fill(opacity, rgb if colours else None)
+            for frame in range(self.scene.num_frames):
+                splats = self.teacher.moved(frame, self.pictures.photos)
+                if splats is not None:
+                    self.state.fill_frame(frame, held(volume_in(self.scene, splats))[0])
 
     def _recentre(self) -> None:
         """Move the middle radius to where this round found opacity, mean over frames."""
