@@ -230,21 +230,12 @@ class Trainer:
 
     def result(self, fingerprint: str) -> tuple[RadianceManifolds, ExplicitSpec]:
         """The model, without the layers that show nothing."""
-        assert self.state is not None
-        state, n = self.state, self.params.layers
-        assert self.views is not None
+        assert self.state is not None and self.views is not None
+        state = self.state
         state.forget_moments()
         self.events += clear_texels(state, self.views, self._stride(), self.params.pruning)
-        peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
-        shows = (peak >= LAYER_ALPHA).tolist()
-        kept = [i for i in range(n) if shows[i]] or [n // 2]
-        # Layers stay where they are: the first surface's must still be evenly spaced, so only outer and inner ones go.
-        first, last = kept[0], kept[-1]
-        below = [i for i in range(n, self.layers) if shows[i]]
-        stay = [*range(first, last + 1), *below]
-        self.events += [
-            fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in range(self.layers) if i not in stay
-        ]
+        above, below = self._kept_layers(state)
+        first, last, stay = above[0], above[-1], [*above, *below]
         radii = self.manifolds().radii().detach()
         outer, inner = radii[..., first], radii[..., last]
         h, w = state.shape
@@ -272,6 +263,17 @@ class Trainer:
             fingerprint=fingerprint,
         )
         return RadianceManifolds(manifolds, textures), spec
+
+    def _kept_layers(self, state: TextureState) -> tuple[list[int], list[int]]:
+        """Those of the first and of the second surface without what shows nothing. Layers stay where they are: the
+        first surface's must still be evenly spaced, so only outer and inner ones go."""
+        peak = torch.stack([state.activated(k)[..., 3].amax(0).clone() for k in range(self.scene.num_frames)]).amax(0)
+        shows, n = (peak >= LAYER_ALPHA).tolist(), self.params.layers
+        kept = [i for i in range(n) if shows[i]] or [n // 2]
+        above, below = list(range(kept[0], kept[-1] + 1)), [i for i in range(n, self.layers) if shows[i]]
+        gone = sorted(set(range(self.layers)) - {*above, *below})
+        self.events += [fact("layer_dropped", layer=i, alpha=float(peak[i])) for i in gone]
+        return above, below
 
     def summary(self, spec: ExplicitSpec) -> dict[str, Any]:
         """`fit.json`: what was chosen, and why."""
