@@ -40,17 +40,12 @@ MARGIN = 2
 """Triangles this near, in samples, to a place that shows are kept."""
 
 
-def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
-    """Meshes of all layers, outermost first, over one triangulation.
+def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
+    """Number of vertices -> meshes of all layers, outermost first, over one triangulation; one sequence of collapses.
 
     A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
     frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
     """
-    return decimated_ladder(sheets, [max_vertices])[max_vertices]
-
-
-def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
-    """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
     st, uv, faces = sheets.st.reshape(-1, 2), vertex_uv(sheets), sheet_faces(sheets)
     groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
     shows = contribution(sheets.opacity, MIN_VISIBILITY)
