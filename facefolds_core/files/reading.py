@@ -150,7 +150,7 @@ def read_bytes(path: Path, remedy: str, *, place: str | None = None, missing: st
         raise UserError(words, file=path, place=place, found=error.strerror, remedy=remedy) from None
 
 
-def read_text(path: Path, remedy: str, *, expected: str, missing: str = "file not found") -> str:
+def read_text(path: Path, remedy: str, *, expected: str) -> str:
     """The text of a regular file in UTF-8, with or without a byte order mark (which is taken off).
 
     Args:
@@ -159,7 +159,7 @@ def read_text(path: Path, remedy: str, *, expected: str, missing: str = "file no
     Raises:
         UserError: as `read_bytes`; if it is not UTF-8.
     """
-    data = read_bytes(path, remedy, missing=missing)
+    data = read_bytes(path, remedy)
     wide = _WIDE.get(data[:2])
     if wide is not None:
         raise UserError(
