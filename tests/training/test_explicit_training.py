@@ -14,15 +14,12 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.files.frame_store import write_frames
-from facefolds_core.geometry.chart import Chart
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.subject.outline import Profile
-from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import TextureState
 from tests.scenes import OPAQUE, make_scene
 
@@ -139,17 +136,6 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
         np.linalg.norm(c.project(np.zeros(3))[0] - c.project(1e-4 * c.rotation[0])[0]) for c in cameras
     ]  # pixels, of a step to the camera's right
     assert fit.pixel_size(scene) == pytest.approx(1e-4 / float(np.median(apart)), rel=0.02)
-
-
-def test_plan_spends_all_iterations() -> None:
-    ones = np.ones((4, 4))
-    window = (-0.5, 0.5, -0.5, 0.5)
-    maps = ones, ones, 0 * ones, 0 * ones, ones, ones, np.ones((4, 4, 3))
-    volume = Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
-    chosen = fit.Fit(Chart((0, 0, 0)), window, *maps, (128, 96), (), (), volume, {}, 30.0)
-    levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)
-    assert sum(level.iterations for level in levels) == 400
-    assert levels[-1].texels == (128, 96)
 
 
 def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
