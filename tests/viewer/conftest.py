@@ -105,6 +105,17 @@ class Player:
         return captured(self.page, camera)
 
 
+def touching(player: Player) -> Callable[..., object]:
+    """What touches the screen: takes a kind, "touchStart", "touchMove" or "touchEnd", and the fingers' (x, y)."""
+    client = player.page.context.new_cdp_session(player.page)
+
+    def touch(kind: str, *points: tuple[float, float]) -> object:
+        places = [{"x": x, "y": y} for x, y in points]
+        return client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+    return touch
+
+
 def page_of_yours(player: Player, body: str) -> None:
     """Open a page with `body` and the module of the player, without any policy, from the player's own server."""
     script = '<script type="module" src="facefolds-player.js"></script>'

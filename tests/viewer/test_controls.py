@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours, touching
 
 
 @pytest.fixture
@@ -140,10 +140,7 @@ def test_orbit_pan_and_zoom_by_pointer(player: Player) -> None:
 def test_touch_turns(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich}, viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
     player.open("asset")
-    client = player.page.context.new_cdp_session(player.page)
-    touch = lambda kind, *points: client.send(  # noqa: E731
-        "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
-    )
+    touch = touching(player)
     touch("touchStart", (200, 250))
     for x in (180, 150, 120):
         touch("touchMove", (x, 250))
