@@ -182,13 +182,13 @@ class _Progress:
         self.psnr = psnr
 
     def update(self, losses: Losses, iteration: int) -> None:
-        values = [float(value.detach()) for value in asdict_shallow(losses).values()]
+        values = [float(value.detach()) for value in vars(losses).values()]
         self.sums = [a + b for a, b in zip(self.sums, values, strict=True)] if self.count else values
         self.count += 1
         self.bar.update()
         if iteration % self.every and iteration < self.params.iterations:
             return
-        means = dict(zip(asdict_shallow(losses), (s / self.count for s in self.sums), strict=True))
+        means = dict(zip(vars(losses), (s / self.count for s in self.sums), strict=True))
         self.psnr = -10 * math.log10(max(means.pop("squared_error"), 1e-10))
         now = time.perf_counter()
         rates = learning_rates(self.params, iteration - 1)
@@ -203,10 +203,6 @@ class _Progress:
     def close(self) -> None:
         self.bar.close()
         self.live.end()
-
-
-def asdict_shallow(losses: Losses) -> dict[str, torch.Tensor]:
-    return dict(vars(losses))
 
 
 def _trim_log(folder: Path, iteration: int) -> None:
