@@ -142,7 +142,7 @@ def test_a_layer_that_shows_nowhere_keeps_its_faces(sheets: Sheets) -> None:
 
 def test_contributions_are_compositing_weights_with_a_floor() -> None:
     opacity = np.array([51, 255, 255], np.uint8)[:, None, None]
-    assert contribution(opacity, 0.05)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
+    assert contribution(opacity)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
 
 
 def test_a_ladder_is_what_each_number_of_vertices_gives_alone(sheets: Sheets) -> None:

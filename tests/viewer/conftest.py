@@ -125,6 +125,16 @@ def page_of_yours(player: Player, body: str) -> None:
     player.page.goto(f"{player.address}yours.html")
 
 
+def listening(page: Page) -> tuple[list[str], list[str]]:
+    """What a page says on its console or as an error, and the addresses that it asks for, from now on."""
+    said: list[str] = []
+    fetched: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: fetched.append(request.url))
+    return said, fetched
+
+
 NewPlayer = Callable[..., Player]
 
 

@@ -10,7 +10,7 @@ from playwright.sync_api import Page
 
 import facefolds_core as facefolds
 from facefolds_core.api import asset as shown
-from tests.viewer.conftest import PATIENCE
+from tests.viewer.conftest import PATIENCE, listening
 
 
 def test_an_asset_plays_in_a_notebook(
@@ -20,11 +20,7 @@ def test_an_asset_plays_in_a_notebook(
     notebook = tmp_path / "notebook.html"
     notebook.write_text(f"<!doctype html><title>x</title>{facefolds.load_asset(rich)._repr_html_()}", encoding="utf-8")
     page = new_page()
-    said: list[str] = []
-    fetched: list[str] = []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: fetched.append(request.url))
+    said, fetched = listening(page)
     page.goto(notebook.as_uri())
     page.frame_locator("iframe").locator("facefolds-player").wait_for()
     playing = "() => { const e = document.querySelector('facefolds-player'); return e.ready && e.playing; }"

@@ -12,17 +12,13 @@ from facefolds_core.asset import read_asset
 from facefolds_core.reporting import face
 from facefolds_core.reporting.build import make_report
 from tests.reporting.tiny import make_subject
-from tests.viewer.conftest import PATIENCE
+from tests.viewer.conftest import PATIENCE, listening
 
 
 def test_the_face_plays_in_the_report(new_page: Callable[..., Page], player_folder: Path, tmp_path: Path) -> None:
     report = make_report(make_subject(tmp_path / "somebody"), player=player_folder)
     page = new_page(viewport={"width": 1440, "height": 900})
-    said: list[str] = []
-    fetched: list[str] = []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: fetched.append(request.url))
+    said, fetched = listening(page)
     page.goto(report.as_uri())
     inner = page.frame_locator("iframe").locator("facefolds-player")
     inner.wait_for()
