@@ -71,11 +71,13 @@ class Player:
         if kind in ("error", "warning"):
             self.said.append(f"{kind}: {text}")
 
-    def open(self, asset: str, view: str = "frame=0", wait: bool = True) -> None:
-        """Open the page with the asset served as `asset`; by default at rest, at frame 0."""
+    def open(self, asset: str, view: str = "frame=0", wait: bool = True, full: bool = False) -> None:
+        """Open the page with the asset served as `asset`; by default at rest, at frame 0. `full`: at its full level."""
         self.page.goto(f"{self.address}?src={asset}/#{view}")
         if wait:
             self.wait("e.ready")
+        if full:
+            self.wait("e.level === 'full'")
 
     def wait(self, condition: str) -> None:
         """Wait until a JavaScript condition on the element `e` holds."""

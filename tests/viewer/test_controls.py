@@ -16,8 +16,7 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player(
         {"asset": rich}, viewport={"width": 760, "height": 500}, permissions=["clipboard-write", "clipboard-read"]
     )
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     return player
 
 

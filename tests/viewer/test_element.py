@@ -246,8 +246,7 @@ def test_a_folder_without_an_address_plays(new_player: NewPlayer, rich: Path, tm
     """A ZIP that is dropped on the page."""
     archive = Path(shutil.make_archive(str(tmp_path / "asset"), "zip", rich.parent, rich.name))
     player = new_player({"asset": rich})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     code = """const bytes = Uint8Array.from(atob(v), (sign) => sign.charCodeAt(0)); const transfer = new DataTransfer();
         transfer.items.add(new File([bytes], 'asset.zip')); window.before = e.player;
         dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, cancelable: true, bubbles: true }));"""

@@ -262,15 +262,13 @@ def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, a
     path.write_bytes(data)
     change_manifest(asset, lambda value: value["levels"][1]["texture"]["videos"][0].update(file_entry(path)))
     player = new_player({"asset": asset})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     assert player.run("return e.statistics.video") == "vp9"
 
 
 def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Path) -> None:
     player = new_player({"asset": asset}, allow=())
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     before = player.capture()
     player.run(
         """const { gl } = e.player.renderer.graphics;
