@@ -161,7 +161,7 @@ def test_wide_layers_keep_their_distance_from_the_centre() -> None:
     assert (fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= fit.MIN_RADIUS - 1e-12).all()
 
 
-def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+def test_a_missing_image_is_said_at_once(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", size=8)
     image = np.zeros((8, 8, 3), np.uint8)
     write_frames(scene.folder / "frames.arrow", image.shape, [(i, 0, image) for i in range(len(scene.cameras))])

@@ -94,6 +94,6 @@ def test_other_frame_counts_and_a_cut_video(copied: Path) -> None:
         read(copied)
 
 
-def test_it_is_recognised(filmed: Path, tmp_path: Path) -> None:
+def test_it_is_recognised(filmed: Path) -> None:
     found = neural3d.recognise(filmed)
     assert found is not None and found.keys == {"holdout": ["cam00"]}
