@@ -16,7 +16,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
-from facefolds_core.model.textures import MlpTextures
 from facefolds_core.params import MlpParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import (
@@ -41,9 +40,6 @@ DECAY_MANIFOLD, DECAY_TEXTURE = 0.05, 0.20
 
 LAMBDA_VIEW = 1.0
 """Weight of the mean |view term|^2: the paper's."""
-
-INITIAL_ALPHA_LOGIT = -1.5
-"""Bias of the opacity at the start, before the sigmoid. Ours: all layers are seen."""
 
 SHAPE: dict[str, Any] = {
     "manifold_layers": 3,
@@ -83,8 +79,6 @@ def new_state(params: MlpParams, spec: ModelSpec, device: torch.device) -> Train
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(params.seed)
         model = build_model(spec).to(device)
-    if isinstance(model.textures, MlpTextures):
-        model.textures.start_alpha(INITIAL_ALPHA_LOGIT)
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
