@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +20,7 @@ from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import ActorOptions, frame_times, make_rig, render
 from facefolds_core.captures.assembly import plan_scene, write_plan
+from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import SOURCES
 from facefolds_core.geometry.cameras import Camera
@@ -79,6 +80,17 @@ def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -
         mattes=np.array([[np.rint(255 * p.opacity).astype(np.uint8) for p in row] for row in pictures]),
         plates=np.array([plate.rgb for plate in plates]),
     )
+
+
+def reader(source: str, **given: object) -> Callable[..., Capture]:
+    """What reads a capture of a layout: from a place, with keys of its subject besides those given here."""
+
+    def read(root: Path, **keys: object) -> Capture:
+        subject = Subject(source=source, path="x", **{**given, **keys})  # type: ignore[arg-type]
+        capture: Capture = SOURCES[source].read(root, subject, CaptureParams())
+        return capture
+
+    return read
 
 
 def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **subject: object) -> Scene:

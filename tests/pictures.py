@@ -37,13 +37,13 @@ def psnr(found: NDArray[Any], expected: NDArray[Any]) -> float:
 
 
 def expected_pictures(
-    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int], background: float = GREY_VALUE
+    asset: Asset | AssetLevel, cameras: Sequence[Camera], frames: Sequence[int]
 ) -> dict[tuple[str, int], NDArray[np.float32]]:
     """One ray a pixel, over grey, the head at rest: by camera's name and frame (H, W, 3) in [0, 1]."""
     caster = AssetCaster(asset)
     hits = {camera.name: caster.cast(camera) for camera in cameras}
     return {
-        (name, frame): composite(hit, textures, (background,) * 3)[0]
+        (name, frame): composite(hit, textures, (GREY_VALUE,) * 3)[0]
         for frame, textures in [(frame, asset.frame(frame)) for frame in frames]
         for name, hit in hits.items()
     }

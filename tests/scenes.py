@@ -51,7 +51,6 @@ class SphereLayer:
 
 
 OPAQUE = (SphereLayer(0.33, 1.0, 4.0),)
-TWO_LAYERS = (SphereLayer(0.34, 0.5, 3.0), SphereLayer(0.31, 1.0, 5.0))
 
 
 def first_hit(origins: Array, directions: Array, radius: float) -> tuple[Array, NDArray[np.bool_]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from facefolds_core.asset.checks import mesh_problems
 from facefolds_core.errors import UserError
@@ -36,25 +37,16 @@ def check_textures(textures: FrameStore, layers: int | None = None) -> int:
     Raises:
         UserError: if it does not; where `layers` is None, of any number of them.
     """
-    remedy = "run `dvc repro` to make the textures again"
+    wrong = partial(UserError, file=textures.path, remedy="run `dvc repro` to make the textures again")
     if textures.channels != 4 or textures.height != textures.width:
-        raise UserError(
-            "the textures are not square RGBA images",
-            file=textures.path,
-            found=f"{textures.height} x {textures.width} x {textures.channels}",
-            remedy=remedy,
-        )
+        found = f"{textures.height} x {textures.width} x {textures.channels}"
+        raise wrong("the textures are not square RGBA images", found=found)
     keys = textures.keys()
     frames = 1 + max((frame for _, frame in keys), default=-1)
     layers = 1 + keys[-1][0] if layers is None and keys else layers or 1
     if frames == 0 or keys != [(layer, frame) for layer in range(layers) for frame in range(frames)]:
-        raise UserError(
-            "the texture store is not complete",
-            file=textures.path,
-            expected=f"{layers} layers x {frames} frames",
-            found=f"{len(keys)} images",
-            remedy=remedy,
-        )
+        expected = f"{layers} layers x {frames} frames"
+        raise wrong("the texture store is not complete", expected=expected, found=f"{len(keys)} images")
     return frames
 
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from facefolds_core.asset.checks import layout_of, manifest_problems, mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.manifest import REMEDY, Layer, Level, Manifest
-from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, parse_manifest
 from facefolds_core.asset.reflection import read_reflection
 from facefolds_core.asset.segments import decode_segments
@@ -71,13 +70,9 @@ class AssetLevel:
         Raises:
             UserError: if its picture is damaged.
         """
-        self._refuse_changed(self.entry.reflection)
+        if self.entry.reflection is not None:
+            refuse_changed(self.folder, self.entry.reflection)
         return read_reflection(self.folder, self.entry)
-
-    def _refuse_changed(self, entry: StoredFile | None) -> None:
-        """Raise UserError if a file that the level may have is not as the manifest says."""
-        if entry is not None:
-            refuse_changed(self.folder / entry.file, entry.bytes, entry.sha256, REMEDY)
 
     @property
     def windows(self) -> list[Window]:
@@ -126,7 +121,7 @@ class AssetLevel:
         video = texture.videos[self.video]
         if video.segments is not None:
             return decode_segments(self.folder, video, texture, start)
-        refuse_changed(self._path, video.bytes, video.sha256, REMEDY)
+        refuse_changed(self.folder, video)
         return decode_video(self._path, (texture.width, texture.height), texture.fps, start)
 
     def _decode(self, start: int) -> Iterator[Frame]:
@@ -231,7 +226,7 @@ def read_level(folder: Path, level: Level, track: Track | None = None) -> AssetL
         UserError: if a mesh is damaged.
     """
     for file in level.meshes:
-        refuse_changed(folder / file.file, file.bytes, file.sha256, REMEDY)
+        refuse_changed(folder, file)
     layers = tuple(_read_layer(folder, layer, f"layer {index}") for index, layer in enumerate(level.layers))
     return AssetLevel(folder, level, layers, track=track)
 
@@ -242,7 +237,7 @@ def layer_bytes(folder: Path, layer: Layer) -> bytes:
     Raises:
         UserError: if its bytes are not the manifest's.
     """
-    return read_slice(folder / layer.mesh, layer.offset, layer.bytes, layer.sha256, REMEDY)
+    return read_slice(folder / layer.mesh, layer.offset, layer.bytes, layer.sha256)
 
 
 def _read_layer(folder: Path, layer: Layer, place: str) -> TexturedMesh:

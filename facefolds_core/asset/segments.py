@@ -70,4 +70,4 @@ def _part(folder: Path, video: Video, index: int) -> BytesIO:
     """The header and a segment, checked."""
     assert video.init is not None and video.segments is not None
     path, parts = folder / video.file, (video.init, video.segments[index])
-    return BytesIO(b"".join(read_slice(path, part.offset, part.bytes, part.sha256, REMEDY) for part in parts))
+    return BytesIO(b"".join(read_slice(path, part.offset, part.bytes, part.sha256) for part in parts))

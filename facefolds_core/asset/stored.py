@@ -9,10 +9,17 @@ import stat
 from functools import lru_cache
 from pathlib import Path
 
+from facefolds_core.asset.manifest import REMEDY
+from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.errors import UserError
 from facefolds_core.files.writing import file_sha256
 
 MISSING = "the file is missing"
+
+
+def stored_file(path: Path) -> StoredFile:
+    """What a manifest says of a file that has been written."""
+    return StoredFile(file=path.name, bytes=path.stat().st_size, sha256=file_sha256(path))
 
 
 def special_problem(path: Path) -> str | None:
@@ -45,22 +52,24 @@ def check_file(path: Path, size: int, sha256: str) -> str | None:
     return None
 
 
-def refuse_changed(path: Path, size: int, sha256: str, remedy: str) -> None:
+def refuse_changed(folder: Path, file: StoredFile) -> None:
     """Check a file again before it is decoded. Without another read where its inode says that nothing was written.
 
     Raises:
         UserError: if it is not (or no longer) what the manifest says.
     """
+    path = folder / file.file
     try:
         status = path.stat()
-        problem = _checked(path, size, sha256, (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns))
+        inode = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+        problem = _checked(path, file.bytes, file.sha256, inode)
     except (OSError, ValueError):
         problem = special_problem(path) or "the file cannot be read"
     if problem:
-        raise UserError("damaged asset", file=path, found=problem, remedy=remedy)
+        raise UserError("damaged asset", file=path, found=problem, remedy=REMEDY)
 
 
-def read_slice(path: Path, offset: int, size: int, sha256: str, remedy: str) -> bytes:
+def read_slice(path: Path, offset: int, size: int, sha256: str) -> bytes:
     """Some bytes of a file, checked.
 
     Raises:
@@ -72,10 +81,10 @@ def read_slice(path: Path, offset: int, size: int, sha256: str, remedy: str) -> 
             data = file.read(size)
     except OSError as error:
         found = f"the file cannot be read: {error.strerror}"
-        raise UserError("damaged asset", file=path, found=found, remedy=remedy) from None
+        raise UserError("damaged asset", file=path, found=found, remedy=REMEDY) from None
     if hashlib.sha256(data).hexdigest() != sha256:
         found = f"the SHA-256 of the {size} bytes from byte {offset} on is not the manifest's"
-        raise UserError("damaged asset", file=path, found=found, remedy=remedy)
+        raise UserError("damaged asset", file=path, found=found, remedy=REMEDY)
     return data
 
 

@@ -22,11 +22,11 @@ import av
 
 from facefolds_core.asset.containers import container_of
 from facefolds_core.asset.manifest import Level, Segment, Texture, Video
-from facefolds_core.asset.manifest_base import ByteRange, StoredFile
+from facefolds_core.asset.manifest_base import ByteRange
 from facefolds_core.asset.manifest_extras import Audio, Stream
 from facefolds_core.asset.segments import probe_segments
+from facefolds_core.asset.stored import stored_file
 from facefolds_core.asset.video import FORMATS
-from facefolds_core.files.writing import file_sha256
 
 DASH, HLS = "stream.mpd", "stream.m3u8"
 _NAMESPACE = {"mpd": "urn:mpeg:dash:schema:mpd:2011"}
@@ -80,9 +80,9 @@ def make_streams(
     streamed = [
         _with_videos(level, [made[level.name, video.file] for video in level.texture.videos]) for level in levels
     ]
-    sound = None if audio is None else audio.model_copy(update=_stored(folder / "audio.mp4").model_dump())
-    playlists = tuple(_stored(folder / name) for name in [HLS, *(track.playlist for track in tracks)])
-    return streamed, sound, Stream(dash=_stored(folder / DASH), hls=playlists)
+    sound = None if audio is None else audio.model_copy(update=stored_file(folder / "audio.mp4").model_dump())
+    playlists = tuple(stored_file(folder / name) for name in [HLS, *(track.playlist for track in tracks)])
+    return streamed, sound, Stream(dash=stored_file(folder / DASH), hls=playlists)
 
 
 def _name(level: Level, video: Video) -> str:
@@ -170,7 +170,7 @@ def _segmented(folder: Path, name: str, video: Video, texture: Texture, ranges: 
             parts.append({"offset": first, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()})
     frames = [after - first for first, after in pairwise(places)]
     segments = tuple(Segment(**part, frames=count) for part, count in zip(parts[1:], frames, strict=True))
-    update = {**_stored(path).model_dump(), "container": "mp4", "init": ByteRange(**parts[0]), "segments": segments}
+    update = {**stored_file(path).model_dump(), "container": "mp4", "init": ByteRange(**parts[0]), "segments": segments}
     made = video.model_copy(update=update)
     facts = probe_segments(folder, made, texture)
     return made.model_copy(update={"mime": facts.mime, "level": facts.level})
@@ -180,7 +180,3 @@ def _with_videos(level: Level, videos: Sequence[Video]) -> Level:
     more = sum(video.bytes for video in videos) - sum(video.bytes for video in level.texture.videos)
     texture = level.texture.model_copy(update={"videos": tuple(videos)})
     return level.model_copy(update={"texture": texture, "bytes": level.bytes + more})
-
-
-def _stored(path: Path) -> StoredFile:
-    return StoredFile(file=path.name, bytes=path.stat().st_size, sha256=file_sha256(path))

@@ -42,7 +42,7 @@ def read_track(folder: Path, manifest: Manifest) -> Track | None:
     if entry is None:
         return None
     path = folder / entry.file
-    data = read_slice(path, 0, entry.bytes, entry.sha256, REMEDY)
+    data = read_slice(path, 0, entry.bytes, entry.sha256)
     problems = track_problems(manifest, data)
     if problems:
         raise UserError("damaged track", file=path, found="; ".join(problems), remedy=REMEDY)

@@ -46,7 +46,7 @@ def validate_asset(folder: str | Path) -> list[str]:
     try:
         manifest = parse_manifest(path)
     except UserError as error:
-        return [_in_words(MANIFEST_NAME, error)]
+        return [_in_words(error)]
     said = manifest_problems(path, manifest)
     problems = [f"{MANIFEST_NAME}: {problem}" for problem in said]
     whole = set()
@@ -121,9 +121,9 @@ def summary(manifest: Manifest) -> str:
     return f"{manifest.subject}: {texture.frames} frames at {texture.fps:g} fps; {levels}"
 
 
-def _in_words(name: str, error: UserError) -> str:
-    """A `UserError` on one line."""
-    parts = [f"{name}: {error.message}"]
+def _in_words(error: UserError) -> str:
+    """A `UserError` of the manifest on one line."""
+    parts = [f"{MANIFEST_NAME}: {error.message}"]
     fields = (("place", error.place), ("expected", error.expected), ("found", error.found))
     parts += [f"{word} {value}" for word, value in fields if value is not None]
     return ", ".join(parts)

@@ -33,9 +33,9 @@ from facefolds_core.asset.packing import AtlasLayout, check_layout
 from facefolds_core.asset.parts import encode_parts
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.regions import Region
+from facefolds_core.asset.stored import stored_file
 from facefolds_core.asset.track_file import write_track
 from facefolds_core.asset.video import key_frames, pack_frame, probe_video
-from facefolds_core.files.writing import file_sha256
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.track import Track
 
@@ -242,9 +242,7 @@ def _shared_key_frames(videos: Sequence[Path]) -> tuple[int, ...]:
 def _video_entry(path: Path, codec: Codec) -> Video:
     facts = probe_video(path)
     return Video(
-        file=path.name,
-        bytes=path.stat().st_size,
-        sha256=file_sha256(path),
+        **stored_file(path).model_dump(),
         container=codec.container,
         codec=codec.name,
         mime=facts.mime,

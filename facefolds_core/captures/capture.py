@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -131,29 +132,21 @@ def select_frames(
     Raises:
         UserError: if there is no such frame, or the range is empty.
     """
+    wrong = partial(UserError, file=file, place="frames", remedy="correct `frames` of this subject in params.yaml")
     if isinstance(wanted, tuple):
         unknown = [name for name in wanted if name not in names]
         if unknown or not wanted:
-            raise UserError(
-                f"frames of `subjects` that {what} does not have" if unknown else "an empty list of frames",
-                file=file,
-                place="frames",
-                expected=f"some of {shorten(names)}",
-                found=shorten(unknown),
-                remedy="correct `frames` of this subject in params.yaml",
-            )
+            message = f"frames of `subjects` that {what} does not have" if unknown else "an empty list of frames"
+            raise wrong(message, expected=f"some of {shorten(names)}", found=shorten(unknown))
         return sorted(set(wanted), key=list(names).index)
     if wanted is None:
         return list(names)
     chosen = list(names)[wanted.start : wanted.stop : wanted.step]
     if not chosen:
-        raise UserError(
+        raise wrong(
             "the range of frames is empty",
-            file=file,
-            place="frames",
             expected=f"positions from 0 to {len(names) - 1} ({what} has {len(names)} frames: {shorten(names)})",
             found=f"start {wanted.start}, stop {wanted.stop}, step {wanted.step}",
-            remedy="correct `frames` of this subject in params.yaml",
         )
     return chosen
 

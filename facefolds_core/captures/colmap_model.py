@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_regular, read_bytes, read_text
 from facefolds_core.geometry.cameras import HUGE
+from facefolds_core.geometry.track import rotation
 
 Array = NDArray[np.float64]
 
@@ -135,13 +136,7 @@ def _w2c(pose: list[float], file: Path, place: str) -> Array:
     length = np.linalg.norm(np.where(np.abs(q) <= HUGE, q, np.inf))
     if not (np.abs(pose) <= HUGE).all() or not 0.5 < length < 2:
         raise _wrong(file, place, "a garbled pose", "a quaternion of length 1 and a translation", pose)
-    w, x, y, z = q / length
-    rotation = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.concatenate([np.array(rotation), t[:, None]], 1)
+    return np.concatenate([rotation(q / length), t[:, None]], 1)
 
 
 def _cameras_txt(file: Path) -> Iterator[Row]:

@@ -7,6 +7,7 @@ For each camera eight lines: its name; the three rows of K; five distortion valu
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ from facefolds_core.geometry.cameras import HUGE, Camera, check_camera
 FULL_SIZE = (1334, 2048)
 """(width, height) of Multiface's own images, v1 and v2."""
 _REMEDY = "copy KRT again from the dataset, or mend this line"
+_wrong = partial(UserError, remedy=_REMEDY)
+
 _ROWS = (3, 3, 3, 5, 4, 4, 4)
 
 
@@ -29,9 +32,7 @@ def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
     except ValueError:
         values = []
     if len(values) != count or not (np.abs(values) <= HUGE).all() or "_" in text:
-        raise UserError(
-            "garbled KRT", file=path, place=place, expected=f"{count} numbers", found=repr(text)[:200], remedy=_REMEDY
-        )
+        raise _wrong("garbled KRT", file=path, place=place, expected=f"{count} numbers", found=repr(text)[:200])
     return values
 
 
@@ -50,16 +51,10 @@ def read_krt(path: Path) -> list[Calibration]:
         block = lines[first : first + 8]
         camera = _camera(block, path)
         if any(camera.name == other.name for other in cameras):
-            raise UserError(
-                "a camera appears twice in KRT",
-                file=path,
-                place=f"line {block[0][0]}",
-                found=camera.name,
-                remedy=_REMEDY,
-            )
+            raise _wrong("a camera appears twice in KRT", file=path, place=f"line {block[0][0]}", found=camera.name)
         cameras.append(camera)
     if not cameras:
-        raise UserError("KRT is empty", file=path, expected="at least one camera", remedy=_REMEDY)
+        raise _wrong("KRT is empty", file=path, expected="at least one camera")
     return cameras
 
 
@@ -67,26 +62,20 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
     """Parse the lines [(number, text)] of one camera."""
     number, name = block[0]
     if len(name.split()) != 1:
-        raise UserError(
-            "garbled KRT",
-            file=path,
-            place=f"line {number}",
-            expected="the name of a camera",
-            found=repr(name)[:200],
-            remedy=_REMEDY,
+        raise _wrong(
+            "garbled KRT", file=path, place=f"line {number}", expected="the name of a camera", found=repr(name)[:200]
         )
     rows = [
         _numbers(text, count, path, f"line {line} (camera {name})")
         for (line, text), count in zip(block[1:], _ROWS, strict=False)
     ]
     if len(rows) < len(_ROWS):
-        raise UserError(
+        raise _wrong(
             "KRT is truncated",
             file=path,
             place=f"line {block[-1][0]}, the last one (camera {name})",
             expected="8 lines a camera",
             found=f"{len(block)} lines",
-            remedy=_REMEDY,
         )
     place = f"camera {name}, lines {number} to {block[-1][0]}"
     camera = Calibration(name, np.array(rows[0:3]), np.array(rows[4:7]), path, place, np.array(rows[3]))

@@ -6,6 +6,7 @@ and the faces; the transform is 3 x 4, head -> world, X_w = R X + t.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from facefolds_core.system.spill import spilled
 
 Array = NDArray[np.float64]
 _REMEDY = "copy the file again from the dataset, or choose other frames for this subject in params.yaml"
+_wrong = partial(UserError, remedy=_REMEDY)
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
@@ -42,13 +44,8 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
                 corners = [int(word.split("/")[0]) - 1 for word in words[1:]]
                 faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
     except (ValueError, IndexError, OverflowError) as error:
-        raise UserError(
-            "garbled mesh",
-            file=path,
-            place=f"line {number}",
-            expected="`v x y z` or `f a b c`",
-            found=str(error),
-            remedy=_REMEDY,
+        raise _wrong(
+            "garbled mesh", file=path, place=f"line {number}", expected="`v x y z` or `f a b c`", found=str(error)
         ) from None
     points, triangles = np.array(vertices, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
     if (
@@ -58,13 +55,12 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
         or triangles.min() < 0
         or triangles.max() >= len(points)
     ):
-        raise UserError(
+        raise _wrong(
             "garbled mesh",
             file=path,
             expected="finite vertices, and faces that name them",
             found=f"{len(points)} vertices, {len(triangles)} triangles"
             + (f", vertex numbers {triangles.min() + 1} to {triangles.max() + 1}" if len(triangles) else ""),
-            remedy=_REMEDY,
         )
     return points, triangles.astype(np.int32)
 
@@ -80,22 +76,20 @@ def read_bin(path: Path, count: int | None) -> Array:
     """
     data = read_bytes(path, _REMEDY)
     if not data or len(data) % 12 or (count is not None and len(data) != 12 * count):
-        raise UserError(
+        raise _wrong(
             "the tracked mesh has a wrong length",
             file=path,
             expected="a multiple of 12 bytes" if count is None else f"{12 * count} bytes ({count} vertices of 12)",
             found=f"{len(data)} bytes",
-            remedy=_REMEDY,
         )
     points = np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
     zeros = int((points == 0).all(1).sum())
     if zeros > 1:
-        raise UserError(
+        raise _wrong(
             "a damaged tracked mesh",
             file=path,
             expected="vertices in different places",
             found=f"{zeros} of {len(points)} exactly at 0 0 0, as after an interrupted copy",
-            remedy=_REMEDY,
         )
     return points
 
@@ -116,26 +110,22 @@ def parse_pose(text: str, path: Path) -> Array:
     except ValueError:
         pose = np.zeros(0)
     if pose.shape != (3, 4):
-        raise UserError(
-            "garbled head pose", file=path, expected="3 rows of 4 numbers", found=repr(text[:60]), remedy=_REMEDY
-        )
+        raise _wrong("garbled head pose", file=path, expected="3 rows of 4 numbers", found=repr(text[:60]))
     if not (np.abs(pose) <= HUGE).all():
         finite = bool(np.isfinite(pose).all())
-        raise UserError(
+        raise _wrong(
             f"the head pose has numbers that are {'beyond sense' if finite else 'not finite'}",
             file=path,
             expected=f"3 rows of 4 finite numbers, none above {HUGE:g}",
             found=pose.tolist(),
-            remedy=_REMEDY,
         )
     R = pose[:, :3]
     if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
-        raise UserError(
+        raise _wrong(
             "R of a head pose is not a rotation",
             file=path,
             expected="R R^T = I and det R = 1",
             found=f"det R = {np.linalg.det(R):.6g}",
-            remedy=_REMEDY,
         )
     return pose
 
@@ -145,12 +135,11 @@ def check_extent(points: Array, file: Path) -> None:
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     if len(points) < 3 or spread[1] <= 1e-4 * spread[0] or spread[0] <= 1e-12:
         low, high = points.min(0), points.max(0)
-        raise UserError(
+        raise _wrong(
             "the vertices of the tracked mesh lie in one point or on one line",
             file=file,
             expected="the shape of a head",
             found=f"{len(points)} vertices from {low.tolist()} to {high.tolist()}",
-            remedy=_REMEDY,
         )
 
 
@@ -192,9 +181,7 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         sound = (np.abs(points) <= HUGE).all(1)
         if len(points) != count or not sound.all():
             found = f"{len(points)} vertices, {int((~sound).sum())} of them not finite or above {HUGE:g}"
-            raise UserError(
-                "a damaged tracked mesh", file=file, expected=f"{count} finite vertices", found=found, remedy=_REMEDY
-            )
+            raise _wrong("a damaged tracked mesh", file=file, expected=f"{count} finite vertices", found=found)
         check_extent(points, file)
         if position == 0:
             vertices = spilled((len(tracked), count, 3))

@@ -72,7 +72,6 @@ class Outcome:
     job: Job
     error: str = ""
     seconds: float = 0.0
-    host: str = ""
     ran: tuple[str, ...] = ()
     metrics: Mapping[str, Any] | None = None
     log: str = ""
@@ -102,7 +101,7 @@ def do(job: Job, run: str) -> Outcome:
         try:
             root, pull = project.unfold(Path(temporary), dict(job.links), job.params, job.lock)
         except UserError as error:
-            return Outcome(job, str(error), host=socket.gethostname())
+            return Outcome(job, str(error))
 
         def tell(line: str) -> None:
             if found := RUNNING.match(line):
@@ -119,7 +118,6 @@ def do(job: Job, run: str) -> Outcome:
             job,
             error=_last_lines(log) if status else "",
             seconds=time.perf_counter() - start,
-            host=socket.gethostname(),
             ran=tuple(stage for stage in dict.fromkeys(RUNNING.findall(log)) if stage != "configure"),
             metrics=json.loads(metrics.read_text()) if not status and metrics.is_file() else {},
             log=log,

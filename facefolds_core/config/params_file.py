@@ -96,11 +96,9 @@ def load_params(path: str | Path = "params.yaml") -> Params:
         check_subject_name(name, path)
     subjects = {name: _subject(name, entry, path) for name, entry in value["subjects"].items()}
     for name, subject in subjects.items():
-        check_path_text(subject.path, name, path)
-        if subject.mattes is not None:
-            check_path_text(subject.mattes, name, path, "mattes")
-        if subject.start is not None:
-            check_path_text(subject.start, name, path, "start")
+        for key in ("path", "mattes", "start"):
+            if (given := getattr(subject, key)) is not None:
+                check_path_text(given, name, path, key)
     params = Params(subjects=subjects, sections=sections, path=str(path))
     for name in subjects:
         for stage in STAGE_SECTIONS:

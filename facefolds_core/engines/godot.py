@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest import REMEDY
 from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.stored import refuse_changed
 from facefolds_core.engines._folder import refuse_other_content, rgb_picture
@@ -80,7 +79,7 @@ def write_godot(folder: Path, level: AssetLevel, subject: str) -> int:
         }
         one = level.entry.reflection
         if one is not None:
-            refuse_changed(level.folder / one.file, one.bytes, one.sha256, REMEDY)
+            refuse_changed(level.folder, one)
             shutil.copyfile(level.folder / one.file, out / one.file)
             scales = [one.environment_scale, one.gloss_scale, one.offset_scale]
             contents["reflection"] = {**one.model_dump(mode="json", include=_OF_A_REFLECTION), "scales": scales}

@@ -40,20 +40,15 @@ MARGIN = 2
 """Triangles this near, in samples, to a place that shows are kept."""
 
 
-def decimate_sheets(sheets: Sheets, max_vertices: int) -> list[TexturedMesh]:
-    """Meshes of all layers, outermost first, over one triangulation.
+def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
+    """Number of vertices -> meshes of all layers, outermost first, over one triangulation; one sequence of collapses.
 
     A layer lacks the triangles that hold nothing of it: no sample in or near them has an alpha of 1/255 or more in any
     frame. What is left out would have shown as alpha 0, so nothing changes. A layer that shows nowhere keeps all.
     """
-    return decimated_ladder(sheets, [max_vertices])[max_vertices]
-
-
-def decimated_ladder(sheets: Sheets, counts: Sequence[int]) -> dict[int, list[TexturedMesh]]:
-    """`decimate_sheets` for several numbers of vertices, in one sequence of collapses."""
     st, uv, faces = sheets.st.reshape(-1, 2), vertex_uv(sheets), sheet_faces(sheets)
     groups = np.array_split(np.arange(sheets.num_layers), min(MEASURED_LAYERS, sheets.num_layers))
-    shows = contribution(sheets.opacity, MIN_VISIBILITY)
+    shows = contribution(sheets.opacity)
     weights = np.stack([shows[group].sum(0).reshape(-1) for group in groups], -1)
     points = np.stack([_positions(sheets, int(group[len(group) // 2]), uv) for group in groups], 1)
     quadrics = build_quadrics(points, faces, weights[faces].max(1) + EMPTY_WEIGHT)
@@ -86,10 +81,10 @@ def _meshes(
     return meshes
 
 
-def contribution(opacity: NDArray[np.uint8], least: float) -> Array:
-    """(N, n, n) compositing weights of the layers seen along the rays, at least `least` times the opacity."""
+def contribution(opacity: NDArray[np.uint8]) -> Array:
+    """(N, n, n) compositing weights of the layers seen along the rays, at least `MIN_VISIBILITY` times the opacity."""
     alpha = opacity / 255.0
-    return np.asarray(alpha * np.maximum(transmittance_before(alpha, 0), least))
+    return np.asarray(alpha * np.maximum(transmittance_before(alpha, 0), MIN_VISIBILITY))
 
 
 def _positions(sheets: Sheets, layer: int, uv: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from facefolds_core.asset.draco import degenerate_faces
 from facefolds_core.errors import UserError
 from facefolds_core.export.poisson import compact, largest_component
 from facefolds_core.export.stores import Grids
@@ -26,9 +27,6 @@ from facefolds_core.progress import progress
 
 AGGRESSIVENESS = (3, 5, 7)
 """Of the simplification, tried in turn until the target is reached."""
-
-FLAT = 1e-7
-"""A face is degenerate if twice its area is not above this times its longest edge squared."""
 
 Array = NDArray[np.float64]
 
@@ -90,10 +88,8 @@ def upright_faces(vertices: NDArray[np.float32], faces: NDArray[np.int32], chart
     """(F,) bool: faces that have an area and look along the chart's rays, outwards."""
     corners = vertices[faces].astype(np.float64)
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(a, b)
-    longest = np.max([(edge**2).sum(-1) for edge in (a, b, b - a)], axis=0)
-    outward = (normal * chart.outward(corners.mean(1))).sum(-1) > 0
-    return np.asarray(outward & (np.linalg.norm(normal, axis=-1) > FLAT * longest))
+    outward = (np.cross(a, b) * chart.outward(corners.mean(1))).sum(-1) > 0
+    return np.asarray(outward & ~degenerate_faces(vertices, faces))
 
 
 def layer_st(

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from itertools import repeat
 
 import numpy as np
 from loky import ProcessPoolExecutor
@@ -61,22 +62,14 @@ def reconstruct_layers(grids: Grids, params: ReconstructParams) -> list[Surface]
     Raises:
         UserError: if pymeshlab cannot be loaded, or a layer has too few samples or yields no surface; names the layer.
     """
-    jobs = [(gather_samples(grids, i, params.resolution), params, i) for i in range(grids.num_layers)]
-    workers = min(len(jobs), os.cpu_count() or 1)
-    with progress(total=len(jobs), desc="surfaces", unit="layer") as bar:
-        if workers == 1:
-            return [_advance(bar, _reconstruct_job(job)) for job in jobs]
-        with ProcessPoolExecutor(workers, initializer=end_with_parent) as pool:
-            return [_advance(bar, result) for result in pool.map(_reconstruct_job, jobs)]
-
-
-def _advance(bar: Any, result: Surface) -> Surface:
-    bar.update()
-    return result
-
-
-def _reconstruct_job(job: tuple[Samples, ReconstructParams, int]) -> Surface:
-    return reconstruct(*job)
+    n = grids.num_layers
+    jobs = [gather_samples(grids, i, params.resolution) for i in range(n)], repeat(params), range(n)
+    workers = min(n, os.cpu_count() or 1)
+    bar = partial(progress, total=n, desc="surfaces", unit="layer")
+    if workers == 1:
+        return list(bar(map(reconstruct, *jobs)))
+    with ProcessPoolExecutor(workers, initializer=end_with_parent) as pool:
+        return list(bar(pool.map(reconstruct, *jobs)))
 
 
 def gather_samples(grids: Grids, layer: int, resolution: int | None) -> Samples:

@@ -80,12 +80,3 @@ def sheet_mesh(sheets: Sheets, layer: int, faces: NDArray[np.int64], uv: Array) 
     vertices = sheets.chart.points(uv[used], radii)
     st = sheets.st.reshape(-1, 2)[used].astype(np.float32)
     return TexturedMesh(vertices.astype(np.float32), index.reshape(-1, 3).astype(np.int32), st)
-
-
-def full_meshes(sheets: Sheets) -> list[TexturedMesh]:
-    """All layers at the grid's resolution; no face where a sample is not valid."""
-    faces, uv = sheet_faces(sheets), vertex_uv(sheets)
-    return [
-        sheet_mesh(sheets, layer, faces[known.reshape(-1)[faces].all(1)], uv)
-        for layer, known in enumerate(sheets.valid)
-    ]

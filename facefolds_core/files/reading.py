@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from functools import partial
 from pathlib import Path
 
 from facefolds_core.errors import UserError
@@ -99,29 +100,21 @@ def check_regular(
     Raises:
         UserError: if it is missing, anything else than a regular file, or too large.
     """
+    wrong = partial(UserError, file=path, place=place, remedy=remedy)
     try:
         found = path.stat()
     except OSError as error:
         if error.errno in _MISSING:
-            raise UserError(missing, file=path, place=place, remedy=remedy) from None
+            raise wrong(missing) from None
         words = _ODD.get(error.errno or 0, error.strerror)
-        raise UserError("cannot open a file", file=path, place=place, found=words, remedy=remedy) from None
+        raise wrong("cannot open a file", found=words) from None
     except ValueError:
-        raise UserError("cannot open a file", file=repr(str(path)), place=place, found="a NUL", remedy=remedy) from None
+        raise wrong("cannot open a file", file=repr(str(path)), found="a NUL") from None
     if not stat.S_ISREG(found.st_mode):
         kind = next((words for test, words in _KINDS if test(found.st_mode)), "something else")
-        raise UserError(
-            "not a file", file=path, place=place, expected="a regular file", found=kind, remedy=remedy
-        ) from None
+        raise wrong("not a file", expected="a regular file", found=kind) from None
     if largest is not None and found.st_size > largest:
-        raise UserError(
-            "the file is too large",
-            file=path,
-            place=place,
-            expected=f"at most {largest} bytes",
-            found=f"{found.st_size} bytes",
-            remedy=remedy,
-        )
+        raise wrong("the file is too large", expected=f"at most {largest} bytes", found=f"{found.st_size} bytes")
     return found.st_size
 
 
@@ -150,7 +143,7 @@ def read_bytes(path: Path, remedy: str, *, place: str | None = None, missing: st
         raise UserError(words, file=path, place=place, found=error.strerror, remedy=remedy) from None
 
 
-def read_text(path: Path, remedy: str, *, expected: str, missing: str = "file not found") -> str:
+def read_text(path: Path, remedy: str, *, expected: str) -> str:
     """The text of a regular file in UTF-8, with or without a byte order mark (which is taken off).
 
     Args:
@@ -159,7 +152,7 @@ def read_text(path: Path, remedy: str, *, expected: str, missing: str = "file no
     Raises:
         UserError: as `read_bytes`; if it is not UTF-8.
     """
-    data = read_bytes(path, remedy, missing=missing)
+    data = read_bytes(path, remedy)
     wide = _WIDE.get(data[:2])
     if wide is not None:
         raise UserError(

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,36 +103,28 @@ def check_camera(camera: Camera, file: object, place: str) -> None:
         UserError: if K is singular or not finite, or R is not a rotation (tolerance 1e-3), naming `file` and `place`.
     """
     remedy = "mend the calibration of this camera, or take the camera out of the capture"
+    wrong = partial(UserError, file=str(file), place=place, remedy=remedy)
     numbers = np.concatenate([camera.K.ravel(), camera.w2c.ravel()])
     if not (np.abs(numbers) <= HUGE).all():
         finite = bool(np.isfinite(numbers).all())
-        raise UserError(
+        raise wrong(
             f"the camera has numbers that are {'beyond sense' if finite else 'not finite'}",
-            file=str(file),
-            place=place,
             expected=f"finite K and [R|t], no number above {HUGE:g}",
             found=f"{float(np.abs(numbers).max()):g}",
-            remedy=remedy,
         )
     K = camera.K
     fx, fy = K[0, 0], K[1, 1]
     slanted = abs(K[1, 0]) > 1e-6 * fy or abs(K[0, 1]) > fx
     if min(fx, fy) <= 1e-3 or max(fx, fy) > 10 * min(fx, fy) or slanted or not np.allclose(K[2], [0, 0, 1]):
-        raise UserError(
+        raise wrong(
             "the intrinsic matrix K is singular or not a pinhole camera's",
-            file=str(file),
-            place=place,
             expected="fx 0 cx, 0 fy cy, 0 0 1: positive focal lengths, less than tenfold different",
             found=K.tolist(),
-            remedy=remedy,
         )
     R = camera.rotation
     if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
-        raise UserError(
+        raise wrong(
             "R of [R|t] is not a rotation",
-            file=str(file),
-            place=place,
             expected="R R^T = I and det R = 1",
             found=f"det R = {np.linalg.det(R):.6g}, R = {R.tolist()}",
-            remedy=remedy,
         )

@@ -135,15 +135,13 @@ def bracket_crossings(
     )
 
 
-def refine(
-    field: Field, brackets: Brackets, levels: Tensor, origins: Tensor, directions: Tensor, steps: int = REFINEMENTS
-) -> Tensor:
+def refine(field: Field, brackets: Brackets, levels: Tensor, origins: Tensor, directions: Tensor) -> Tensor:
     """Distances [P] of the crossings inside `brackets`, with the gradient of the field's parameters."""
     o, d, level = origins[brackets.ray], directions[brackets.ray], levels[brackets.layer]
     with torch.no_grad():
         near, far, value_near, value_far = brackets.near, brackets.far, brackets.value_near, brackets.value_far
         distance = _secant(near, far, value_near, value_far)
-        for _ in range(steps):
+        for _ in range(REFINEMENTS):
             value = field.value(o + distance[:, None] * d) - level
             inside = value < 0
             near, value_near = torch.where(inside, near, distance), torch.where(inside, value_near, value)

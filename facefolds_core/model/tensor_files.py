@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+from functools import partial
 from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
@@ -60,24 +61,21 @@ def check_tensors(found: dict[str, Tensor], expected: dict[str, Tensor], path: P
     Raises:
         UserError: at the first difference, naming the tensor.
     """
+    wrong = partial(UserError, file=path, remedy=remedy)
     for name in sorted(set(found) ^ set(expected)):
-        raise UserError(
+        raise wrong(
             "the file does not belong to this configuration",
-            file=path,
             place=name,
             expected="this tensor" if name in expected else "no such tensor",
             found="no such tensor" if name in expected else "this tensor",
-            remedy=remedy,
         )
     for name, tensor in found.items():
         if tensor.shape != expected[name].shape:
-            raise UserError(
+            raise wrong(
                 "the file does not belong to this configuration",
-                file=path,
                 place=name,
                 expected=f"shape {tuple(expected[name].shape)}",
                 found=f"shape {tuple(tensor.shape)}",
-                remedy=remedy,
             )
         if tensor.is_floating_point() and not tensor.isfinite().all():
-            raise UserError("numbers that are not finite", file=path, place=name, remedy=remedy)
+            raise wrong("numbers that are not finite", place=name)

@@ -113,14 +113,9 @@ class MlpTextures(nn.Module):
                 nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
                 nn.init.zeros_(layer.bias)
             nn.init.normal_(self.base.weight, std=0.5 / width**0.5)
-            self.base.bias.copy_(torch.tensor([0.0, 0.0, 0.0, -1.5]))
+            self.base.bias.copy_(torch.tensor([0.0, 0.0, 0.0, -1.5]))  # opacity: all layers are seen. Ours
             nn.init.zeros_(self.view.weight)
             nn.init.zeros_(self.view.bias)
-
-    def start_alpha(self, logit: float) -> None:
-        """Set the bias of the opacity, of all layers and frames: before training only."""
-        with torch.no_grad():
-            self.base.bias[3] = logit
 
     def reflection_maps(self) -> ReflectionMaps | None:
         """None: the view branch is dropped at export."""

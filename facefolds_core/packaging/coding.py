@@ -15,9 +15,9 @@ from facefolds_core.asset.writer import LevelContent, write_level
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging import rate
 from facefolds_core.packaging.attention import regions_of
-from facefolds_core.packaging.settings import LevelSetting, VideoSetting
+from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.packaging.views import FRAMES, ViewMeter
-from facefolds_core.params import CodecName
+from facefolds_core.params import CodecName, VideoCodec
 from facefolds_core.spacing import spread
 
 
@@ -73,7 +73,7 @@ def _crf(
     content: LevelContent,
     regions: Sequence[Region],
     codec: Codec,
-    video: VideoSetting,
+    video: VideoCodec,
     meter: ViewMeter,
     target: float,
 ) -> int:
@@ -87,4 +87,4 @@ def _crf(
         wanted = ((k, picture) for k, picture in enumerate(pictures) if k in meter.frames)
         return meter.psnr((k, unpack_picture(picture, layout)) for k, picture in wanted)
 
-    return rate.search_crf(quality, target, codec.crf(video.crf), codec.worst_crf).crf
+    return rate.search_crf(quality, target, codec.crf(video.crf), codec.worst_crf)

@@ -21,19 +21,14 @@ from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poste
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.asset.stored import stored_file
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.track_file import read_track
-from facefolds_core.asset.writer import (
-    FULL,
-    AssetSource,
-    LevelContent,
-    manifest_of,
-)
+from facefolds_core.asset.writer import FULL, AssetSource, LevelContent, manifest_of
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
-from facefolds_core.export.stores import Grids
 from facefolds_core.files.frame_store import FrameStore
-from facefolds_core.files.writing import atomic_folder, file_sha256
+from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
@@ -43,7 +38,6 @@ from facefolds_core.packaging.limits import Model, good_view
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
 from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.settings import LevelSetting
-from facefolds_core.packaging.views import training_cameras
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.spacing import spread
 
@@ -74,18 +68,6 @@ class Export:
     coarser: Mapping[int, Sequence[TexturedMesh]]
     reflection: ReflectionMaps | None = None
 
-    @classmethod
-    def of(
-        cls,
-        grids: Grids,
-        meshes: Sequence[TexturedMesh],
-        textures: Path,
-        coarser: Mapping[int, Sequence[TexturedMesh]],
-    ) -> Export:
-        """From what the steps of the export give; `textures` is the frame store of `bake`."""
-        windows = [(float(u0), float(u1), float(v0), float(v1)) for u0, u1, v0, v1 in grids.windows]
-        return cls(meshes, windows, FrameStore(textures), grids.chart.centre, coarser, grids.reflection)
-
 
 def package(folder: Path, export: Export, scene: Scene, params: CompressParams) -> Manifest:
     """Write the folder of an asset, whole or not at all; an older one is replaced.
@@ -96,7 +78,7 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
     _check_order(params.levels)
     frames = check_inputs(export.meshes, export.windows, export.textures)
     source = AssetSource(scene.subject, scene.fps, scene.from_capture.inverse(), export.centre, scene.poses)
-    cameras, textures = training_cameras(scene), export.textures
+    cameras, textures = scene.views_of("train"), export.textures
     with atomic_folder(folder) as temporary:
         streamed = is_streamed(params.stream, frames, source.fps)
         unit = stream_unit(params.levels, textures.image(0, 0).shape[0]) if streamed else 1
@@ -140,7 +122,7 @@ def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> 
     """Add the reflection to a level; each has its own copy, a few kB: a level is complete in itself."""
     path = folder / f"{level.name}_reflection.png"
     path.write_bytes(picture.png())
-    entry = reflection_entry(picture, _stored(path))
+    entry = reflection_entry(picture, stored_file(path).model_dump())
     return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 
@@ -150,7 +132,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     if scene.audio is not None:
         path, texture = folder / "audio.m4a", manifest.full.texture
         mime = encode_sound(path, scene.audio, texture.frames / texture.fps)
-        update["audio"] = Audio(**_stored(path), mime=mime)
+        update["audio"] = Audio(**stored_file(path).model_dump(), mime=mime)
     train = scene.indices("train")
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
@@ -159,7 +141,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     side = min(POSTER_SIDE, max(first.width, first.height))
     camera = write_poster(path, manifest, side, JPEG_QUALITY)
     update["poster"] = Poster(
-        **_stored(path),
+        **stored_file(path).model_dump(),
         width=camera.width,
         height=camera.height,
         K=_rows(camera.K),
@@ -189,7 +171,7 @@ def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
         camera = scene.cameras[key[0]]
         found.append(
             Photo(
-                **_stored(path),
+                **stored_file(path).model_dump(),
                 width=camera.width,
                 height=camera.height,
                 camera=camera.name,
@@ -203,7 +185,3 @@ def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
 
 def _rows(matrix: NDArray[np.float64]) -> Any:
     return tuple(tuple(float(x) for x in row) for row in matrix)
-
-
-def _stored(path: Path) -> dict[str, Any]:
-    return {"file": path.name, "bytes": path.stat().st_size, "sha256": file_sha256(path)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 FRAMES = 30
 """Frames that an attempt encodes, at most, from the first on."""
@@ -21,22 +20,7 @@ SLOPE = 0.4
 """Rough cost of one step of the factor, dB: for the second attempt."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """A factor and what it gave.
-
-    Attributes:
-        crf: the factor.
-        psnr: dB; below the target if no factor reaches it.
-        encodes: how many were made to find it.
-    """
-
-    crf: int
-    psnr: float
-    encodes: int
-
-
-def search_crf(quality: Callable[[int], float], target: float, start: int, worst: int) -> Found:
+def search_crf(quality: Callable[[int], float], target: float, start: int, worst: int) -> int:
     """The largest factor in [1, worst] whose quality is at least `target`, as far as `MAX_ENCODES` trials can tell.
 
     Where no factor reaches it (coarse textures lose more by 4:2:0 than the encoder does), bits without end would buy
@@ -50,7 +34,7 @@ def search_crf(quality: Callable[[int], float], target: float, start: int, worst
     good = _search(quality, target, start, worst, tried)
     if not good:
         good = _search(quality, max(tried.values()) - SPARED, start, worst, tried)
-    return Found(good, tried[good], len(tried))
+    return good
 
 
 def _search(

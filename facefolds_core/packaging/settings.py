@@ -6,30 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from facefolds_core.asset.cropping import CroppedLayer
-from facefolds_core.asset.draco import MeshSettings
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.packaging.meshbits import position_bits, texture_coordinate_bits
-from facefolds_core.params import AttentionParams, CodecName, CompressParams, LevelParams
-
-
-@dataclass(frozen=True)
-class MeshSetting:
-    """See `MeshCodec`; with `max_error_pixels` the numbers of bits follow from the meshes (`LevelSetting.fitted`)."""
-
-    quantization_bits: int
-    texture_coordinate_bits: int
-    compression_level: int
-
-
-@dataclass(frozen=True)
-class VideoSetting:
-    """See `VideoCodec`."""
-
-    codec: tuple[CodecName, ...]
-    crf: int
-    target_psnr: float | None
-    preset: str
-    keyframe_interval: int
+from facefolds_core.params import AttentionParams, CompressParams, LevelParams, MeshCodec, VideoCodec
 
 
 @dataclass(frozen=True)
@@ -37,14 +16,13 @@ class LevelSetting:
     """Of one level.
 
     Attributes:
-        mesh, video: for the encoders.
-        max_error_pixels: None: the numbers of bits are given.
+        mesh: for the encoder; with `max_error_pixels` the numbers of bits follow from the meshes (`fitted`).
+        video: for the encoder.
         attention: where bits go.
     """
 
-    mesh: MeshSettings
-    video: VideoSetting
-    max_error_pixels: float | None
+    mesh: MeshCodec
+    video: VideoCodec
     attention: AttentionParams
 
     @classmethod
@@ -55,26 +33,21 @@ class LevelSetting:
             interval: frames between the key frames of a stream, which has one a segment.
         """
         mesh, video = params.mesh, params.video
-        error = mesh.max_error_pixels
-        if level is not None and level.max_error_pixels is not None:
-            error = level.max_error_pixels
-        return cls(
-            MeshSetting(mesh.quantization_bits, mesh.texture_coordinate_bits, mesh.compression_level),
-            VideoSetting(
-                codec=video.codec,
-                crf=video.crf if level is None else level.crf,
-                target_psnr=video.target_psnr if level is None else None,
-                preset=video.preset,
-                keyframe_interval=video.keyframe_interval if interval is None else interval,
-            ),
-            error,
-            params.attention,
-        )
+        if level is not None:
+            video = video.model_copy(update={"crf": level.crf, "target_psnr": None})
+            if level.max_error_pixels is not None:
+                mesh = mesh.model_copy(update={"max_error_pixels": level.max_error_pixels})
+        if interval is not None:
+            video = video.model_copy(update={"keyframe_interval": interval})
+        return cls(mesh, video, params.attention)
 
     def fitted(self, layers: Sequence[CroppedLayer], cameras: Sequence[Camera]) -> LevelSetting:
         """With numbers of bits that keep `max_error_pixels`; as it is where none is asked for."""
-        error = self.max_error_pixels
+        error = self.mesh.max_error_pixels
         if error is None or not cameras:
             return self
-        bits, st_bits = position_bits(layers, cameras, error), texture_coordinate_bits(layers, error)
-        return replace(self, mesh=MeshSetting(bits, st_bits, self.mesh.compression_level))
+        bits = {
+            "quantization_bits": position_bits(layers, cameras, error),
+            "texture_coordinate_bits": texture_coordinate_bits(layers, error),
+        }
+        return replace(self, mesh=self.mesh.model_copy(update=bits))

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.scene import Scene
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.rendering.raster import cast_layers
@@ -33,11 +32,6 @@ RAYS_PER_CAMERA = 16_000
 """Rays of each camera that hit anything, drawn once."""
 
 
-def training_cameras(scene: Scene) -> list[Camera]:
-    """In the head's own frame."""
-    return scene.views_of("train")
-
-
 class ViewMeter:
     """Measures renderings against a reference along fixed rays.
 
@@ -45,18 +39,13 @@ class ViewMeter:
         meshes: of the reference, outermost first.
         cameras: of which some, evenly spaced, are used.
         references: frame -> N textures of the reference.
-        seed: of the choice of rays among those that hit anything.
     """
 
     def __init__(
-        self,
-        meshes: Sequence[TexturedMesh],
-        cameras: Sequence[Camera],
-        references: Mapping[int, Sequence[Texture]],
-        seed: int = 0,
+        self, meshes: Sequence[TexturedMesh], cameras: Sequence[Camera], references: Mapping[int, Sequence[Texture]]
     ) -> None:
         self._cameras = spread(cameras, CAMERAS)
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         self._pixels: list[NDArray[np.intp]] = []
         hits = []
         for camera in self._cameras:

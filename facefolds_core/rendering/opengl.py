@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy
+from facefolds_core.rendering.opengl_reflection import FRAGMENT_WITH_REFLECTION, Glossy, upload
 from facefolds_core.rendering.reference import BLACK, Image, Layered, room_from, seen_from
 
 VERTEX = """
@@ -164,16 +164,8 @@ class OpenGLRenderer:
             return
         for texture in self._textures:
             texture.release()
-        self._textures = [self._texture(texture) for texture in self._asset.frame(frame)]
+        self._textures = [upload(self._context, texture) for texture in self._asset.frame(frame)]
         self._frame = frame
-
-    def _texture(self, texels: NDArray[np.uint8]) -> moderngl.Texture:
-        """Stored values as they are: no sRGB format. Row 0 is the top, as t runs."""
-        height, width = texels.shape[:2]
-        texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels).tobytes(), alignment=1)
-        texture.filter = moderngl.LINEAR, moderngl.LINEAR
-        texture.repeat_x = texture.repeat_y = False
-        return texture
 
     def _sized_target(self, camera: Camera) -> moderngl.Framebuffer:
         size = (camera.width, camera.height)

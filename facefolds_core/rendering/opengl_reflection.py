@@ -64,13 +64,16 @@ class Glossy:
             "normals": maps.normals,
             "environment": maps.environment,
         }
-        return [(name, _texture(context, image)) for name, image in images.items()]
+        return [(name, upload(context, image)) for name, image in images.items()]
 
 
-def _texture(context: moderngl.Context, image: NDArray[Any]) -> moderngl.Texture:
+def upload(context: moderngl.Context, image: NDArray[Any]) -> moderngl.Texture:
+    """An image (H, W, C), uint8 or else as float32. Stored values as they are: no sRGB format. Row 0 is the top, as t
+    runs."""
     height, width, channels = image.shape
-    data = np.ascontiguousarray(image, np.float32).tobytes()
-    texture = context.texture((width, height), channels, data, alignment=1, dtype="f4")
+    kind = "f1" if image.dtype == np.uint8 else "f4"
+    data = np.ascontiguousarray(image, np.uint8 if kind == "f1" else np.float32).tobytes()
+    texture = context.texture((width, height), channels, data, alignment=1, dtype=kind)
     texture.filter = moderngl.LINEAR, moderngl.LINEAR
     texture.repeat_x = texture.repeat_y = False
     return texture

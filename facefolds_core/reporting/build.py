@@ -209,7 +209,7 @@ def textures(subject: Subject) -> dict[str, Any]:
                 "name": f"layer {i + 1}",
                 "size": f"{rgba.shape[1]} × {rgba.shape[0]}",
                 "src": pictures.texture(rgba, TEXTURE_SIDE),
-                "opaque": words.percent(float((rgba[..., 3] >= 128).mean()), 0),
+                "opaque": words.percent(float((rgba[..., 3] >= 128).mean())),
             }
             for i, rgba in enumerate(asset.frame(frame))
         ],

@@ -55,9 +55,9 @@ def duration(seconds: Any) -> str:
     return f"{minutes}\u00a0min {rest}\u00a0s" if minutes < 120 else f"{minutes // 60}\u00a0h {minutes % 60}\u00a0min"
 
 
-def percent(share: Any, digits: int = 1) -> str:
+def percent(share: Any) -> str:
     found = finite(share)
-    return NONE if found is None else f"{100 * found:.{digits}f}\u00a0%"
+    return NONE if found is None else f"{100 * found:.0f}\u00a0%"
 
 
 def region_words(metrics: dict[str, Any]) -> str:

@@ -16,7 +16,6 @@ from facefolds_core.errors import UserError
 from facefolds_core.model.device import pick_device
 from facefolds_core.model.manifolds import MlpManifolds
 from facefolds_core.model.storage import ModelSpec, build_model
-from facefolds_core.model.textures import MlpTextures
 from facefolds_core.params import MlpParams
 from facefolds_core.progress import progress
 from facefolds_core.training.checkpoints import (
@@ -41,9 +40,6 @@ DECAY_MANIFOLD, DECAY_TEXTURE = 0.05, 0.20
 
 LAMBDA_VIEW = 1.0
 """Weight of the mean |view term|^2: the paper's."""
-
-INITIAL_ALPHA_LOGIT = -1.5
-"""Bias of the opacity at the start, before the sigmoid. Ours: all layers are seen."""
 
 SHAPE: dict[str, Any] = {
     "manifold_layers": 3,
@@ -83,8 +79,6 @@ def new_state(params: MlpParams, spec: ModelSpec, device: torch.device) -> Train
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(params.seed)
         model = build_model(spec).to(device)
-    if isinstance(model.textures, MlpTextures):
-        model.textures.start_alpha(INITIAL_ALPHA_LOGIT)
     named = list(model.named_parameters())
     groups = [
         {"params": [p for n, p in named if n.startswith("manifolds.")], "name": "manifold"},
@@ -182,13 +176,13 @@ class _Progress:
         self.psnr = psnr
 
     def update(self, losses: Losses, iteration: int) -> None:
-        values = [float(value.detach()) for value in asdict_shallow(losses).values()]
+        values = [float(value.detach()) for value in vars(losses).values()]
         self.sums = [a + b for a, b in zip(self.sums, values, strict=True)] if self.count else values
         self.count += 1
         self.bar.update()
         if iteration % self.every and iteration < self.params.iterations:
             return
-        means = dict(zip(asdict_shallow(losses), (s / self.count for s in self.sums), strict=True))
+        means = dict(zip(vars(losses), (s / self.count for s in self.sums), strict=True))
         self.psnr = -10 * math.log10(max(means.pop("squared_error"), 1e-10))
         now = time.perf_counter()
         rates = learning_rates(self.params, iteration - 1)
@@ -203,10 +197,6 @@ class _Progress:
     def close(self) -> None:
         self.bar.close()
         self.live.end()
-
-
-def asdict_shallow(losses: Losses) -> dict[str, torch.Tensor]:
-    return dict(vars(losses))
 
 
 def _trim_log(folder: Path, iteration: int) -> None:

@@ -91,7 +91,7 @@ def test_static_scene(tmp_path: Path) -> None:
     assert len(asset.frame(0)) == 3
 
 
-def test_failure_leaves_the_old_asset(folder: Path, tmp_path: Path) -> None:
+def test_failure_leaves_the_old_asset(tmp_path: Path) -> None:
     make_asset(tmp_path / "asset")
     before = {file.name: file.read_bytes() for file in (tmp_path / "asset").iterdir()}
     write_frames(tmp_path / "part.arrow", (64, 64, 4), [(0, 0, cap_textures(1, 0, 64)[0])])

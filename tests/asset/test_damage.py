@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from facefolds_core.asset import read_asset
 from facefolds_core.asset.validation import validate_asset
+from facefolds_core.errors import UserError
 from tests.asset.filmed import filmed, packaged
 from tests.viewer.fixtures import random_reflection
 
@@ -22,6 +24,10 @@ FILES = [
     "poster.jpg",
     "photo_00.jpg",
 ]
+
+
+READ = ("manifest.json", "full_meshes.bin", "full.mp4")
+"""Of these the reader wants to know at once whether they are whole."""
 
 
 @pytest.fixture(scope="module")
@@ -56,5 +62,8 @@ def test_damage_is_named(whole: Path, tmp_path: Path, name: str) -> None:
     for what, damaged in {"truncated": data[: len(data) // 2], "one byte short": data[:-1], "flipped": flipped}.items():
         path.write_bytes(damaged)
         assert any(problem.startswith(f"{name}:") for problem in validate_asset(folder)), what
+        if name in READ:
+            with pytest.raises(UserError):
+                read_asset(folder)
     path.unlink()
     assert any(problem.startswith(f"{name}:") for problem in validate_asset(folder))

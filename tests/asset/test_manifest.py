@@ -48,6 +48,10 @@ REFLECTION: dict[str, Any] = {
 }
 
 
+LACKING = object()
+"""In place of a new value: the key is left out."""
+
+
 def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Manifests that break one rule each."""
     edits: dict[str, tuple[list[Any], Any]] = {
@@ -78,30 +82,20 @@ def broken(value: dict[str, Any]) -> dict[str, dict[str, Any]]:
         "scales": (["levels", 0, "reflection"], REFLECTION | {"gloss_scale": 0}),
         "unknown key": (["levels", 0, "texture", "colour"], 1),
     }
-    made = {}
-    for name, (place, new) in edits.items():
-        copied = copy.deepcopy(value)
-        inner: Any = copied
-        for key in place[:-1]:
-            inner = inner[key]
-        inner[place[-1]] = new
-        made[name] = copied
-    lacking: tuple[tuple[Any, ...], ...] = (
-        ("subject",),
-        ("audio",),
-        ("photos",),
-        ("compositing", "order"),
-        ("levels", 0, "quality"),
-        ("levels", 0, "texture", "videos", 0, "codec"),
-        ("coordinates", "to_capture"),
+    lacking: tuple[list[Any], ...] = (
+        *(["subject"], ["audio"], ["photos"], ["compositing", "order"], ["coordinates", "to_capture"]),
+        *(["levels", 0, "quality"], ["levels", 0, "texture", "videos", 0, "codec"]),
     )
-    for place in lacking:
-        copied = copy.deepcopy(value)
-        inner = copied
-        for key in place[:-1]:
+    edits |= {f"no {place[-1]}": (place, LACKING) for place in lacking}
+    made = {}
+    for name, ((*way, last), new) in edits.items():
+        made[name] = inner = copy.deepcopy(value)
+        for key in way:
             inner = inner[key]
-        del inner[place[-1]]
-        made[f"no {place[-1]}"] = copied
+        if new is LACKING:
+            del inner[last]
+        else:
+            inner[last] = new
     return made
 
 

@@ -151,12 +151,6 @@ def test_flat_alpha_extremes_survive(tmp_path: Path) -> None:
         assert alpha[0].max() <= 1 and alpha[1].min() >= 254
 
 
-def test_same_input_same_bytes(video: Path, tmp_path: Path) -> None:
-    path = tmp_path / "again.mp4"
-    encode(path, (pack_frame(numbered(k), LAYOUT) for k in range(FRAMES)))
-    assert path.read_bytes() == video.read_bytes()
-
-
 def test_another_size_is_refused(video: Path) -> None:
     with pytest.raises(UserError, match="damaged texture video"):
         next(decode_video(video, (SIZE[0] + 16, SIZE[1]), 30.0))

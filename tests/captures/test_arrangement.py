@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.arrangement import Shot, arrange, mean_calibration
-from facefolds_core.captures.capture import Capture, closest_rotation
+from facefolds_core.captures.capture import closest_rotation
 from facefolds_core.captures.gathering import Calibration
-from facefolds_core.captures.sources import transforms
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import CaptureParams, Subject
 from tests.captures.fixtures import intrinsics, opengl_matrix, pattern, save
-from tests.filmed import check_same, film, scene_of
+from tests.filmed import check_same, film, reader, scene_of
+
+read = reader("transforms")
 
 
 def moved(camera: Camera, jitter: float, seed: int) -> Camera:
@@ -41,10 +41,6 @@ def write(root: Path, labels: str, jitter: float = 1e-4, timed: bool = False, **
     entries[0] |= first
     (root / "transforms.json").write_text(json.dumps({"frames": entries}))
     return root
-
-
-def read(root: Path) -> Capture:
-    return transforms.read(root, Subject(source="transforms", path="x"), CaptureParams())
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def test_frames_that_are_not_evenly_spaced_have_no_sound(tmp_path: Path) -> None
     assert any("evenly spaced" in line for line in left_out)
 
 
-def test_a_single_frame_has_its_place(tmp_path: Path) -> None:
+def test_a_single_frame_has_its_place() -> None:
     assert sound_start([0.4], 0.0) == 0.4
 
 

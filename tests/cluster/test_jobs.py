@@ -1,12 +1,15 @@
-"""What a job finds where its subject's relative paths lead."""
+"""Jobs: what they find where relative paths lead, what they lose to each other, what a killed DVC leaves."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from facefolds_core.cluster.job import ATTEMPTS, repro
 from facefolds_core.cluster.jobs import links_of
+from facefolds_core.cluster.run_cache import drop_empty_runs
 from facefolds_core.config.params_file import load_params
 
 
@@ -23,3 +26,39 @@ def test_captures_and_named_mattes_are_linked(tmp_path: Path, keys: str, linked:
     (tmp_path / "params.yaml").write_text(f"subjects:\n  anna: {{source: transforms, {keys}}}\n")
     links = links_of(load_params(tmp_path / "params.yaml"), tmp_path, "anna")
     assert links == tuple((one, str((tmp_path / one).resolve())) for one in linked)
+
+
+LOST = "ERROR: failed to reproduce 'configure': [Errno 2] No such file: '/p/.dvc/cache/runs/47/475c/.4sh.tmp'\n"
+DAMAGED = "WARNING: corrupted cache file '../cache/runs/47/475c/.4sh.tmp'.\nERROR: failed: 'evaluate@bad'\n"
+
+
+def _repro(*answers: tuple[int, str]) -> tuple[int, str, int]:
+    """Two jobs with a stage in common may lose DVC's record of it to each other: the stage is then run again."""
+    left = list(answers)
+    status, log = repro(lambda *_: left.pop(0), ["repro", "evaluate@a"])
+    return status, log, len(answers) - len(left)
+
+
+def test_a_lost_record_is_made_again() -> None:
+    assert _repro((1, LOST), (0, "done\n")) == (0, LOST + "done\n", 2)
+
+
+def test_other_failures_are_not_repeated() -> None:
+    assert _repro((1, DAMAGED), (0, "")) == (1, DAMAGED, 1)
+    assert _repro((0, LOST), (1, "")) == (0, LOST, 1)
+
+
+def test_it_ends() -> None:
+    assert _repro(*[(1, LOST)] * (ATTEMPTS + 1)) == (1, LOST * ATTEMPTS, ATTEMPTS)
+
+
+def test_only_empty_folders_that_stay_so_are_removed(tmp_path: Path) -> None:
+    full, empty, new = (tmp_path / "runs" / "68" / name for name in ("full", "empty", "new"))
+    for folder in (full, empty, new):
+        folder.mkdir(parents=True)
+    (full / "entry").write_text("x")
+    for folder in (full, empty):
+        os.utime(folder, (0, 0))
+    drop_empty_runs(tmp_path)
+    assert sorted(path.name for path in (tmp_path / "runs" / "68").iterdir()) == ["full", "new"]
+    drop_empty_runs(tmp_path / "none")

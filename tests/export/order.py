@@ -1,4 +1,4 @@
-"""Whether neighbouring layers cross, by rays; and how many borders a surface has."""
+"""Sheets as meshes; whether neighbouring layers cross, by rays; and how many borders a surface has."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from scipy.sparse.csgraph import connected_components
 from trimesh import Trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
+from facefolds_core.export.sheets import sheet_faces, sheet_mesh, vertex_uv
+from facefolds_core.export.stores import Sheets
 from facefolds_core.geometry.chart import Chart
-from facefolds_core.geometry.meshes import Surface
+from facefolds_core.geometry.meshes import Surface, TexturedMesh
 
 CROSSING_TOLERANCE = 1e-5
 """Two layers cross where the inner one is farther out by more than this, units: ray casting is in float32."""
@@ -70,3 +72,12 @@ def boundary_loops(faces: NDArray[Any]) -> int:
     size = int(index.max()) + 1
     links = coo_matrix((np.ones(len(index), np.int8), (index[:, 0], index[:, 1])), shape=(size, size))
     return int(connected_components(links, directed=False)[0])
+
+
+def full_meshes(sheets: Sheets) -> list[TexturedMesh]:
+    """All layers at the grid's resolution; no face where a sample is not valid."""
+    faces, uv = sheet_faces(sheets), vertex_uv(sheets)
+    return [
+        sheet_mesh(sheets, layer, faces[known.reshape(-1)[faces].all(1)], uv)
+        for layer, known in enumerate(sheets.valid)
+    ]

@@ -12,11 +12,11 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from facefolds_core.export.collapse import decimate_sheets
+from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate_layers
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.sampling import sample_grids, write_textures
-from facefolds_core.export.sheets import full_meshes, grid_sheets
+from facefolds_core.export.sheets import grid_sheets
 from facefolds_core.export.textures import resample_store
 from facefolds_core.export.window import visible_window
 from facefolds_core.files.frame_store import FrameStore
@@ -25,6 +25,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.params import DecimateParams, ReconstructParams
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.ellipsoids import Ellipsoids
+from tests.export.order import full_meshes
 from tests.scenes import look_at_origin
 
 pytestmark = pytest.mark.slow
@@ -93,7 +94,7 @@ def test_each_step_of_the_grid_export_loses_no_more_than_this(
     opacity = write_textures(tmp_path / "samples.arrow", model, grids)
     sheets = grid_sheets(replace(grids, opacity=opacity), None)
     samples = FrameStore(tmp_path / "samples.arrow")
-    coarse = decimate_sheets(sheets, resolution**2)
+    coarse = decimated_ladder(sheets, [resolution**2])[resolution**2]
     steps = [Exported(full_meshes(sheets), samples), Exported(coarse, samples)]
     unseen = look_at_origin("unseen", 12, 6, 96)
     for exported, least in zip(steps, losses, strict=True):

@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 
 from facefolds_core.errors import UserError
-from facefolds_core.export.collapse import decimate_sheets
+from facefolds_core.export.collapse import decimated_ladder
 from facefolds_core.export.decimation import decimate, exact_st, upright_faces
 from facefolds_core.export.poisson import gather_samples, reconstruct
 from facefolds_core.export.refit import radial_cosines, refit_radii
@@ -109,7 +109,7 @@ def test_faces_of_the_grid_keep_their_side(sheets: Sheets) -> None:
 
 @pytest.mark.parametrize("count", [144, 400])
 def test_the_shape_stays_when_it_is_decimated(sheets: Sheets, count: int) -> None:
-    meshes = decimate_sheets(sheets, count)
+    meshes = decimated_ladder(sheets, [count])[count]
     for mesh, radius in zip(meshes, RADII, strict=True):
         assert len(mesh.vertices) == count
         middle = mesh.vertices[mesh.faces].mean(1)
@@ -121,7 +121,7 @@ def test_the_shape_stays_when_it_is_decimated(sheets: Sheets, count: int) -> Non
 
 
 def test_decimated_layers_of_a_bumpy_column_stay_upright_and_in_order(bumpy: Sheets) -> None:
-    meshes = decimate_sheets(bumpy, 300)
+    meshes = decimated_ladder(bumpy, [300])[300]
     for mesh in meshes:
         assert upright_faces(mesh.vertices, mesh.faces, CHART).all()
     assert layer_order(meshes, CHART).crossed == 0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from facefolds_core.export.collapse import contribution, decimate_sheets, decimated_ladder
+from facefolds_core.export.collapse import contribution, decimated_ladder
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.refit import radial_cosines
 from facefolds_core.export.sampling import sample_grids
@@ -38,13 +38,13 @@ def rough(sheets: Sheets, seed: int) -> Sheets:
 
 @pytest.mark.parametrize("target", [64, 256, 1024])
 def test_the_bound_on_the_vertices_is_met(sheets: Sheets, target: int) -> None:
-    for mesh in decimate_sheets(sheets, target):
+    for mesh in decimated_ladder(sheets, [target])[target]:
         assert len(mesh.vertices) == target
         assert np.array_equal(np.unique(mesh.faces), np.arange(target))
 
 
 def test_the_shape_and_the_texture_coordinates_stay(sheets: Sheets) -> None:
-    for mesh, axes in zip(decimate_sheets(sheets, 256), Ellipsoids().axes, strict=True):
+    for mesh, axes in zip(decimated_ladder(sheets, [256])[256], Ellipsoids().axes, strict=True):
         middle = mesh.vertices[mesh.faces].mean(1)
         assert np.abs(np.linalg.norm((middle - CENTRE) / np.array(axes), axis=-1) - 1).max() < 0.01
         assert np.abs(mesh.st - exact_st(mesh.vertices, WINDOW, sheets.chart)).max() < 1e-5
@@ -64,7 +64,7 @@ def test_cosines_are_those_of_the_normals(sheets: Sheets) -> None:
 
 
 def test_the_border_stays_where_it_was(sheets: Sheets) -> None:
-    for mesh in decimate_sheets(sheets, 100):
+    for mesh in decimated_ladder(sheets, [100])[100]:
         assert boundary_loops(mesh.faces) == 1
         assert mesh.st.min() == pytest.approx(0.5 / N)
         assert mesh.st.max() == pytest.approx(1 - 0.5 / N)
@@ -80,7 +80,7 @@ def covered_area(mesh: TexturedMesh) -> float:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_layers_never_cross_and_faces_never_turn_over(sheets: Sheets, seed: int) -> None:
-    meshes = decimate_sheets(rough(sheets, seed), 300)
+    meshes = decimated_ladder(rough(sheets, seed), [300])[300]
     order = layer_order(meshes, sheets.chart)
     assert order.compared > 500
     assert order.deepest < 1e-7  # rounding of the vertices to float32
@@ -111,7 +111,7 @@ def test_vertices_gather_where_the_radius_jumps(sheets: Sheets) -> None:
     radii = np.full_like(sheets.radii, 0.3)
     radii[1] = 0.29
     radii[:, :, N // 2 :] += 0.05
-    (mesh, _) = decimate_sheets(replace(sheets, radii=radii), 256)
+    (mesh, _) = decimated_ladder(replace(sheets, radii=radii), [256])[256]
     column = mesh.st[:, 0] * N - 0.5
     assert (np.abs(column - (N / 2 - 0.5)) < 1).mean() > 0.1  # 2 of 64 columns, 3 %; seen: 16 %
     radius = np.linalg.norm(mesh.vertices - CENTRE, axis=-1)
@@ -122,7 +122,7 @@ def test_what_is_transparent_in_all_frames_is_trimmed(sheets: Sheets) -> None:
     opacity = np.zeros_like(sheets.opacity)
     opacity[0, 20:40, 20:40] = 1
     opacity[1] = 255
-    shown, whole = decimate_sheets(replace(sheets, opacity=opacity), 400)
+    shown, whole = decimated_ladder(replace(sheets, opacity=opacity), [400])[400]
     assert len(shown.faces) < 0.6 * len(whole.faces)
     inside = np.argwhere(opacity[0])[:, ::-1] * 1.0
     a, b, c = (shown.st[shown.faces[:, k]].astype(np.float64) * N - 0.5 for k in range(3))
@@ -136,17 +136,17 @@ def test_what_is_transparent_in_all_frames_is_trimmed(sheets: Sheets) -> None:
 def test_a_layer_that_shows_nowhere_keeps_its_faces(sheets: Sheets) -> None:
     opacity = sheets.opacity.copy()
     opacity[0] = 0
-    first, second = decimate_sheets(replace(sheets, opacity=opacity), 100)
+    first, second = decimated_ladder(replace(sheets, opacity=opacity), [100])[100]
     assert len(first.faces) == len(second.faces)
 
 
 def test_contributions_are_compositing_weights_with_a_floor() -> None:
     opacity = np.array([51, 255, 255], np.uint8)[:, None, None]
-    assert contribution(opacity, 0.05)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
+    assert contribution(opacity)[:, 0, 0] == pytest.approx([0.2, 0.8, 0.05])
 
 
 def test_a_ladder_is_what_each_number_of_vertices_gives_alone(sheets: Sheets) -> None:
     for count, meshes in decimated_ladder(sheets, [100, 400, 200]).items():
-        for mesh, alone in zip(meshes, decimate_sheets(sheets, count), strict=True):
+        for mesh, alone in zip(meshes, decimated_ladder(sheets, [count])[count], strict=True):
             assert np.array_equal(mesh.faces, alone.faces)
             assert np.array_equal(mesh.vertices, alone.vertices)

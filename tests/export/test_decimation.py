@@ -75,7 +75,7 @@ def test_nearest_texture_coordinates_skip_invalid_samples(grids: Grids) -> None:
     assert np.allclose(st, [20.5 / 96, 10.5 / 96])
 
 
-def test_exact_texture_coordinates_are_the_direction(grids: Grids) -> None:
+def test_exact_texture_coordinates_are_the_direction() -> None:
     uv = np.array([[0.1, -0.2], [-0.4, 0.3], [0.9, 0.0]])
     angles = uv * np.pi / 2
     flat = np.cos(angles[:, 0])

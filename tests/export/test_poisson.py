@@ -27,9 +27,9 @@ WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 PARAMS = ReconstructParams(depth=6)
 
 
-def surface_of(model: Ellipsoids, resolution: int, window: Window, params: ReconstructParams = PARAMS) -> Surface:
+def surface_of(model: Ellipsoids, resolution: int, window: Window) -> Surface:
     grids = sample_grids(model, resolution, window)
-    return reconstruct(gather_samples(grids, 0, params.resolution), params, 0)
+    return reconstruct(gather_samples(grids, 0, PARAMS.resolution), PARAMS, 0)
 
 
 @pytest.mark.parametrize("window", [FULL_WINDOW, WINDOW], ids=["hemisphere", "window"])

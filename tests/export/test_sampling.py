@@ -132,21 +132,6 @@ def test_nan_in_a_texture_is_caught() -> None:
 
 
 @dataclass(frozen=True)
-class OfTexels(Ellipsoids):
-    """A model with texels of its own, one frame of which may show something else."""
-
-    num_frames: int = 4
-    changed: int = -1
-
-    def texel_grid(self) -> TexelGrid:  # type: ignore[override]
-        return TexelGrid(WINDOW, (12, 10))
-
-    def texture(self, uv: Tensor, layer: int, time: float) -> tuple[Tensor, Tensor]:
-        rgb, alpha = super().texture(uv, layer, time)
-        return rgb * (0.5 if time == self.changed else 1.0), alpha
-
-
-@dataclass(frozen=True)
 class Fine(Ellipsoids):
     """Of 700 x 300 texels."""
 

@@ -9,11 +9,11 @@ import pytest
 
 from facefolds_core.export.decimation import exact_st
 from facefolds_core.export.sampling import sample_grids
-from facefolds_core.export.sheets import full_meshes, grid_sheets, sheet_faces, vertex_uv
+from facefolds_core.export.sheets import grid_sheets, sheet_faces, vertex_uv
 from facefolds_core.export.stores import Grids
 from facefolds_core.geometry.sphere_uv import Window
 from tests.ellipsoids import Ellipsoids
-from tests.export.order import layer_order
+from tests.export.order import full_meshes, layer_order
 
 WINDOW: Window = (-0.5, 0.6, -0.3, 0.4)
 CENTRE = np.array(Ellipsoids().chart.centre)

@@ -77,20 +77,17 @@ def test_packed_images_are_what_they_were_in_any_order(tmp_path: Path) -> None:
         assert np.array_equal(store.image(*key), images[key])
 
 
-def test_what_hardly_changes_takes_hardly_any_space(tmp_path: Path) -> None:
-    noise = np.random.default_rng(0).integers(0, 256, (64, 64, 4), dtype=np.uint8)
-    for packed in (False, True):
-        write_frames(tmp_path / f"{packed}.arrow", (64, 64, 4), [(0, k, noise) for k in range(24)], packed)
-    plain, small = ((tmp_path / f"{packed}.arrow").stat().st_size for packed in (False, True))
-    assert small < plain / 8
+NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 4), dtype=np.uint8)
 
 
-def test_what_is_smooth_is_packed_small(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("images", "share"), [([NOISE] * 24, 8), ([smooth(k) for k in range(4)], 5)])
+def test_what_hardly_changes_or_is_smooth_is_packed_small(tmp_path: Path, images: list[Image], share: int) -> None:
     for packed in (False, True):
-        write_frames(tmp_path / f"{packed}.arrow", (64, 64, 4), [(0, k, smooth(k)) for k in range(4)], packed)
+        rows = ((0, k, one) for k, one in enumerate(images))
+        write_frames(tmp_path / f"{packed}.arrow", (64, 64, 4), rows, packed)
     plain, small = ((tmp_path / f"{packed}.arrow").stat().st_size for packed in (False, True))
-    assert small < plain / 5
-    assert np.array_equal(FrameStore(tmp_path / "True.arrow").image(0, 3), smooth(3))
+    assert small < plain / share
+    assert np.array_equal(FrameStore(tmp_path / "True.arrow").image(0, 3), images[3])
 
 
 def test_what_is_packed_wrongly_is_named_when_it_is_looked_at(tmp_path: Path) -> None:

@@ -20,11 +20,11 @@ BELTS = [Belt(0.0, 0.3), Belt(0.2, 0.25), Belt(1.2, 0.5)]
 CHARTS = [Chart(C, belt) for belt in BELTS]
 
 
-def places(chart: Chart, count: int = 500) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def places(chart: Chart) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(u, v) above and below the belt, before and behind the ears, and radii."""
     rng = np.random.default_rng(0)
     lowest = -0.95 if chart.belt is None else -1.8
-    return rng.uniform([lowest, -1.95], [0.95, 1.95], (count, 2)), rng.uniform(0.1, 0.6, count)
+    return rng.uniform([lowest, -1.95], [0.95, 1.95], (500, 2)), rng.uniform(0.1, 0.6, 500)
 
 
 @kernel

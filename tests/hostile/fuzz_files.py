@@ -43,7 +43,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.model.storage import ModelSpec, build_model, load_model, save_model
+from facefolds_core.model.storage import build_model, load_model, save_model
 from facefolds_core.params import Subject
 from facefolds_core.reporting.facts import read_images
 from facefolds_core.subject.cameras import CameraFit
@@ -52,23 +52,9 @@ from facefolds_core.subject.storage import FoundSubject, read_found, write_found
 from tests.ellipsoids import Ellipsoids
 from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
 from tests.hostile.structured import damage_path, damage_values
+from tests.scoring.fakes import SPEC
 
 SECONDS = 10
-SPEC = ModelSpec(
-    centre=(-0.25, 0, 0),
-    levels=(0.36, 0.34),
-    radius=0.42,
-    num_frames=2,
-    manifold_layers=1,
-    manifold_width=4,
-    search_samples=8,
-    texture_layers=1,
-    texture_width=4,
-    latent_dim=2,
-    uv_frequencies=1,
-    level_frequencies=1,
-    view_frequencies=1,
-)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,6 @@ def test_a_file_in_place_of_the_folder_to_write(asset: Path, tmp_path: Path) -> 
     assert (tmp_path / "out").read_text() == "mine"
 
 
-def test_a_manifest_that_steers_the_terminal(asset: Path, tmp_path: Path) -> None:
+def test_a_manifest_that_steers_the_terminal(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"format": "facefolds", "version": "\\u001b[31m\\u0007"}')
     assert "\x1b" not in refused("validate", tmp_path) and "\x1b" not in refused("view", tmp_path)

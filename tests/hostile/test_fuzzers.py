@@ -1,4 +1,4 @@
-"""Short runs of the fuzzers: `python -m tests.hostile` makes long ones (disks, kills: test_disk, test_kills)."""
+"""Short runs of the fuzzers: `python -m tests.hostile` makes long ones (`--only disk --count 500`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.hostile import fuzz_params
+from tests.hostile import fuzz_kills, fuzz_params
+from tests.hostile.fuzz_disk import STAGES, NoSmallDiskError, run, small_disk
 
 pytestmark = pytest.mark.slow
 
@@ -43,3 +44,26 @@ def test_crashes_and_harm_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     kept = tmp_path / "harm" / "precious" / "config" / "kept.txt"
     monkeypatch.setattr(fuzz_params, "load_params", lambda _: kept.unlink())
     assert fuzz_params.run(1, 1, tmp_path / "harm").harmed
+
+
+@pytest.mark.parametrize("rounds", [1, pytest.param(3, marks=pytest.mark.nightly)])
+def test_no_stage_loses_anything_for_want_of_room(rounds: int, tmp_path: Path) -> None:
+    counts = run(rounds * len(STAGES), 0, tmp_path)
+    assert counts.tried == rounds * len(STAGES)
+    assert counts.refused > rounds * len(STAGES) / 4
+    assert counts.defects == []
+
+
+def test_full_disks_were_among_them(tmp_path: Path) -> None:
+    try:
+        with small_disk(tmp_path / "disk"):
+            pass
+    except NoSmallDiskError as error:
+        pytest.skip(f"{error}: the test above knew limits of file sizes only")
+
+
+@pytest.mark.nightly
+def test_killed_runs_are_recovered(tmp_path: Path) -> None:
+    counts = fuzz_kills.run(2, 0, tmp_path)
+    assert counts.tried == 2
+    assert counts.defects == []

@@ -28,9 +28,9 @@ def camera_rays(count: int, spread: float = 0.25) -> tuple[Tensor, Tensor]:
     return origins, torch.nn.functional.normalize(targets - origins, dim=-1)
 
 
-def spheres(levels: tuple[float, ...] = LEVELS, samples: int = 64) -> MlpManifolds:
+def spheres(samples: int = 64) -> MlpManifolds:
     torch.manual_seed(0)
-    return MlpManifolds(SPHERE_CENTRE, levels, RADIUS, hidden_layers=2, width=16, samples=samples).double()
+    return MlpManifolds(SPHERE_CENTRE, LEVELS, RADIUS, hidden_layers=2, width=16, samples=samples).double()
 
 
 def bumpy(samples: int = 64) -> MlpManifolds:

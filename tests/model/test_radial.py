@@ -17,12 +17,12 @@ C = (-0.25, 0.0, 0.0)
 WINDOW = (-0.6, 0.6, -0.6, 0.6)
 
 
-def _spheres(radius: float = 0.3, halfwidth: float = 0.03, layers: int = 3) -> RadialManifolds:
-    return RadialManifolds(Chart(C), WINDOW, torch.full((24, 20), radius), torch.full((24, 20), halfwidth), layers)
+def _spheres(layers: int = 3) -> RadialManifolds:
+    return RadialManifolds(Chart(C), WINDOW, torch.full((24, 20), 0.3), torch.full((24, 20), 0.03), layers)
 
 
-def _bumpy(seed: int = 0) -> RadialManifolds:
-    generator = torch.Generator().manual_seed(seed)
+def _bumpy() -> RadialManifolds:
+    generator = torch.Generator().manual_seed(0)
     coarse = torch.randn(1, 1, 6, 6, generator=generator)
     bumps = torch.nn.functional.interpolate(coarse, size=(48, 40), mode="bicubic")[0, 0]
     return RadialManifolds(Chart(C), WINDOW, 0.3 + 0.01 * bumps, torch.full((48, 40), 0.01), 4)

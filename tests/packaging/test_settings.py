@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from facefolds_core.packaging.settings import LevelSetting, MeshSetting
+from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, VideoCodec
 from tests.assets import cap_crops
 from tests.scenes import look_at_origin
@@ -16,16 +16,14 @@ COARSE = LevelParams(name="small", mesh_resolution=16, texture_resolution=64, cr
 
 def test_the_full_level_is_coded_as_configured() -> None:
     found = LevelSetting.of(PARAMS)
-    assert found.mesh == MeshSetting(11, 9, 3) and found.max_error_pixels == 0.1
-    video = PARAMS.video.model_dump()
-    assert {name: getattr(found.video, name) for name in video} == video
+    assert (found.mesh, found.video) == (PARAMS.mesh, PARAMS.video)
 
 
 def test_a_coarser_level_has_a_rate_and_an_error_of_its_own() -> None:
     found = LevelSetting.of(PARAMS, COARSE)
     assert (found.video.crf, found.video.target_psnr) == (31, None)
-    assert (found.video.keyframe_interval, found.max_error_pixels, found.mesh.compression_level) == (12, 0.1, 3)
-    assert LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).max_error_pixels == 0.5
+    assert (found.video.keyframe_interval, found.mesh.max_error_pixels, found.mesh.compression_level) == (12, 0.1, 3)
+    assert LevelSetting.of(PARAMS, COARSE.model_copy(update={"max_error_pixels": 0.5})).mesh.max_error_pixels == 0.5
 
 
 def test_a_stream_has_one_key_frame_a_segment() -> None:

@@ -44,13 +44,13 @@ SCRIPTS = {
         show(np.frombuffer((folder / "model" / "model.safetensors").read_bytes(), np.uint8))
     """,
     "decimate": """
-        from facefolds_core.export.collapse import decimate_sheets
+        from facefolds_core.export.collapse import decimated_ladder
         from facefolds_core.export.sampling import sample_grids
         from facefolds_core.export.sheets import grid_sheets
         from tests.ellipsoids import Ellipsoids
 
         grids = sample_grids(Ellipsoids(), 32, (-0.5, 0.6, -0.3, 0.4))
-        for mesh in decimate_sheets(grid_sheets(grids, None), 64):
+        for mesh in decimated_ladder(grid_sheets(grids, None), [64])[64]:
             show(mesh.vertices, mesh.faces, mesh.st)
     """,
     "bake": """

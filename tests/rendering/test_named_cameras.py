@@ -25,7 +25,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scene]:
     return root / "asset", scene
 
 
-def test_cameras_by_name(made: tuple[Path, Scene], tmp_path: Path) -> None:
+def test_cameras_by_name(made: tuple[Path, Scene]) -> None:
     asset, scene = read_asset(made[0]), made[1]
     poster = named_camera(asset, "poster")
     assert asset.manifest.poster is not None and poster.width == asset.manifest.poster.width

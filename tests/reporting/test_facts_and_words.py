@@ -87,7 +87,7 @@ def test_a_curve_of_one_point_is_none(tmp_path: Path) -> None:
         (words.duration(95.5), "96\u00a0s"),
         (words.duration(389), "6\u00a0min 29\u00a0s"),
         (words.duration(None), "–"),
-        (words.percent(0.125), "12.5\u00a0%"),
+        (words.percent(0.125), "12\u00a0%"),
     ],
 )
 def test_figures_as_people_read_them(found: str, expected: str) -> None:

@@ -25,8 +25,8 @@ def random_cut(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
     return np.concatenate([rng.random((*shape, 3)) * alpha, alpha], -1).astype(np.uint8)
 
 
-def _problem(rays: int, layers: int, shape: tuple[int, int], seed: int = 0) -> dict[str, np.ndarray]:
-    rng = np.random.default_rng(seed)
+def _problem(rays: int, layers: int, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(0)
     codes = rng.integers(1, 65536, (rays, layers, 2)).astype(np.uint16)
     codes[rng.random((rays, layers)) < 0.2] = 0
     texture = rng.random((*shape, layers, 4), np.float32)

@@ -14,15 +14,12 @@ from facefolds_core.captures.scene import SPHERE_CENTRE, Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import read_fact
 from facefolds_core.files.frame_store import write_frames
-from facefolds_core.geometry.chart import Chart
 from facefolds_core.model import load_model
 from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.params import ExplicitParams, train_params
 from facefolds_core.subject.outline import Profile
-from facefolds_core.subject.volume import Volume
 from facefolds_core.training.explicit import fit, trainer
 from facefolds_core.training.explicit.loop import fit_explicit
-from facefolds_core.training.explicit.plan import plan
 from facefolds_core.training.explicit.state import TextureState
 from tests.scenes import OPAQUE, make_scene
 
@@ -141,17 +138,6 @@ def test_a_pixel_is_as_large_as_it_is_at_the_origin_in_the_median_training_camer
     assert fit.pixel_size(scene) == pytest.approx(1e-4 / float(np.median(apart)), rel=0.02)
 
 
-def test_plan_spends_all_iterations() -> None:
-    ones = np.ones((4, 4))
-    window = (-0.5, 0.5, -0.5, 0.5)
-    maps = ones, ones, 0 * ones, 0 * ones, ones, ones, np.ones((4, 4, 3))
-    volume = Volume(np.zeros((2, 2, 2, 4)), np.zeros(3), 1.0)
-    chosen = fit.Fit(Chart((0, 0, 0)), window, *maps, (128, 96), (), (), volume, {}, 30.0)
-    levels = plan(chosen, _params(iterations=400), frames=11, pixels=1000)
-    assert sum(level.iterations for level in levels) == 400
-    assert levels[-1].texels == (128, 96)
-
-
 def test_divergence_is_reported(trained: tuple[Scene, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TextureState, "step", lambda self, *args: float("nan"))
     with pytest.raises(UserError, match="diverged"):
@@ -175,7 +161,7 @@ def test_wide_layers_keep_their_distance_from_the_centre() -> None:
     assert (fit.least_middle(halfwidth, GEOMETRY) - max(GEOMETRY.rounds) * halfwidth >= fit.MIN_RADIUS - 1e-12).all()
 
 
-def test_a_missing_image_is_said_at_once(trained: tuple[Scene, Path], tmp_path: Path) -> None:
+def test_a_missing_image_is_said_at_once(tmp_path: Path) -> None:
     scene = make_scene(tmp_path / "scene", size=8)
     image = np.zeros((8, 8, 3), np.uint8)
     write_frames(scene.folder / "frames.arrow", image.shape, [(i, 0, image) for i in range(len(scene.cameras))])

@@ -28,6 +28,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def layers() -> RadialManifolds:
+    """Three spheres' caps around the subject of `make_scene`."""
     middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
     return RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
 

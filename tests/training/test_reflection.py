@@ -44,12 +44,12 @@ KEYS = ReflectionParams(enabled=True, texels=8, environment_texels=8)
 PARAMS = GlossParams()
 
 
-def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8), environment: int = 8) -> Maps:
+def _random_maps(seed: int = 0, shape: tuple[int, int] = (8, 8)) -> Maps:
     rng = np.random.default_rng(seed)
     surface = np.stack([np.ones(shape), *(0.3 * rng.standard_normal((2, *shape)))], -1)
     surface /= np.linalg.norm(surface, axis=-1, keepdims=True)
     gloss, offset = rng.random(shape), 0.2 * rng.random((*shape, 3))
-    light = rng.random((environment, environment, 3))
+    light = rng.random((8, 8, 3))
     return Maps(*(np.asarray(x, np.float32) for x in (gloss, offset, surface, np.zeros((*shape, 2)), light)))
 
 
@@ -135,12 +135,12 @@ def _start(truth: Maps) -> Maps:
     return Maps.blank(truth.normals, KEYS)
 
 
-def _seen(maps: Maps, strength: float, noise: float = 0.01, turned: bool = False) -> Seen:
+def _seen(maps: Maps, strength: float, turned: bool = False) -> Seen:
     """Rays of eight cameras whose photos show `strength` times a known reflection, its mean in the layers."""
     looked = _looked(*_rays(20_000), _turns(20_000) if turned else None)
     rng, count = np.random.default_rng(2), len(looked.st)
     known = centred(maps, looked, PARAMS)
-    residual = strength * known.added(looked) + noise * rng.standard_normal((count, 3)).astype(np.float32)
+    residual = strength * known.added(looked) + 0.01 * rng.standard_normal((count, 3)).astype(np.float32)
     return replace(looked, camera=(np.arange(count) % 8).astype(np.int32), residual=residual.astype(np.float32))
 
 

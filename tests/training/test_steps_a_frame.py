@@ -10,35 +10,15 @@ import numpy as np
 import pytest
 import torch
 
-from facefolds_core.geometry.chart import Chart
 from facefolds_core.params import ExplicitParams
-from facefolds_core.subject.volume import Volume
-from facefolds_core.training.explicit.fit import Fit
 from facefolds_core.training.explicit.plan import epochs, plan
 from facefolds_core.training.explicit.state import TextureState
+from tests.training.test_warnings import WELL
 
 PIXELS = 3_000_000
 
 
-def fitted() -> Fit:
-    ones = np.ones((4, 4))
-    return Fit(
-        Chart((0, 0, 0)),
-        (-0.5, 0.5, -0.5, 0.5),
-        ones,
-        ones,
-        np.zeros((4, 4)),
-        np.zeros((4, 4)),
-        ones,
-        ones,
-        np.ones((4, 4, 3)),
-        (128, 96),
-        (),
-        (),
-        Volume(np.zeros((2, 2, 2, 4), np.float32), np.zeros(3), 1.0),
-        {},
-        30.0,
-    )
+FITTED = replace(WELL, texels=(128, 96))
 
 
 def params(steps: int = 20) -> ExplicitParams:
@@ -47,12 +27,12 @@ def params(steps: int = 20) -> ExplicitParams:
 
 @pytest.mark.parametrize("frames", [1, 4, 6])
 def test_few_frames_share_the_iterations_that_are_asked_for(frames: int) -> None:
-    assert sum(level.iterations for level in plan(fitted(), params(), frames, PIXELS)) == params().iterations
+    assert sum(level.iterations for level in plan(FITTED, params(), frames, PIXELS)) == params().iterations
 
 
 @pytest.mark.parametrize(("frames", "steps"), [(24, 20), (200, 20), (1000, 20), (1000, 1)])
 def test_each_of_many_frames_has_its_steps_at_full_resolution(frames: int, steps: int) -> None:
-    last = plan(fitted(), params(steps), frames, PIXELS)[-1]
+    last = plan(FITTED, params(steps), frames, PIXELS)[-1]
     order = epochs(frames, np.random.default_rng(0))
     taken = Counter(islice(order, last.iterations))
     assert last.texels == (128, 96)
@@ -70,20 +50,20 @@ def test_orders_differ_and_repeat_with_the_seed() -> None:
 
 @pytest.mark.parametrize(("iterations", "pace"), [(183, 1.0), (460, 1.0), (740, 0.5), (1860, 1 / 6)])
 def test_a_longer_training_goes_the_same_way_in_smaller_steps(iterations: int, pace: float) -> None:
-    *rounds, half, last = plan(fitted(), params().model_copy(update={"iterations": iterations}), 1, PIXELS)
+    *rounds, half, last = plan(FITTED, params().model_copy(update={"iterations": iterations}), 1, PIXELS)
     assert all(level.pace == 1 for level in rounds)
     assert half.pace == last.pace == pytest.approx(pace)
 
 
 def test_many_frames_are_trained_at_full_rate() -> None:
-    assert {level.pace for level in plan(fitted(), params(), 200, PIXELS)} == {1.0}
+    assert {level.pace for level in plan(FITTED, params(), 200, PIXELS)} == {1.0}
     doubled = params().model_copy(update={"iterations": 8180})
-    assert plan(fitted(), doubled, 200, PIXELS)[-1].pace == pytest.approx(0.5)
+    assert plan(FITTED, doubled, 200, PIXELS)[-1].pace == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("parts", [1, 2, 4, 7])
 def test_opacity_is_smoothed_as_often_in_a_longer_training(parts: int) -> None:
-    level = replace(plan(fitted(), params(), 1, PIXELS)[-1], pace=1 / parts)
+    level = replace(plan(FITTED, params(), 1, PIXELS)[-1], pace=1 / parts)
     smoothed = [i for i in range(168 * parts) if level.smooths(i, 3)]
     assert smoothed == [3 * parts * k for k in range(56)]
 
@@ -97,6 +77,6 @@ def test_frames_decay_at_the_level_s_pace() -> None:
 
 @pytest.mark.parametrize(("pixels", "stride"), [(3_000_000, 8), (2_000_000, 8), (1_440_000, 5), (540_672, 2), (100, 1)])
 def test_rounds_look_at_enough_of_small_pictures(pixels: int, stride: int) -> None:
-    *rounds, half, last = plan(fitted(), params(), 12, pixels)
+    *rounds, half, last = plan(FITTED, params(), 12, pixels)
     assert {level.stride for level in rounds} == {stride}
     assert half.stride == last.stride == 1

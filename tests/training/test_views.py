@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from facefolds_core.captures.scene import Scene
-from facefolds_core.geometry.chart import Chart
-from facefolds_core.model.radial import RadialManifolds
 from facefolds_core.training.explicit.teacher import Teacher
 from facefolds_core.training.explicit.views import Views, trace_views
-from tests.scenes import CENTRE, make_scene
+from tests.scenes import make_scene
 from tests.subject.splats import found
+from tests.training.test_moving import layers
 
 
 @pytest.fixture
@@ -23,9 +21,7 @@ def scene(tmp_path: Path) -> Scene:
 
 
 def traced(scene: Scene, stride: int) -> Views:
-    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
-    chart = Chart((float(CENTRE[0]), 0.0, 0.0))
-    return trace_views(scene, RadialManifolds(chart, (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3), stride)
+    return trace_views(scene, layers(), stride)
 
 
 def test_four_rays_at_outlines_around_the_centres_and_one_elsewhere(scene: Scene) -> None:
@@ -67,9 +63,7 @@ def test_parts_and_what_is_put_together_keep_their_rays(scene: Scene) -> None:
 
 def test_virtual_cameras_have_fewer_pixels_and_finer_rays_at_their_outlines(scene: Scene) -> None:
     teacher = Teacher(scene, found(scene, 30.0), seed=0).virtual
-    middle, halfwidth = torch.full((9, 9), 0.33), torch.full((9, 9), 0.01)
-    layers = RadialManifolds(Chart((float(CENTRE[0]), 0.0, 0.0)), (-0.6, 0.6, -0.6, 0.6), middle, halfwidth, 3)
-    plain, views = trace_views(scene, layers, 1), trace_views(scene, layers, 1, teacher)
+    plain, views = traced(scene, 1), trace_views(scene, layers(), 1, teacher)
     real = len(scene.indices("train"))
     photos = views.part(np.flatnonzero(views.camera < real))
     for name, array in vars(plain).items():

@@ -71,11 +71,13 @@ class Player:
         if kind in ("error", "warning"):
             self.said.append(f"{kind}: {text}")
 
-    def open(self, asset: str, view: str = "frame=0", wait: bool = True) -> None:
-        """Open the page with the asset served as `asset`; by default at rest, at frame 0."""
+    def open(self, asset: str, view: str = "frame=0", wait: bool = True, full: bool = False) -> None:
+        """Open the page with the asset served as `asset`; by default at rest, at frame 0. `full`: at its full level."""
         self.page.goto(f"{self.address}?src={asset}/#{view}")
         if wait:
             self.wait("e.ready")
+        if full:
+            self.wait("e.level === 'full'")
 
     def wait(self, condition: str) -> None:
         """Wait until a JavaScript condition on the element `e` holds."""
@@ -105,6 +107,17 @@ class Player:
         return captured(self.page, camera)
 
 
+def touching(player: Player) -> Callable[..., object]:
+    """What touches the screen: takes a kind, "touchStart", "touchMove" or "touchEnd", and the fingers' (x, y)."""
+    client = player.page.context.new_cdp_session(player.page)
+
+    def touch(kind: str, *points: tuple[float, float]) -> object:
+        places = [{"x": x, "y": y} for x, y in points]
+        return client.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+    return touch
+
+
 def page_of_yours(player: Player, body: str) -> None:
     """Open a page with `body` and the module of the player, without any policy, from the player's own server."""
     script = '<script type="module" src="facefolds-player.js"></script>'
@@ -112,6 +125,16 @@ def page_of_yours(player: Player, body: str) -> None:
     html = f'{head}<link rel="icon" href="data:,">{script}<body style="margin:0">{body}</body>'
     player.page.route("**/yours.html", lambda route: route.fulfill(body=html, content_type="text/html"))
     player.page.goto(f"{player.address}yours.html")
+
+
+def listening(page: Page) -> tuple[list[str], list[str]]:
+    """What a page says on its console or as an error, and the addresses that it asks for, from now on."""
+    said: list[str] = []
+    fetched: list[str] = []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: fetched.append(request.url))
+    return said, fetched
 
 
 NewPlayer = Callable[..., Player]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from facefolds_core.asset import read_asset
-from tests.viewer.conftest import NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import NewPlayer, Player, page_of_yours, touching
 
 
 @pytest.fixture
@@ -16,8 +16,7 @@ def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player(
         {"asset": rich}, viewport={"width": 760, "height": 500}, permissions=["clipboard-write", "clipboard-read"]
     )
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     return player
 
 
@@ -140,10 +139,7 @@ def test_orbit_pan_and_zoom_by_pointer(player: Player) -> None:
 def test_touch_turns(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich}, viewport={"width": 390, "height": 700}, has_touch=True, is_mobile=True)
     player.open("asset")
-    client = player.page.context.new_cdp_session(player.page)
-    touch = lambda kind, *points: client.send(  # noqa: E731
-        "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
-    )
+    touch = touching(player)
     touch("touchStart", (200, 250))
     for x in (180, 150, 120):
         touch("touchMove", (x, 250))

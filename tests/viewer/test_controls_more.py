@@ -21,8 +21,7 @@ from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player({"asset": rich}, viewport={"width": 760, "height": 500})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     return player
 
 

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from tests.viewer.conftest import PATIENCE, NewPlayer, Player, page_of_yours
+from tests.viewer.conftest import PATIENCE, NewPlayer, Player, page_of_yours, touching
 
 COUNT_FRAMES = """window.frames_asked = 0; const ask = requestAnimationFrame.bind(window);
     window.requestAnimationFrame = (act) => { ++window.frames_asked; return ask(act); };"""
@@ -95,10 +95,7 @@ def test_one_finger_scrolls_the_page_upright_and_turns_across(new_player: NewPla
     player = opened(new_player, rich, ONE.format("") + TALL, **phone)
     player.wait("e.ready")
     assert player.run("return getComputedStyle(e.shadowRoot.querySelector('canvas')).touchAction") == "pan-y"
-    client = player.page.context.new_cdp_session(player.page)
-    touch = lambda kind, *points: client.send(  # noqa: E731
-        "Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]}
-    )
+    touch = touching(player)
     touch("touchStart", (200, 200))
     for k in range(1, 13):
         touch("touchMove", (200, 200 - 10 * k))
@@ -249,8 +246,7 @@ def test_a_folder_without_an_address_plays(new_player: NewPlayer, rich: Path, tm
     """A ZIP that is dropped on the page."""
     archive = Path(shutil.make_archive(str(tmp_path / "asset"), "zip", rich.parent, rich.name))
     player = new_player({"asset": rich})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     code = """const bytes = Uint8Array.from(atob(v), (sign) => sign.charCodeAt(0)); const transfer = new DataTransfer();
         transfer.items.add(new File([bytes], 'asset.zip')); window.before = e.player;
         dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, cancelable: true, bubbles: true }));"""

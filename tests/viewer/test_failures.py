@@ -31,11 +31,7 @@ def asset(rich_copy: Path) -> Path:
 @pytest.fixture
 def one_level(rich_copy: Path) -> Path:
     """Nothing to fall back to."""
-
-    def change(value: dict) -> None:
-        value["levels"] = value["levels"][:1]
-
-    change_manifest(rich_copy, change)
+    change_manifest(rich_copy, lambda value: value.update(levels=value["levels"][:1]))
     return rich_copy
 
 
@@ -136,11 +132,7 @@ def spoil_mesh(asset: Path) -> str:
     """Garbage whose checksum is right."""
     path = asset / "coarse_meshes.bin"
     path.write_bytes(b"\x01" * path.stat().st_size)
-
-    def change(value: dict) -> None:
-        value["levels"][0]["meshes"][0]["sha256"] = file_entry(path)["sha256"]
-
-    change_manifest(asset, change)
+    change_manifest(asset, lambda value: value["levels"][0]["meshes"][0].update(sha256=file_entry(path)["sha256"]))
     return "not a Draco mesh"
 
 
@@ -152,10 +144,8 @@ def spoil_video(asset: Path) -> str:
 
 
 def spoil_codec(asset: Path) -> str:
-    def change(value: dict) -> None:
-        value["levels"][0]["texture"]["videos"][0]["mime"] = 'video/mp4; codecs="hvc9.1"'
-
-    change_manifest(asset, change)
+    mime = 'video/mp4; codecs="hvc9.1"'
+    change_manifest(asset, lambda value: value["levels"][0]["texture"]["videos"][0].update(mime=mime))
     return "h264: not supported"
 
 
@@ -188,20 +178,13 @@ def test_try_again_loads_again(new_player: NewPlayer, one_level: Path, tmp_path:
     assert not player.page.get_by_role("alert").is_visible()
 
 
-def test_a_damaged_finer_level_leaves_the_coarse_one_playing(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "full_meshes.bin").unlink()
+@pytest.mark.parametrize(("damaged", "left"), [("full", "coarse"), ("coarse", "full")])
+def test_a_damaged_level_gives_way_to_the_other(new_player: NewPlayer, asset: Path, damaged: str, left: str) -> None:
+    (asset / f"{damaged}_meshes.bin").unlink()
     player = new_player({"asset": asset}, allow=(NOT_FOUND,))
     player.open("asset")
-    assert "full_meshes.bin is missing" in player.notice()
-    assert player.run("e.play(); return [e.level, e.playing]") == ["coarse", True]
-
-
-def test_a_damaged_coarse_level_gives_way_to_the_finer_one(new_player: NewPlayer, asset: Path) -> None:
-    (asset / "coarse_meshes.bin").unlink()
-    player = new_player({"asset": asset}, allow=(NOT_FOUND,))
-    player.open("asset")
-    assert "coarse_meshes.bin is missing" in player.notice()
-    assert player.run("return e.level") == "full"
+    assert f"{damaged}_meshes.bin is missing" in player.notice()
+    assert player.run("e.play(); return [e.level, e.playing]") == [left, True]
 
 
 def test_a_damaged_level_that_was_named_gives_way_to_another(new_player: NewPlayer, asset: Path) -> None:
@@ -279,15 +262,13 @@ def test_a_broken_stream_falls_back_to_the_second_video(new_player: NewPlayer, a
     path.write_bytes(data)
     change_manifest(asset, lambda value: value["levels"][1]["texture"]["videos"][0].update(file_entry(path)))
     player = new_player({"asset": asset})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     assert player.run("return e.statistics.video") == "vp9"
 
 
 def test_a_lost_context_is_said_and_comes_back(new_player: NewPlayer, asset: Path) -> None:
     player = new_player({"asset": asset}, allow=())
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     before = player.capture()
     player.run(
         """const { gl } = e.player.renderer.graphics;

@@ -25,8 +25,7 @@ def pictures(rich: Path) -> list[np.ndarray]:
 
 
 def opened(player: Player) -> Player:
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     player.run("e.background = v; e.effects = false", GREY)
     return player
 

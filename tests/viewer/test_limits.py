@@ -20,8 +20,7 @@ GOOD = {"azimuth": (-23, 33), "elevation": (-7, 17)}
 def player(new_player: NewPlayer, rich_copy: Path) -> Player:
     change_manifest(rich_copy, lambda value: value.update(view=FILMED))
     player = new_player({"asset": rich_copy}, viewport={"width": 760, "height": 500})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     return player
 
 

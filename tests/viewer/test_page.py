@@ -18,8 +18,7 @@ def test_the_coarse_level_comes_first_and_the_full_one_follows(new_player: NewPl
         const e = document.querySelector('facefolds-player');
         for (const name of ['ready', 'level']) e.addEventListener(name, () => seen.push([name, e.level])); });"""
     )
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     assert player.page.evaluate("seen") == [["ready", "coarse"], ["level", "coarse"], ["level", "full"]]
     order = [Path(urlsplit(url).path).name for url in player.requests]
     assert order.index("coarse.mp4") < order.index("full.mp4")

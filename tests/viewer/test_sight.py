@@ -42,8 +42,7 @@ NEIGHBOURS = (("#16181d", DARK), ("#ffffff", WHITE), ("transparent", WHITE))
 @pytest.fixture
 def player(new_player: NewPlayer, rich: Path) -> Player:
     player = new_player({"asset": rich}, viewport={"width": 900, "height": 700})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     return player
 
 
@@ -118,8 +117,7 @@ def test_layers_that_are_pulled_apart_are_seen_from_aside_and_fill_the_canvas(
         player.run("await customElements.whenDefined('facefolds-player'); e.spread = 1")
         player.wait("e.level === 'full'")
     else:
-        player.open("asset")
-        player.wait("e.level === 'full'")
+        player.open("asset", full=True)
         player.run("e.setAttribute('controls', 'none'); e.spread = 0.9")
         if how == "settings":
             player.run("e.setAttribute('controls', '')")

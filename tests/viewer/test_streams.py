@@ -58,8 +58,7 @@ def shows(picture: np.ndarray, pictures: list[np.ndarray], frame: int) -> bool:
 
 
 def opened(player: Player) -> Player:
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     player.run("e.background = v", GREY)
     return player
 

@@ -32,8 +32,7 @@ def views(vectors: Path, asset: str) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("asset", ["short", "stream"])
 def test_the_web_player_shows_what_it_must(new_player: NewPlayer, vectors: Path, tmp_path: Path, asset: str) -> None:
     player = new_player({"asset": vectors / asset})
-    player.open("asset")
-    player.wait("e.level === 'full'")
+    player.open("asset", full=True)
     player.run("e.background = '#4080c0'")
     for view in views(vectors, asset):
         player.run("e.level = v", view["level"])

@@ -35,7 +35,7 @@ from facefolds_core.asset.glb import (
 )
 from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection
 from facefolds_core.asset.gltf.sound import mime_with_sound, with_sound
-from facefolds_core.asset.manifest import REMEDY, Video
+from facefolds_core.asset.manifest import Video
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_extras import Audio
 from facefolds_core.asset.opaque import opaque_where_covered
@@ -246,4 +246,4 @@ def _stored(level: AssetLevel, entry: StoredFile) -> bytes:
     Raises:
         UserError: if it is not what the manifest says.
     """
-    return read_slice(level.folder / entry.file, 0, entry.bytes, entry.sha256, REMEDY)
+    return read_slice(level.folder / entry.file, 0, entry.bytes, entry.sha256)

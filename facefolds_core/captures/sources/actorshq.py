@@ -16,6 +16,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -33,6 +34,7 @@ FPS = 25.0
 PIXEL_CENTRES = 0.5
 COLUMNS = ("name", "w", "h", "rx", "ry", "rz", "tx", "ty", "tz", "fx", "fy", "px", "py")
 _REMEDY = "copy calibration.csv again from the dataset"
+_wrong = partial(UserError, remedy=_REMEDY)
 
 
 def recognise(root: Path) -> Recognised | None:
@@ -74,35 +76,31 @@ def _table(path: Path) -> list[Calibration]:
     header = tuple(rows[0]) if rows else ()
     missing = [name for name in COLUMNS if name not in header]
     if missing:
-        raise UserError(
+        raise _wrong(
             "a table of cameras without all columns",
             file=path,
             place="line 1",
             expected=", ".join(COLUMNS),
             found=", ".join(header)[:200] or "an empty file",
-            remedy=_REMEDY,
         )
     cameras: list[Calibration] = []
     for number, row in enumerate(rows[1:], 2):
         if not row:
             continue
         if len(row) != len(header):
-            raise UserError(
+            raise _wrong(
                 "a line of the table has too few or too many values",
                 file=path,
                 place=f"line {number}",
                 expected=f"{len(header)} values",
                 found=f"{len(row)}",
-                remedy=_REMEDY,
             )
         camera = _camera(dict(zip(header, row, strict=True)), path, number)
         if camera.name in {other.name for other in cameras}:
-            raise UserError(
-                "a camera appears twice", file=path, place=f"line {number}", found=camera.name, remedy=_REMEDY
-            )
+            raise _wrong("a camera appears twice", file=path, place=f"line {number}", found=camera.name)
         cameras.append(camera)
     if not cameras:
-        raise UserError("a table without cameras", file=path, expected="a line a camera", remedy=_REMEDY)
+        raise _wrong("a table without cameras", file=path, expected="a line a camera")
     return cameras
 
 
@@ -113,13 +111,12 @@ def _camera(values: dict[str, str], path: Path, line: int) -> Calibration:
         except ValueError:
             value = float("nan")
         if not abs(value) <= HUGE:
-            raise UserError(
+            raise _wrong(
                 "not a number",
                 file=path,
                 place=f"line {line} (camera {values['name']}), {name}",
                 expected=f"a finite number, at most {HUGE:g}",
                 found=values[name][:80],
-                remedy=_REMEDY,
             )
         return value
 

@@ -12,6 +12,7 @@ refers to bmild/nerf, README.md ("Generating poses for your own scenes") and loa
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -71,26 +72,17 @@ def _videos(root: Path) -> dict[str, Path]:
 
 def _camera(name: str, row: NDArray[np.float64], path: Path, index: int) -> Calibration:
     place = f"row {index} (camera {name})"
+    wrong = partial(UserError, file=path, place=place, remedy=_REMEDY)
     down, right, back, centre, (height, width, focal) = row[:15].reshape(3, 5).T
     rotation = np.stack([right, down, -back])
     if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
         found = f"det = {np.linalg.det(rotation):.6g}, {np.round(rotation, 4).tolist()}"
-        raise UserError(
-            "a row without a rotation",
-            file=path,
-            place=place,
-            expected="columns down, right, back: orthonormal axes",
-            found=found,
-            remedy=_REMEDY,
-        )
+        raise wrong("a row without a rotation", expected="columns down, right, back: orthonormal axes", found=found)
     if not (1 <= width <= 1 << 20 and 1 <= height <= 1 << 20 and abs(focal) <= HUGE):
-        raise UserError(
+        raise wrong(
             "a row without a picture's size",
-            file=path,
-            place=place,
             expected="height, width and focal length in pixels",
             found=[float(height), float(width), float(focal)],
-            remedy=_REMEDY,
         )
     K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     w2c = np.concatenate([rotation, -(rotation @ centre)[:, None]], 1)

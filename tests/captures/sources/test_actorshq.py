@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.sources import actorshq
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, Subject
 from tests.captures.fixtures import pattern, save
-from tests.filmed import check_same, film, save_jpeg, scene_of
+from tests.filmed import check_same, film, reader, save_jpeg, scene_of
+
+read = reader("actorshq")
 
 HEADER = "name,w,h,rx,ry,rz,tx,ty,tz,fx,fy,px,py"
 
@@ -37,10 +37,6 @@ def write(root: Path) -> Path:
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("4x"))
-
-
-def read(root: Path, **subject: object) -> Capture:
-    return actorshq.read(root, Subject(source="actorshq", path="x", **subject), CaptureParams())  # type: ignore[arg-type]
 
 
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:

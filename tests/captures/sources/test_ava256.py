@@ -15,11 +15,12 @@ import pytest
 from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import frame_times, head_pose, tracked_mesh
-from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.sources import ava256
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, Subject
-from tests.filmed import Film, check_same, film, scene_of
+from facefolds_core.params import CaptureParams
+from tests.filmed import Film, check_same, film, reader, scene_of
+
+read = reader("ava256", segment="EXP_a")
 
 WIDTH, HEIGHT = 43, 66  # as 2668 x 4096, to a few thousandths of a percent
 FRAMES = ("000120", "000124", "000128")
@@ -83,11 +84,6 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def copied(filmed: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(filmed, tmp_path / "copy"))
-
-
-def read(root: Path, segment: str | None = "EXP_a", **subject: object) -> Capture:
-    entry = Subject(source="ava256", path="x", segment=segment, **subject)  # type: ignore[arg-type]
-    return ava256.read(root, entry, CaptureParams())
 
 
 def test_the_filmed_actor_comes_back_with_its_mesh(filmed: Path, tmp_path: Path) -> None:
@@ -156,7 +152,7 @@ def test_cameras_and_frames_that_are_missing_are_said(copied: Path) -> None:
 @pytest.mark.parametrize(("segment", "words"), [(None, "several segments"), ("EXP_c", "no such segment")])
 def test_the_segment_must_be_one(filmed: Path, segment: str | None, words: str) -> None:
     with pytest.raises(UserError, match=words) as caught:
-        read(filmed, segment)
+        read(filmed, segment=segment)
     assert caught.value.expected == "one of EXP_a, EXP_b"
 
 

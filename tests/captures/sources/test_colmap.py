@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.colmap_model import MODELS
 from facefolds_core.captures.sources import colmap
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import CaptureParams, Subject
 from tests.captures.fixtures import pattern, save
 from tests.captures.test_arrangement import moved
-from tests.filmed import check_same, film, scene_of
+from tests.filmed import check_same, film, reader, scene_of
+
+read = reader("colmap")
 
 Array = NDArray[np.float64]
 NUMBERS = {name: number for number, (name, _) in MODELS.items()}
@@ -63,10 +63,6 @@ class Model:
             data += struct.pack("<i7di", i, *pose, camera) + name.encode() + b"\0"
             data += struct.pack("<Q2ddq", 1, 1.5, 2.5, 0.0, -1)[: 8 + 24]
         (folder / "images.bin").write_bytes(data)
-
-
-def read(root: Path) -> Capture:
-    return colmap.read(root, Subject(source="colmap", path="x"), CaptureParams())
 
 
 def film_pictures(root: Path) -> None:

@@ -9,12 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.sources import easymocap
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, Subject
 from tests.captures.fixtures import pattern, save
-from tests.filmed import check_same, film, save_video, scene_of
+from tests.filmed import check_same, film, reader, save_video, scene_of
+
+read = reader("easymocap")
 
 
 def write_calibration(root: Path) -> None:
@@ -46,10 +45,6 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
             save(root / "images" / name / f"{k:06d}.png", truth.images[c, k])
             save(root / "mask" / name / f"{k:06d}.png", truth.mattes[c, k])
     return root
-
-
-def read(root: Path, **subject: object) -> Capture:
-    return easymocap.read(root, Subject(source="easymocap", path="x", **subject), CaptureParams())  # type: ignore[arg-type]
 
 
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
@@ -195,13 +190,3 @@ def test_neither_pictures_nor_videos_is_said(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="neither pictures nor videos") as caught:
         read(tmp_path)
     assert "annots.npy is a pickle" in str(caught.value)
-
-
-def test_videos_of_other_lengths_are_refused(tmp_path: Path) -> None:
-    truth = film()
-    write_calibration(tmp_path)
-    for c, name in enumerate(truth.names):
-        save_video(tmp_path / "videos" / f"{name}.mp4", truth.images[c][: 2 if c == 1 else 3], truth.fps)
-    with pytest.raises(UserError, match="different lengths") as caught:
-        read(tmp_path)
-    assert "A001" in str(caught.value)

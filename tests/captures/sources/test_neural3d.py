@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.sources import neural3d
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.params import CaptureParams, Subject
-from tests.filmed import check_same, film, save_video, scene_of
+from tests.filmed import check_same, film, reader, save_video, scene_of
+
+read = reader("neural3d")
 
 NAMES = tuple(f"cam{i:02d}" for i in (0, 1, 2, 4, 10))
 """A camera that was taken out has neither video nor row."""
@@ -37,10 +37,6 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def copied(filmed: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(filmed, tmp_path / "copy"))
-
-
-def read(root: Path, **subject: object) -> Capture:
-    return neural3d.read(root, Subject(source="neural3d", path="x", **subject), CaptureParams())  # type: ignore[arg-type]
 
 
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
@@ -98,6 +94,6 @@ def test_other_frame_counts_and_a_cut_video(copied: Path) -> None:
         read(copied)
 
 
-def test_it_is_recognised(filmed: Path, tmp_path: Path) -> None:
+def test_it_is_recognised(filmed: Path) -> None:
     found = neural3d.recognise(filmed)
     assert found is not None and found.keys == {"holdout": ["cam00"]}

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from PIL import Image as Pillow
 
-from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.sources import renderme
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, Subject
 from tests.captures.fixtures import pattern
-from tests.filmed import check_same, film, scene_of
+from tests.filmed import check_same, film, reader, scene_of
+
+read = reader("renderme")
 
 NAMES = ("00", "01", "02", "03", "04")
 
@@ -50,10 +50,6 @@ def write(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("renderme"))
-
-
-def read(root: Path, **subject: object) -> Capture:
-    return renderme.read(root, Subject(source="renderme", path="x", **subject), CaptureParams())  # type: ignore[arg-type]
 
 
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
