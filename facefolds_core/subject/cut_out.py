@@ -138,7 +138,7 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
     """
     radius = pixels(edge.soft, camera)
     near = grown(cut.astype(np.uint8), radius) > 0
-    if near.all():
+    if near.all() or not near.any():
         return cut.astype(np.float32)
     part, opacity = around(near, AROUND * radius), np.zeros(cut.shape, np.float32)
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)

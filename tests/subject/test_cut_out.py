@@ -210,3 +210,11 @@ def test_between_locks_one_sees_what_stands_behind() -> None:
     beside = comb & (x > 316) & (x < 326) & (abs(y - 192) < 30)
     assert opacity[beside & ~locks].mean() < 0.6 * opacity[beside & locks].mean()
     assert opacity[head & (x < 180) & (np.hypot(x - 192, y - 192) < 60)].min() == 1
+
+
+@pytest.mark.parametrize("all_of_it", [True, False])
+def test_a_silhouette_of_nothing_or_of_the_whole_picture_stays(all_of_it: bool) -> None:
+    image, cut = np.full((24, 24, 3), 80, np.uint8), np.full((24, 24), all_of_it)
+    start, behind = np.full((24, 24), 0.5, np.float32), np.zeros((24, 24, 3), np.float32)
+    opacity = softened(image, cut, start, behind, look_at_origin("c", 0, 0, 24), EdgeParams())
+    np.testing.assert_array_equal(opacity, cut)
