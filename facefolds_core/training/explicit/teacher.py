@@ -87,15 +87,10 @@ class Teacher:
             self._mesh = surface[0]
         return [self._at(frame, photos) for frame in others]
 
-    def moved(self, frame: int, photos: Callable[[int], Image]) -> Splats | None:
-        """The Gaussians of a frame, as far as they are known without a fit that nothing else needs; None where they
-        are those of the start.
-
-        Args:
-            photos: as of `cut`.
-        """
-        known = self._at(frame, photos) if self._views or frame in self._known else self._begun(frame)
-        return None if known is self._splats else known
+    def moved(self, frame: int) -> Splats | None:
+        """The Gaussians of a frame as the tracked mesh says, and they alone: those that follow the photos of few
+        cameras have holes. None where they are those of the start, or ride on no mesh."""
+        return None if self._mesh is None or frame == self._first else self._ridden(self._mesh, frame)
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
         """(V, H W, 4) RGBA of a frame, colours times opacity.
@@ -111,12 +106,10 @@ class Teacher:
             if self._usual is None:
                 self._usual = mean_errors(self._splats, targets_of(self._real(self._first), photos(self._first)))
             targets = targets_of(self._real(frame), photos(frame))
-            self._known[frame] = changed_to(self._begun(frame), self._usual, targets, self._seed + frame)
+            moved = self.moved(frame)
+            begun = self._splats if moved is None else moved
+            self._known[frame] = changed_to(begun, self._usual, targets, self._seed + frame)
         return self._known[frame]
-
-    def _begun(self, frame: int) -> Splats:
-        """As the tracked mesh says; without one those of the start."""
-        return self._splats if self._mesh is None else self._ridden(self._mesh, frame)
 
     def _ridden(self, mesh: NDArray[np.float32], frame: int) -> Splats:
         start, now = (mesh[k].astype(np.float64) for k in (self._first, frame))

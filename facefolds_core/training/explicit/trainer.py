@@ -155,7 +155,7 @@ class Trainer:
         if fill:
             self.state.fill(opacity, rgb if colours else None)
             for frame in range(self.scene.num_frames):
-                splats = self.teacher.moved(frame, self.pictures.photos)
+                splats = self.teacher.moved(frame)
                 if splats is not None:
                     self.state.fill_frame(frame, held(volume_in(self.scene, splats))[0])
 
