@@ -10,7 +10,7 @@ import trimesh
 
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.sphere_uv import directions_to_uv
-from facefolds_core.training.explicit.tracked import REACH, blend, mean_radius, mesh_radii
+from facefolds_core.training.explicit.tracked import REACH, blend, mesh_radii
 
 AXIS = -0.2
 
@@ -35,7 +35,7 @@ def test_a_mesh_has_no_radius_where_it_lies_behind_the_centre_only() -> None:
     faces = ball.faces[(back[ball.faces][..., 0] < 0.1).all(1)]  # the front is cut away
     directions = np.array([[1.0, 0, 0], [0.9, 0.3, 0], [0, 1, 0], [-1, 0, 0]])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    (radii,) = mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
+    radii = mesh_radii(back[None], faces, Chart((0, 0, 0)), directions_to_uv(directions))
     assert np.isnan(radii[:2]).all()
     assert radii[2:] == pytest.approx([0.2, 0.2], abs=0.003)
 
@@ -50,7 +50,7 @@ def test_radii_of_a_mesh_below_the_belt_are_measured_from_the_axis() -> None:
     faces = np.concatenate([np.stack([sides, after, 4 + sides], 1), np.stack([after, 4 + after, 4 + sides], 1)])
     chart = Chart((AXIS, 0.0, 0.0), Belt(0.0, 0.25))
     uv = np.array([[-0.5, 0.0], [-0.5, 0.5], [-0.9, -1.0], [-1.3, 0.0], [0.5, 0.0]])
-    (radii,) = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
+    radii = mesh_radii(vertices[None], faces.astype(np.int32), chart, uv)
     inner = 0.1 / math.sqrt(2)
     assert radii[:3] == pytest.approx([inner, 0.1, inner], abs=1e-6)
     assert np.isnan(radii[3:]).all()
@@ -60,5 +60,5 @@ def test_the_radius_is_the_mean_over_the_frames() -> None:
     ball = trimesh.creation.icosphere(4, 1.0)
     sizes = np.array([0.28, 0.30, 0.30, 0.36])
     uv = np.random.default_rng(0).uniform(-0.8, 0.8, (50, 2))
-    radii = mean_radius(mesh_radii(sizes[:, None, None] * ball.vertices, ball.faces, Chart((0, 0, 0)), uv))
+    radii = mesh_radii(sizes[:, None, None] * ball.vertices, ball.faces, Chart((0, 0, 0)), uv)
     assert radii == pytest.approx(np.full(50, sizes.mean()), abs=1e-3)

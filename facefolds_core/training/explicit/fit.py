@@ -32,15 +32,7 @@ from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import FoundSubject
 from facefolds_core.subject.volume import CELLS, COARSE, Volume, volume_of
 from facefolds_core.training.explicit.second_surface import LAYERS, second_surface
-from facefolds_core.training.explicit.tracked import (
-    OPACITY,
-    REACH,
-    TRUST,
-    blend,
-    mean_radius,
-    mesh_radii,
-    trusted_surface,
-)
+from facefolds_core.training.explicit.tracked import OPACITY, REACH, TRUST, blend, mesh_radii, trusted_surface
 
 Array = NDArray[np.float64]
 
@@ -117,16 +109,14 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     seen = profile(volume, chart, uv, start.subject_opacity)
     opacity = seen.opacity.astype(np.float64)
     if surface is None or vertices is None:
-        known, kept, tracked = seen.radius, np.zeros((rows, columns)), np.empty((0, rows, columns))
+        known, kept = seen.radius, np.zeros((rows, columns))
         source = fact("middle_from_volume")
     else:
-        tracked = mesh_radii(vertices, surface[1], chart, uv)
-        mesh = mean_radius(tracked)
+        mesh = mesh_radii(vertices, surface[1], chart, uv)
         points = chart.points(uv, mesh).reshape(-1, 3)
         unseen = seen_by(cameras, points).reshape(mesh.shape) < MIN_VIEW_SHARE * len(cameras)
         seen = replace(seen, radius=np.where(unseen & np.isfinite(mesh), np.nan, seen.radius))
         known, kept = blend(mesh, seen.radius, REACH)
-        tracked = np.where(kept == 1, tracked, np.nan)
         opacity = np.where(np.isfinite(mesh) & np.isnan(seen.radius), np.maximum(opacity, OPACITY), opacity)
         source = fact("middle_from_mesh", reach=REACH)
     middle = extrapolate(known).clip(MIN_RADIUS)
@@ -134,7 +124,7 @@ def fit_scene(scene: Scene, subject: FoundSubject, params: ExplicitParams, other
     widths = spread(seen, middle, geometry.halfwidth, most, volume.voxel)
     volumes = [volume_in(scene, splats) for splats in others]
     radii = [profile(other, chart, uv, start.subject_opacity).radius for other in volumes]
-    outwards, inwards = np.maximum(moves(seen.radius, radii, widths), moves(known, list(tracked), widths))
+    outwards, inwards = moves(seen.radius, radii, widths)
     middle, reach = middle + 0.5 * (outwards - inwards), 0.5 * (outwards + inwards)
     middle = np.maximum(middle, least_middle(widths, geometry) + reach)
     radius = float(np.quantile(middle[opacity >= start.subject_opacity], RADIUS_QUANTILE))

@@ -26,8 +26,6 @@ NODES = 128
 """Rows and columns of (u, v) at which mesh and Gaussians are compared."""
 TRUST = 0.004
 """The mesh is kept where the opacity found lies nearer than this, units; farther offsets lose as much."""
-FRAMES = 12
-"""In which it is asked where the mesh lies, at least, where there are as many."""
 OPACITY = 0.9
 """At the start, where only the mesh has a surface."""
 
@@ -52,32 +50,26 @@ def share_off(volume: Volume, chart: Chart, vertices: Array, faces: NDArray[np.i
     u0, u1, v0, v1 = whole_window(chart, start)
     uv = window_uv((max(u0, -1.0), u1, max(v0, -1.0), min(v1, 1.0)), NODES, NODES)
     least = start.subject_opacity
-    seen, mesh = profile(volume, chart, uv, least), mean_radius(mesh_radii(vertices, faces, chart, uv))
+    seen, mesh = profile(volume, chart, uv, least), mesh_radii(vertices, faces, chart, uv)
     apart = np.abs(seen.radius - mesh)[np.isfinite(mesh) & np.isfinite(seen.radius) & (seen.opacity >= least)]
     return float((apart > MAX_DISTANCE).mean()) if len(apart) else 0.0
 
 
 def mesh_radii(vertices: Array, faces: NDArray[np.int32], chart: Chart, uv: Array) -> Array:
-    """Radius (F, ...) of the mesh's outermost point along the chart's rays of (u, v) (..., 2), units, in `FRAMES` or
-    more of the frames of vertices (K, V, 3), evenly spread; NaN where the mesh has no point on that ray."""
+    """Radius (...) of the mesh's outermost point along the chart's rays of (u, v) (..., 2), mean over the frames of
+    vertices (K, V, 3), units; NaN where no frame's mesh has a point on that ray."""
     origins, flat = (of(uv).reshape(-1, 3) for of in (chart.origins, chart.directions))
-    chosen = vertices[:: max(1, len(vertices) // FRAMES)]
-    radii = np.full((len(chosen), len(flat)), np.nan)
-    for frame, own in zip(chosen, radii, strict=True):
+    total, count = np.zeros(len(flat)), np.zeros(len(flat))
+    for frame in vertices[:: max(1, len(vertices) // 12)]:
         mesh = trimesh.Trimesh(frame, faces, process=False)
         start = 2 * float(np.linalg.norm(frame - np.array(chart.centre), axis=1).max())
         points, ray, _ = mesh.ray.intersects_location(origins + start * flat, -flat, multiple_hits=False)
         radius = ((points - origins[ray]) * flat[ray]).sum(1)
         # A ray that meets nothing on this side runs on through its origin and may meet the back of a head.
         near = radius > 0
-        own[ray[near]] = radius[near]
-    return radii.reshape(-1, *uv.shape[:-1])
-
-
-def mean_radius(radii: Array) -> Array:
-    """Mean over the frames (F, ...) that have one; NaN where none has."""
-    count = np.isfinite(radii).sum(0)
-    return np.where(count > 0, np.nan_to_num(radii).sum(0) / np.maximum(count, 1), np.nan)
+        total[ray[near]] += radius[near]
+        count[ray[near]] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(uv.shape[:-1])
 
 
 def blend(mesh: Array, volume: Array, reach: float) -> tuple[Array, Array]:
