@@ -88,8 +88,8 @@ class Teacher:
         return [self._at(frame, photos) for frame in others]
 
     def moved(self, frame: int) -> Splats | None:
-        """The Gaussians of a frame as the tracked mesh says, and they alone: those that follow the photos of few
-        cameras have holes. None where they are those of the start, or ride on no mesh."""
+        """The Gaussians of a frame as the tracked mesh says; None where they are those of the start, or ride on no
+        mesh."""
         return None if self._mesh is None or frame == self._first else self._ridden(self._mesh, frame)
 
     def cut(self, frame: int, photos: Callable[[int], Image]) -> Image:
