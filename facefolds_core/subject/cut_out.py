@@ -43,7 +43,9 @@ class EdgeParams:
         rounds: how often pictures and Gaussians tell each other.
         soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels;
         deep: and so many within it, where a pixel looks like what stands behind, as between locks of hair:
-        alike: where no channel differs by so much, of values in [0, 1].
+        alike: where no channel differs by so much, of values in [0, 1]. A room from which the picture differs by
+            less, in the median, is known, and so is its noise; others have:
+        noise: deviation of what stands behind, of values in [0, 1].
         agreeing: IoU of a silhouette with the Gaussians', under which it is not believed.
     """
 
@@ -56,6 +58,7 @@ class EdgeParams:
     soft: float = 4.0
     deep: float = 12.0
     alike: float = 0.05
+    noise: float = 0.1
     agreeing: float = 0.65
 
 
@@ -144,13 +147,14 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
     off, near, own = np.abs(colours - room), near[part], cut[part]
     outside = (~own).astype(np.uint8)
-    deep, alike = grown(outside, pixels(edge.deep, camera)) == 0, off.max(-1) < edge.alike
-    inside = (grown(outside, radius) == 0) & (deep | ~alike)
+    inside, far = grown(outside, radius) == 0, grown(own.astype(np.uint8), 2 * radius) == 0
+    params, noise = PlateParams(), edge.noise
+    differing = float(np.median(off[far])) if far.any() else edge.noise
+    if differing < edge.alike:  # the room is known
+        noise = max(params.noise, differing)
+        inside &= (grown(outside, pixels(edge.deep, camera)) == 0) | (off.max(-1) >= edge.alike)
     if not inside.any():
         return cut.astype(np.float32)
-    far = grown(own.astype(np.uint8), 2 * radius) == 0
-    params = PlateParams()
-    noise = max(params.noise, float(np.median(off[far])) if far.any() else 0.0)
     found = opacity_before(colours, room, inside, near & ~inside, noise, params)
     both = np.sqrt(found * np.clip(start[part], 0, 1))
     opacity[part] = np.where(inside, np.float32(1), np.where(near, both, np.float32(0)))
