@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.subject.known_background import PlateParams, opacity_before
+from facefolds_core.subject.known_background import TINY, PlateParams, opacity_before
 
 Array = NDArray[np.float32]
 Image = NDArray[np.uint8]
@@ -43,9 +43,9 @@ class EdgeParams:
         rounds: how often pictures and Gaussians tell each other.
         soft: pixels on both sides of an outline in which opacity is not 0 or 1, at a picture of 384 pixels;
         deep: and so many within it, where a pixel looks like what stands behind, as between locks of hair:
-        alike: where no channel differs by so much, of values in [0, 1]. A room from which the picture differs by
-            less, in the median, is known, and so is its noise; others have:
-        noise: deviation of what stands behind, of values in [0, 1].
+        alike: where no channel differs by so much, of values in [0, 1], and what stands behind is known as well.
+        beside: pixels beside the subject by which that is told, standard deviation, at a picture of 384 pixels.
+        noise: largest deviation of what stands behind that is reckoned with, of values in [0, 1].
         agreeing: IoU of a silhouette with the Gaussians', under which it is not believed.
     """
 
@@ -58,6 +58,7 @@ class EdgeParams:
     soft: float = 4.0
     deep: float = 12.0
     alike: float = 0.05
+    beside: float = 6.0
     noise: float = 0.1
     agreeing: float = 0.65
 
@@ -131,9 +132,8 @@ def _logarithmic(picture: Image) -> Image:
 
 def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Camera, edge: EdgeParams) -> Array:
     """(H, W) opacity in [0, 1] of the subject in a picture (H, W, 3): around its silhouette the geometric mean
-    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it. How
-    far the picture differs from that beside the subject, in the median, is the noise: a dark wall is known well, and
-    opacity goes to 0 within a pixel, clutter is not.
+    of what the Gaussians say and of what the picture's colours say before what stands behind: both must say it. A dark
+    wall is known well, and opacity goes to 0 within a pixel; clutter that other cameras hardly see is not.
 
     Args:
         start: (H, W) opacity of its Gaussians.
@@ -145,20 +145,45 @@ def softened(picture: Image, cut: Bool, start: Array, behind: Array, camera: Cam
         return cut.astype(np.float32)
     part, opacity = around(near, AROUND * radius), np.zeros(cut.shape, np.float32)
     colours, room = picture[part].astype(np.float32) / np.float32(255), np.clip(behind[part], 0, 1)
-    off, near, own = np.abs(colours - room), near[part], cut[part]
+    near, own = near[part], cut[part]
     outside = (~own).astype(np.uint8)
     inside, far = grown(outside, radius) == 0, grown(own.astype(np.uint8), 2 * radius) == 0
-    params, noise = PlateParams(), edge.noise
-    differing = float(np.median(off[far])) if far.any() else edge.noise
-    if differing < edge.alike:  # the room is known
-        noise = max(params.noise, differing)
-        inside &= (grown(outside, pixels(edge.deep, camera)) == 0) | (off.max(-1) >= edge.alike)
+    noise = _noise(colours, room, far, pixels(edge.beside, camera), radius, edge.noise)
+    asked = (noise < edge.alike) & (np.abs(colours - room).max(-1) < edge.alike)
+    inside &= ~asked | (grown(outside, pixels(edge.deep, camera)) == 0)
     if not inside.any():
         return cut.astype(np.float32)
-    found = opacity_before(colours, room, inside, near & ~inside, noise, params)
+    found = opacity_before(colours, room, inside, near & ~inside, noise, PlateParams())
     both = np.sqrt(found * np.clip(start[part], 0, 1))
     opacity[part] = np.where(inside, np.float32(1), np.where(near, both, np.float32(0)))
     return opacity
+
+
+def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int, most: float) -> Array:
+    """(H, W) how well it is known what stands behind, as a deviation: how much the picture varies beside the subject,
+    and how far what is said to stand behind is off its mean there. Hidden by the subject from most cameras, that is a
+    guess.
+
+    Args:
+        colours, room: (H, W, 3) of the picture, and said to stand behind.
+        far: (H, W) surely not the subject.
+        beside, radius: deviations of the surroundings, pixels: of what is beside, of what is behind.
+        most: deviation where nothing is known.
+    """
+    weight = _near(far.astype(np.float32), beside)
+    nearest = ndimage.distance_transform_edt(weight <= TINY, return_distances=False, return_indices=True)
+    mean, square = (
+        (_near(one * far[..., None], beside) / np.maximum(weight, TINY)[..., None])[tuple(nearest)]
+        for one in (colours, colours**2)
+    )
+    off = _near(np.abs(room - mean), radius)
+    variance = np.maximum(square - mean**2, 0).mean(-1) + np.square(off).mean(-1)
+    return np.clip(np.sqrt(variance), PlateParams().noise, most).astype(np.float32)
+
+
+def _near(values: Array, width: float) -> Array:
+    """(H, W) or (H, W, Q), blurred."""
+    return np.asarray(cv2.GaussianBlur(values, (0, 0), width), np.float32)
 
 
 def around(mask: Bool, margin: int) -> tuple[slice, slice]:

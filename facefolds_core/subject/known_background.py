@@ -62,15 +62,18 @@ TINY = float(np.finfo(np.float32).eps)
 """No mean is formed by a smaller weight, no variance is smaller."""
 
 
-def opacity_before(image: Array, plate: Array, inside: Mask, unknown: Mask, noise: float, params: PlateParams) -> Array:
+def opacity_before(
+    image: Array, plate: Array, inside: Mask, unknown: Mask, noise: float | Array, params: PlateParams
+) -> Array:
     """(H, W) in [0, 1]: 1 on `inside`, 0 beyond it and `unknown`.
 
     Args:
         image, plate: (H, W, 3) in [0, 1].
         inside: (H, W) surely the subject's, somewhere.
         unknown: (H, W) where opacity is asked for.
-        noise: standard deviation of both, of values in [0, 1].
+        noise: standard deviation of both, of values in [0, 1]; or (H, W), each pixel's.
     """
+    variance = np.broadcast_to(np.square(np.float32(noise)) + np.float32(TINY), inside.shape)
     opacity, unknown = inside.astype(np.float32), unknown & ~inside
     colours, known = image.copy(), ~unknown
     away = np.ceil(np.asarray(ndimage.distance_transform_edt(~inside)))
@@ -80,7 +83,9 @@ def opacity_before(image: Array, plate: Array, inside: Mask, unknown: Mask, nois
         sure = known.astype(np.float32)
         beside = _blurred(opacity * sure, params.beside)[ring]
         beside /= np.maximum(_blurred(sure, params.beside)[ring], TINY)
-        opacity[ring], colours[ring] = _likeliest(image[ring], plate[ring], mean, covariance, beside, noise, params)
+        opacity[ring], colours[ring] = _likeliest(
+            image[ring], plate[ring], mean, covariance, beside, variance[ring][:, None], params
+        )
         known[ring] = True
     return opacity
 
@@ -122,7 +127,7 @@ def _widely(values: Array, width: float) -> Array:
 
 
 def _likeliest(
-    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, noise: float, params: PlateParams
+    image: Array, plate: Array, mean: Array, covariance: Array, beside: Array, noise: Array, params: PlateParams
 ) -> tuple[Array, Array]:
     """Expected opacity (P,), and the subject's colour (P, 3) with it.
 
@@ -130,20 +135,20 @@ def _likeliest(
         image, plate, mean: (P, 3).
         covariance: (P, 3, 3).
         beside: (P,) mean opacity of what is known around.
-        noise: see `opacity_before`.
+        noise: (P, 1) variance of both.
     """
     steps = np.linspace(0, 1, params.steps, dtype=np.float32)
     variances, axes = np.linalg.eigh(covariance)
     variances = np.maximum(variances, TINY)
     across = np.einsum("pij,pi->pj", axes, mean - plate)
     off = np.einsum("pij,pi->pj", axes, image - plate)
-    spread = steps[:, None, None] ** 2 * variances + (noise**2 + TINY)
+    spread = steps[:, None, None] ** 2 * variances + noise
     error = off - steps[:, None, None] * across
     chance = -0.5 * (error**2 / spread + np.log(spread)).sum(-1)
     chance -= params.alike * np.abs(steps[:, None] - beside)
     chance[-1] += params.solid
     chance = np.exp(chance - chance.max(0))
     opacity = (chance * steps[:, None]).sum(0) / chance.sum(0)
-    gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + (noise**2 + TINY))
+    gain = opacity[:, None] * variances / (opacity[:, None] ** 2 * variances + noise)
     colour = mean + np.einsum("pij,pj->pi", axes, gain * (off - opacity[:, None] * across))
     return opacity.astype(np.float32), np.clip(colour, 0, 1).astype(np.float32)

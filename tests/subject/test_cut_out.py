@@ -212,6 +212,17 @@ def test_between_locks_one_sees_what_stands_behind() -> None:
     assert opacity[head & (x < 180) & (np.hypot(x - 192, y - 192) < 60)].min() == 1
 
 
+def test_what_is_guessed_to_stand_behind_takes_nothing_away() -> None:
+    """Hidden from all cameras, hair is said to stand behind hair: beside it one sees that the wall is another."""
+    y, x = np.mgrid[:384, :384]
+    head = np.hypot(x - 192, y - 192) < 100
+    image, behind = np.full((384, 384, 3), 190, np.uint8), np.full((384, 384, 3), 190 / 255, np.float32)
+    image[head], behind[np.hypot(x - 192, y - 192) < 104] = (60, 45, 38), np.array((60, 45, 38)) / 255
+    opacity = softened(image, head, head.astype(np.float32), behind, look_at_origin("c", 0, 0, 384), EdgeParams())
+    assert opacity[np.hypot(x - 192, y - 192) < 95].min() == 1
+    assert opacity[head].mean() > 0.97
+
+
 @pytest.mark.parametrize("all_of_it", [True, False])
 def test_a_silhouette_of_nothing_or_of_the_whole_picture_stays(all_of_it: bool) -> None:
     image, cut = np.full((24, 24, 3), 80, np.uint8), np.full((24, 24), all_of_it)
