@@ -178,7 +178,7 @@ def _noise(colours: Array, room: Array, far: Bool, beside: int, radius: int, mos
     )
     off = _near(np.abs(room - mean), radius)
     variance = np.maximum(square - mean**2, 0).mean(-1) + np.square(off).mean(-1)
-    return np.clip(np.sqrt(variance), PlateParams().noise, most).astype(np.float32)
+    return np.asarray(np.clip(np.sqrt(variance), PlateParams().noise, most), np.float32)
 
 
 def _near(values: Array, width: float) -> Array:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from facefolds_core.captures.scene import REACH, Scene
 from facefolds_core.geometry.cameras import Camera
@@ -33,6 +36,13 @@ NEAR = 0.1
 """Standard deviation of the neighbourhood of the origin in which the body is the heaviest, units."""
 VIEWS = 3
 """Training cameras that must have a Gaussian in their pictures, at least; all, where there are fewer."""
+AROUND_IT = 0.5
+"""Length of the mean direction in which a body leaves the ball, below which it leaves it all around: a wall that
+surrounds the subject has 0, a neck and chest 0.8."""
+DIRECTIONS = 3
+"""Directions are told apart by so many steps from the middle to each side."""
+DOUBT = 0.7
+"""Opacity as which a Gaussian counts that may be of the room: too little to be surely the subject's."""
 
 
 def subject_of(splats: Splats, scene: Scene) -> Bool:
@@ -52,7 +62,7 @@ def _body(splats: Splats, possible: Bool, reach: float) -> Bool:
     solid = possible & (splats.opacities > SOLID)
     if not solid.any():
         return solid
-    voxel = float(np.clip(JOINED * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
+    voxel = _voxel(splats, solid, reach)
     low = splats.means[possible].min(0) - 1.5 * voxel
     cells = ((splats.means - low) / voxel).astype(np.int64)
     weight = np.zeros(tuple(cells[possible].max(0) + 2), np.float32)
@@ -74,8 +84,61 @@ def near_enough(splats: Splats, scene: Scene) -> Bool:
     mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in cameras], 0)
     before = splats.means @ mean > TOWARDS * away
     inside = away < np.where(before & (scene.radius is None), AROUND * reach, reach)
-    seen = seen_by(cameras, splats.means.astype(np.float64))
-    return np.asarray(inside & (seen >= min(VIEWS, len(cameras))))
+    return np.asarray(inside & _seen(splats, scene))
+
+
+def _seen(splats: Splats, scene: Scene) -> Bool:
+    """(N,) whether enough cameras have a Gaussian in their pictures."""
+    cameras = scene.views_of("train")
+    return np.asarray(seen_by(cameras, splats.means.astype(np.float64)) >= min(VIEWS, len(cameras)))
+
+
+def belief(splats: Splats, scene: Scene, body: Bool) -> Array:
+    """(N,) 1 for what is surely the subject's among Gaussians of a whole scene, DOUBT for what may be, 0 for the rest.
+
+    A body that leaves its ball all around goes on as a wall, of which the ball has cut out a disc. Then only what is
+    more than half as far from all that goes on, along the body's own surface, as its farthest part is surely the
+    subject's; pictures are asked about the rest.
+    """
+    reach, sure = scene.radius or REACH, body.astype(np.float32)
+    away = np.linalg.norm(splats.means, axis=1)
+    solid = (splats.opacities > SOLID) & (body | ((away < AROUND * reach) & _seen(splats, scene)))
+    if not (body & solid).any():
+        return sure
+    voxel = _voxel(splats, body & solid, reach)
+    steps = _steps(splats.means[solid], longest_axes(splats.values[solid]), ~body[solid] & (away[solid] > reach), voxel)
+    own, near = body[solid] & np.isfinite(steps), body[solid] & (steps <= 2)
+    ways = np.unique(np.rint(DIRECTIONS * splats.means[solid][near] / away[solid][near][:, None]), axis=0)
+    if not len(ways) or np.linalg.norm((ways / np.linalg.norm(ways, axis=1)[:, None]).mean(0)) > AROUND_IT:
+        return sure
+    doubtful = np.flatnonzero(solid)[own & (steps <= 0.5 * steps[own].max())]
+    sure[doubtful] = DOUBT
+    return sure
+
+
+def _voxel(splats: Splats, solid: Bool, reach: float) -> float:
+    """Side of cells in which Gaussians touch."""
+    return float(np.clip(JOINED * np.median(splats.sizes[solid].max(1)), reach / FINEST, reach / COARSEST))
+
+
+def _steps(means: Array, ends: Array, first: Bool, voxel: float) -> Array:
+    """(N,) float64: from cell to touching cell, how many steps Gaussians are from the first; inf if not joined to them.
+
+    Args:
+        means, ends: (N, 3) of Gaussians, which are in the cells at their means and at that to both sides of them.
+        first: (N,) where the way begins.
+        voxel: side of a cell.
+    """
+    places = np.floor(np.concatenate([means, means - ends, means + ends]) / voxel).astype(np.int64)
+    cells, cell = np.unique(places, axis=0, return_inverse=True)
+    cell = cell.reshape(3, -1)
+    touching = KDTree(cells).query_pairs(1.8, output_type="ndarray")  # sides, edges and corners: root of 3 at most
+    pairs = np.concatenate([touching, cell[[0, 1]].T, cell[[0, 2]].T])
+    graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), (len(cells), len(cells)))
+    if not first.any():
+        return np.full(len(means), np.inf)
+    far = dijkstra(graph, False, np.unique(cell[0][first]), unweighted=True, min_only=True)
+    return np.asarray(far[cell[0]])
 
 
 def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, low: Array, voxel: float) -> None:
@@ -88,8 +151,12 @@ def _scatter(weight: Array, splats: Splats, chosen: Bool, amount: Array, low: Ar
         np.add.at(weight, tuple(cells[inside].T), amount[chosen][inside] / 3)
 
 
-def opacity_of(splats: Splats, subject: Bool, camera: Camera) -> Array:
-    """(H, W) opacity of the subject as the camera sees it: what stands before it covers it."""
+def opacity_of(splats: Splats, subject: Bool | Array, camera: Camera) -> Array:
+    """(H, W) opacity of the subject as the camera sees it: what stands before it covers it.
+
+    Args:
+        subject: (N,) which Gaussians are its, or how far each is believed to be.
+    """
     drawing = draw(splats.values, view_of(camera))
     marks = np.repeat(subject[:, None].astype(np.float32), 3, 1)
     return np.asarray(drawing.blended(marks).picture()[0][..., 0])

@@ -26,7 +26,7 @@ from facefolds_core.subject.cut_out import (
     softened,
 )
 from facefolds_core.subject.drawing import draw, view_of
-from facefolds_core.subject.found import background, near_enough, opacity_of, subject_of
+from facefolds_core.subject.found import background, belief, near_enough, opacity_of, subject_of
 from facefolds_core.subject.plates import from_plate
 from facefolds_core.subject.splats import Splats
 from facefolds_core.subject.storage import Body
@@ -112,7 +112,8 @@ class Mattes:
     def _colours(self) -> Colours | None:
         """Of the pictures by which the body was found."""
         assert self.body is not None
-        return _colours(self.scene, self.body, self.edge)
+        body = self.body
+        return colours_of(_pictures(self.scene, body.splats, body.frame, body.subject), self.edge)
 
     def _seen(self, key: Key) -> tuple[Array, Array]:
         """(H, W) opacity of the subject's Gaussians, and (H, W, 3) what stands behind them: of a head that turns the
@@ -131,26 +132,24 @@ def body_among(scene: Scene, splats: Splats, frame: int, edge: EdgeParams | None
     is said to the pixel by its colours, and these silhouettes vote on the Gaussians."""
     edge = edge or EdgeParams()
     body, possible = Body(splats, subject_of(splats, scene), frame), near_enough(splats, scene)
+    believed = belief(splats, scene, body.subject)
     for _ in range(edge.rounds):
-        colours, larger = _colours(scene, body, edge), []
-        for picture, start, camera in _pictures(scene, body):
+        marks = np.where(believed > 0, believed, 1) * body.subject
+        colours, larger = colours_of(_pictures(scene, splats, frame, marks), edge), []
+        for picture, start, camera in _pictures(scene, splats, frame, marks):
             cut = cut_out(picture, start, camera, colours, edge)
             larger.append((camera, grown(cut.astype(np.uint8), pixels(edge.grow, camera)) > 0))
         body = Body(splats, possible & _voted(splats, larger, edge.share), frame)
     return body
 
 
-def _colours(scene: Scene, body: Body, edge: EdgeParams) -> Colours | None:
-    return colours_of(_pictures(scene, body), edge)
-
-
-def _pictures(scene: Scene, body: Body) -> Iterator[tuple[Image, Array, Camera]]:
-    """Training pictures of the body's frame, the subject's opacity in them, and their cameras."""
+def _pictures(scene: Scene, splats: Splats, frame: int, subject: Bool | Array) -> Iterator[tuple[Image, Array, Camera]]:
+    """Training pictures of a frame, the subject's opacity in them, and their cameras."""
     store = scene.open_frames()
     for i in scene.indices("train"):
-        if (i, body.frame) in store:
-            camera = scene.camera_in_head(i, body.frame)
-            yield store.image(i, body.frame), opacity_of(body.splats, body.subject, camera), camera
+        if (i, frame) in store:
+            camera = scene.camera_in_head(i, frame)
+            yield store.image(i, frame), opacity_of(splats, subject, camera), camera
 
 
 def _voted(splats: Splats, cuts: list[tuple[Camera, Bool]], share: float) -> Bool:

@@ -20,7 +20,7 @@ from facefolds_core.geometry.track import Track
 from facefolds_core.params import SubjectParams
 from facefolds_core.subject.find import all_mattes, find_subject, found_in, frames_looked_at, subject_in
 from facefolds_core.subject.folder import make_folder
-from facefolds_core.subject.found import joined, subject_of
+from facefolds_core.subject.found import DOUBT, belief, joined, subject_of
 from facefolds_core.subject.mattes import Matte, Mattes
 from facefolds_core.subject.ply import write_ply
 from facefolds_core.subject.sheet import RED, tile
@@ -198,17 +198,44 @@ def test_a_splat_file_takes_the_place_of_our_own_fit(tmp_path: Path) -> None:
     assert (true & here).sum() / (true | here).sum() > 0.9
 
 
+def seen_widely(folder: Path) -> tuple[Scene, np.ndarray]:
+    """Whose cameras see far beyond the ball; (3, 3) directions towards them, to a side, and across both."""
+    scene = make_scene(folder, size=8)
+    wide = [replace(camera, K=camera.K * [[0.2, 1, 1], [1, 0.2, 1], [1, 1, 1]]) for camera in scene.cameras]
+    towards = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in wide], 0)
+    towards /= np.linalg.norm(towards)
+    aside = np.cross(towards, [0, 1, 0])
+    aside /= np.linalg.norm(aside)
+    return replace(scene, cameras=wide), np.stack([towards, aside, np.cross(towards, aside)])
+
+
+def small(places: np.ndarray) -> Splats:
+    """Opaque Gaussians at (N, 3), 1 cm thick."""
+    head = gaussians(OPAQUE)
+    values = np.repeat(head.values[:1], len(places), 0)
+    values[:, MEAN], values[:, SCALE], values[:, OPACITY] = places, np.log(0.01), 4
+    return Splats(values, head.background)
+
+
 def test_what_is_joined_to_the_subject_towards_the_cameras_is_its(tmp_path: Path) -> None:
     """As a muzzle before a wall, where the cameras' common point is; not what goes on to a side of it."""
-    scene, head = make_scene(tmp_path, size=8), gaussians(OPAQUE)
-    wide = [replace(camera, K=camera.K * [[0.2, 1, 1], [1, 0.2, 1], [1, 1, 1]]) for camera in scene.cameras]
-    scene = replace(scene, cameras=wide)
-    mean = np.mean([camera.centre / np.linalg.norm(camera.centre) for camera in scene.cameras], 0)
-    towards = mean / np.linalg.norm(mean)
-    aside = np.cross(towards, [0, 1, 0]) / np.linalg.norm(np.cross(towards, [0, 1, 0]))
+    scene, (towards, aside, _) = seen_widely(tmp_path)
     away = np.linspace(0, 0.7, 71)
-    bars = np.repeat(head.values[:1], 142, 0)
-    bars[:, MEAN] = np.concatenate([away[:, None] * towards, away[:, None] * aside])
-    bars[:, SCALE], bars[:, OPACITY] = np.log(0.01), 4
-    found = subject_of(Splats(bars, head.background), scene)
+    found = subject_of(small(np.concatenate([away[:, None] * towards, away[:, None] * aside])), scene)
     assert found[:71].all() and found[71:][away < 0.44].all() and not found[71:][away > 0.46].any()
+
+
+def test_a_wall_that_the_ball_cuts_off_all_around_is_doubtful_and_a_neck_is_not(tmp_path: Path) -> None:
+    """A head at a wall sticks out of it; a neck and chest leave the ball at one side."""
+    scene, (towards, aside, across) = seen_widely(tmp_path)
+    y, z = (0.02 * values.reshape(-1, 1) for values in np.mgrid[-40:41, -40:41])
+    around = np.linspace(0, 2 * np.pi, 40)[:, None]
+    ring, wall, far = 0.12 * np.hstack([np.cos(around), np.sin(around)]), y * aside + z * across, np.hypot(y, z)[:, 0]
+    head = np.concatenate([ring @ [aside, across] + x * towards for x in np.arange(0, 0.4, 0.02)])
+    both = small(np.concatenate([wall, head]))
+    sure = belief(both, scene, subject_of(both, scene))
+    assert set(sure[: len(wall)][(far > 0.15) & (far < 0.4)]) == {np.float32(DOUBT)}
+    assert set(sure[-40:]) == {1} and not sure[: len(wall)][far > 0.5].any()
+    chest = small(np.concatenate([ring @ [towards, across] + x * aside for x in np.arange(-0.7, 0.2, 0.02)]))
+    sure = belief(chest, scene, subject_of(chest, scene))
+    assert set(sure) == {0, 1} and set(sure[-200:]) == {1}
