@@ -91,12 +91,8 @@ def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, p
         raise _wrong(file, place, "a garbled camera", expected, f"{size[0]} x {size[1]}, {values}")
     focal, rest = (values[:1] * 2, values[1:]) if name in ONE_FOCAL else (values[:2], values[2:])
     K = np.array([[focal[0], 0, rest[0]], [0, focal[1], rest[1]], [0, 0, 1]])
-    fisheye = name.endswith("FISHEYE")
-    given = rest[2:]
     # All but FULL_OPENCV lack the last of OpenCV's coefficients; FULL_OPENCV has k1 k2 p1 p2 k3 k4 k5 k6, as `Lens`.
-    length = 4 if fisheye else max(5, len(given))
-    coefficients = np.array(given + [0.0] * (length - len(given)))
-    return Calibration(name, K, np.eye(3, 4), file, place, coefficients, fisheye, size)
+    return Calibration(name, K, np.eye(3, 4), file, place, np.array(rest[2:]), name.endswith("FISHEYE"), size)
 
 
 def _w2c(pose: list[float], file: Path, place: str) -> Array:

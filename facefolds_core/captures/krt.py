@@ -85,7 +85,7 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
 
 def krt_reference(
     cameras: list[Calibration], image: tuple[int, int], given: tuple[int, int] | None, path: Path
-) -> tuple[tuple[int, int], Fact | None]:
+) -> tuple[tuple[int, int], list[Fact]]:
     """Find out which image size K refers to.
 
     Two hypotheses: the images at hand, or the dataset's full size. A principal point lies near the middle of the image,
@@ -96,7 +96,7 @@ def krt_reference(
         given: `krt_size` of params.yaml, which overrides.
 
     Returns:
-        (width, height), and a fact on what was found out, None where there was nothing to find.
+        (width, height), and a fact on what was found out, if anything.
 
     Raises:
         UserError: if neither hypothesis fits.
@@ -111,9 +111,9 @@ def krt_reference(
                 found=list(given),
                 remedy="correct `krt_size` of this subject in params.yaml",
             )
-        return given, None
+        return given, []
     if image == FULL_SIZE:
-        return image, None
+        return image, []
     points = np.median([camera.K[:2, 2] for camera in cameras], axis=0)
     offsets = {size: float(np.abs(points / size - 0.5).max()) for size in (image, FULL_SIZE)}
     best = min(offsets, key=offsets.__getitem__)
@@ -127,4 +127,4 @@ def krt_reference(
             remedy="set `krt_size: [width, height]` of this subject in params.yaml",
         )
     kind = "krt_is_scaled" if best == image else "krt_is_of_full_size"
-    return best, fact(kind, point=[float(x) for x in points], image=list(image))
+    return best, [fact(kind, point=[float(x) for x in points], image=list(image))]

@@ -127,4 +127,4 @@ def _camera(values: dict[str, str], path: Path, line: int) -> Calibration:
     w2c = np.concatenate([rotation, -(rotation @ centre)[:, None]], 1)
     K = np.concatenate([K, [[0, 0, 1]]])
     size = (max(1, round(width)), max(1, round(height)))
-    return Calibration(values["name"], K, w2c, path, f"line {line} (camera {values['name']})", np.zeros(5), size=size)
+    return Calibration(values["name"], K, w2c, path, f"line {line} (camera {values['name']})", size=size)

@@ -135,7 +135,7 @@ def _calibration(entry: Any, path: Path, place: str) -> Calibration:
         expected = "k1, k2, p1, p2"
         where = f"{place}, distortion"
         raise UserError("no distortion", file=path, place=where, expected=expected, found=short(bent), remedy=_REMEDY)
-    return Calibration(name, K, w2c, path, place, np.array([*bent, *[0.0] * (5 - len(bent))]), size=FULL_SIZE)
+    return Calibration(name, K, w2c, path, place, np.array(bent, float), size=FULL_SIZE)
 
 
 def _listed(root: Path) -> dict[str, list[str]]:

@@ -106,7 +106,7 @@ def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name:
     lengths = tuple(shape for n in (5, 4, 8) for shape in ((n, 1), (1, n)))
     bent = matrix_of(intri, f"D_{name}", lengths, inner)
     bent = matrix_of(intri, f"dist_{name}", lengths, inner) if bent is None else bent
-    coefficients = np.zeros(5) if bent is None else np.pad(bent.ravel(), (0, max(0, 5 - bent.size)))
+    coefficients = np.zeros(0) if bent is None else bent.ravel()
     turn = matrix_of(extri, f"R_{name}", ((3, 1), (1, 3)), outer)
     rotation = matrix_of(extri, f"Rot_{name}", ((3, 3),), outer)
     if turn is not None:

@@ -176,7 +176,7 @@ def _calibrations(root: Path, image: tuple[int, int]) -> list[Calibration]:
         each = isinstance(inner, dict)
         K = matrix_from(inner[serial] if each else inner, ((3, 3),), path, f"intrinsics, {serial}", _REMEDY)
         size = _size_of(K, image)
-        calibrations.append(Calibration(serial, K, w2c, path, f"camera {serial}", np.zeros(5), size=size))
+        calibrations.append(Calibration(serial, K, w2c, path, f"camera {serial}", size=size))
     return calibrations
 
 

@@ -86,4 +86,4 @@ def _camera(name: str, row: NDArray[np.float64], path: Path, index: int) -> Cali
         )
     K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     w2c = np.concatenate([rotation, -(rotation @ centre)[:, None]], 1)
-    return Calibration(name, K, w2c, path, place, np.zeros(5), size=(round(width), round(height)))
+    return Calibration(name, K, w2c, path, place, size=(round(width), round(height)))

@@ -140,7 +140,7 @@ def _calibration(file: Path, name: str, group: Any, size: tuple[int, int] | None
     D = _matrix(file, place, group, "D", [(n,) for n in (4, 5, 8)] + [s for n in (4, 5, 8) for s in ((1, n), (n, 1))])
     rotation = RT[:, :3].T
     w2c = np.concatenate([rotation, -(rotation @ RT[:, 3])[:, None]], 1)
-    return Calibration(name, K, w2c, file, place, np.pad(D.ravel(), (0, max(0, 5 - D.size))), size=size)
+    return Calibration(name, K, w2c, file, place, D.ravel(), size=size)
 
 
 def _matrix(file: Path, place: str, group: Any, key: str, shapes: list[tuple[int, ...]]) -> Array:

@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, mean_calibration, wrong
-from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
-from facefolds_core.captures.gathering import Calibration, Recognised
+from facefolds_core.captures.capture import Capture, closest_rotation, frame_rate, select_frames
+from facefolds_core.captures.gathering import Calibration, Recognised, undistorted
 from facefolds_core.captures.images import image_size
-from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.facts import fact, shorten
@@ -126,7 +125,8 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
     centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
     members = {name: [present[i] for i in of] for name, of in arranged.cameras.items()}
     each = [_calibrations(name, some, centres, path) for name, some in members.items()]
-    views = tuple(_view(mean_calibration(some)) for some in each)
+    means = [mean_calibration(some) for some in each]
+    views = tuple(undistorted(one, one.K, one.w2c, one.size or (0, 0)) for one in means)
     position = {name: f for f, name in enumerate(frames)}
     images: dict[tuple[int, int], Picture] = {}
     for c, of in enumerate(arranged.cameras.values()):
@@ -222,14 +222,6 @@ def _calibration(name: str, entry: Entry, pixel_centres: float, path: Path) -> C
     check_camera(Camera(name, K, entry.w2c, width, height), path, entry.place)
     given = [_number(entry, key) if key in entry.values else 0.0 for key in (_FISHEYE if fisheye else _DISTORTION)]
     return Calibration(name, K, entry.w2c, path, entry.place, np.array(given), fisheye, (width, height))
-
-
-def _view(calibration: Calibration) -> View:
-    """The camera of an entry, distortion taken out."""
-    c = calibration
-    assert c.size is not None
-    lens = make_lens(c.K, c.coefficients, *c.size, c.file, c.place, c.fisheye)
-    return View(Camera(c.name, c.K if lens is None else lens.pinhole, c.w2c, *c.size), lens)
 
 
 def _is_fisheye(entry: Entry, path: Path) -> bool:
