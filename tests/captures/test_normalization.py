@@ -11,8 +11,8 @@ import pytest
 
 from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
 from facefolds_core.captures.capture import complete_subset
-from facefolds_core.captures.images import decode_image
 from facefolds_core.captures.normalization import nearest_to_axes, split_cameras, view_angles
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import read_scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.sources.transforms import read_transforms
@@ -162,7 +162,7 @@ def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
     scene = read_scene(tmp_path / "scene")
     store = scene.open_frames()
     assert store.keys() == [(c, f) for c in range(5) for f in range(3)]
-    expected = decode_image(made.image("400004", "000006"), "")
+    expected = FilePicture(made.image("400004", "000006")).rgb("")
     assert np.array_equal(store.image(3, 1), expected)
 
 

@@ -15,7 +15,7 @@ import pytest
 from PIL import EpsImagePlugin
 from PIL import Image as Pillow
 
-from facefolds_core.captures.images import decode_image, image_size
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
 from tests.hostile.damage import flip_bits, truncate, zero_tail
@@ -46,9 +46,9 @@ def png(parts: list[tuple[bytes, bytes]]) -> bytes:
 
 
 @pytest.mark.parametrize("name", ["x.png", "poster.jpg"])
-@pytest.mark.parametrize("call", [image_size, decode_image])
+@pytest.mark.parametrize("call", [FilePicture.size, FilePicture.rgb])
 def test_nothing_is_started_for_an_eps_by_another_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, call: Callable[[Path, str], object]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, call: Callable[[FilePicture, str], object]
 ) -> None:
     reached: list[str] = []
     monkeypatch.setattr(
@@ -59,7 +59,7 @@ def test_nothing_is_started_for_an_eps_by_another_name(
     monkeypatch.setattr(os, "posix_spawn", lambda *_, **__: reached.append("process"))
     (tmp_path / name).write_bytes(EPS)
     with pytest.raises(UserError, match="cannot read an image"):
-        call(tmp_path / name, "camera 1")
+        call(FilePicture(tmp_path / name), "camera 1")
     assert reached == []
 
 
@@ -132,7 +132,7 @@ def test_a_header_that_promises_more_than_the_file_holds(tmp_path: Path, size: t
     header = struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0)
     (tmp_path / "x.png").write_bytes(png([(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), END]))
     with pytest.raises(UserError):
-        decode_image(tmp_path / "x.png", "camera 1")
+        FilePicture(tmp_path / "x.png").rgb("camera 1")
 
 
 def test_a_jpeg_that_is_cut_or_lacks_a_part() -> None:
@@ -191,7 +191,7 @@ def test_memory_that_runs_out_is_not_called_damage(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("PIL.ImageFile.ImageFile.load", fails)
     with pytest.raises(UserError, match="memory ran out"):
-        decode_image(tmp_path / "x.png", "camera 1")
+        FilePicture(tmp_path / "x.png").rgb("camera 1")
 
 
 def test_pillow_opens_files_in_one_place_only() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from facefolds_core.captures.actor import write_capture
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.images import decode_image, decode_mask
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
@@ -43,7 +43,7 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
     assert plates.keys() == [(c, 0) for c in range(len(names))]
     assert mattes.keys() == [(c, 1) for c in range(len(names))]
     for c, name in enumerate(names):
-        whole = decode_image(root / "plates" / f"{name}.png", "").astype(float)
+        whole = FilePicture(root / "plates" / f"{name}.png").rgb("").astype(float)
         assert np.abs(plates.image(c, 0) - whole.reshape(32, 2, 20, 2, 3).mean((1, 3))).max() <= 0.5
         assert np.ptp(mattes.image(c, 1)) == 0
         assert mattes.image(c, 1)[0, 0, 0] == 50 * [camera.name for camera in made.cameras].index(name)
@@ -62,9 +62,9 @@ def test_the_actor_has_them_when_asked_and_they_agree_with_its_pictures(tmp_path
     params = CaptureParams(cameras=3, frames=1, height=48, width=32, plates=True, mattes=True)
     write_capture(tmp_path, params)
     for camera in ("A000", "A001", "A002"):
-        image = decode_image(next((tmp_path / "images").glob(f"*/{camera}/*.png")), "")
-        matte = decode_mask(next((tmp_path / "mattes").glob(f"*/{camera}/*.png")), "")
-        plate = decode_image(tmp_path / "plates" / f"{camera}.png", "")
+        image = FilePicture(next((tmp_path / "images").glob(f"*/{camera}/*.png"))).rgb("")
+        matte = FilePicture(next((tmp_path / "mattes").glob(f"*/{camera}/*.png"))).opacity("")
+        plate = FilePicture(tmp_path / "plates" / f"{camera}.png").rgb("")
         # Pixels beside the subject are smoothed with it: away from it the room is the same to the bit.
         near = np.pad(matte[..., 0], 1)
         beside = np.max([near[i : i + 48, j : j + 32] for i in range(3) for j in range(3)], 0) > 0

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside, pictures_in
-from facefolds_core.captures.images import decode_mask
 from facefolds_core.captures.numbers import short
 from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
 from facefolds_core.captures.picture import FilePicture, Picture
@@ -54,7 +53,7 @@ class MaskFile(FilePicture):
     """A mask of opacity, or of labels."""
 
     def opacity(self, place: str) -> NDArray[np.uint8]:
-        values = decode_mask(self.file, place)
+        values = super().opacity(place)
         return np.where(values > 0, 255, 0).astype(np.uint8) if values.max() <= _LABELS else values
 
 

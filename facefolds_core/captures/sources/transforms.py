@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, mean_calibration, wrong
 from facefolds_core.captures.capture import Capture, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.gathering import Calibration, Recognised, undistorted
-from facefolds_core.captures.images import image_size
 from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.facts import fact, shorten
@@ -202,7 +201,7 @@ def _calibrations(name: str, entries: list[Entry], pixel_centres: float, path: P
 def _calibration(name: str, entry: Entry, pixel_centres: float, path: Path) -> Calibration:
     """Of one entry; K in continuous pixel coordinates."""
     assert entry.image is not None
-    width, height = image_size(entry.image, f"camera {name}")
+    width, height = FilePicture(entry.image).size(f"camera {name}")
     fisheye = _is_fisheye(entry, path)
     for key, size in (("w", width), ("h", height)):
         if key in entry.values and _number(entry, key) != size:
