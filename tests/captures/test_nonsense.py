@@ -7,7 +7,6 @@ import math
 import os
 import shutil
 import socket
-import wave
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from tests.captures.fixtures import (
     VERTICES,
     MultifaceCapture,
     edit_transforms,
+    save_wav,
     write_multiface,
     write_transforms,
 )
@@ -224,9 +224,7 @@ def test_a_path_that_cannot_be(tmp_path: Path, source: str, path: str) -> None:
 
 def test_a_sound_that_is_shorter_than_it_says(tmp_path: Path) -> None:
     path = tmp_path / "x.wav"
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, 8000, 0, "NONE", ""))
-        file.writeframes(bytes(8000))
+    save_wav(path, np.zeros(4000), 8000)
     path.write_bytes(path.read_bytes()[:5000])
     with pytest.raises(UserError, match="sound cannot be read"):
         cut_sound(path, tmp_path / "cut.wav", 0, 0.1)

@@ -8,24 +8,22 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.actor import write_capture
-from facefolds_core.captures.assembly import plan_scene, write_plan
+from facefolds_core.captures.assembly import write_plan
 from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import Scene
-from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, NormalizeParams, Subject
-from tests.captures.fixtures import SEGMENT, pattern, save, write_multiface
+from facefolds_core.params import CaptureParams, NormalizeParams
+from tests.captures.fixtures import SEGMENT, pattern, plan_of, save, write_multiface
 
 
-def normalized(root: Path, out: Path) -> Scene:
-    subject = Subject(source="multiface", path=str(root), holdout=("400003",))
+def normalized(root: Path) -> Scene:
     params = NormalizeParams(long_side=32, short_side=20)
-    return write_plan(plan_scene(read_multiface(root, subject), "head", subject, params, out), params)
+    return write_plan(plan_of(root, params), params)
 
 
 def test_a_capture_without_them_gives_none(tmp_path: Path) -> None:
     write_multiface(tmp_path / "capture")
-    scene = normalized(tmp_path / "capture", tmp_path / "scene")
+    scene = normalized(tmp_path / "capture")
     assert (scene.open_plates(), scene.open_mattes()) == (None, None)
 
 
@@ -36,7 +34,7 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
         plate = pattern(40, 64, 10 + c)
         save(root / "plates" / f"{camera.name}.png", plate)
         save(root / "mattes" / SEGMENT / camera.name / "000006.png", np.full((64, 40), 50 * c, np.uint8))
-    scene = normalized(root, tmp_path / "scene")
+    scene = normalized(root)
     plates, mattes = scene.open_plates(), scene.open_mattes()
     assert plates is not None and mattes is not None
     names = [camera.name for camera in scene.cameras]
@@ -51,10 +49,10 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_plate_of_another_shape_is_refused(tmp_path: Path) -> None:
-    write_multiface(tmp_path)
-    save(tmp_path / "plates" / "400002.png", pattern(20, 30, 0))
+    write_multiface(tmp_path / "capture")
+    save(tmp_path / "capture" / "plates" / "400002.png", pattern(20, 30, 0))
     with pytest.raises(UserError, match="different sizes") as caught:
-        normalized(tmp_path, tmp_path / "scene")
+        normalized(tmp_path / "capture")
     assert "clean plate of camera 400002" in str(caught.value)
 
 
