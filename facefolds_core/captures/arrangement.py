@@ -73,9 +73,6 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
 
     Args:
         path: of the file that lists them, for messages.
-
-    Raises:
-        UserError: if they show a single camera that moves.
     """
     groups = _by_pose(shots)
     groups = _gathered(shots, groups) or groups
@@ -105,11 +102,7 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
 
 
 def mean_calibration(some: Sequence[Calibration]) -> Calibration:
-    """One camera whose pictures were calibrated one by one: the mean of its calibrations.
-
-    Raises:
-        UserError: if some of them are a fisheye's and others not.
-    """
+    """One camera whose pictures were calibrated one by one: the mean of its calibrations."""
     first = some[0]
     if len(some) == 1:
         return first

@@ -115,11 +115,7 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
 
 
 def _ball(radius: float, capture: Capture) -> float:
-    """The radius of the subject's ball, units.
-
-    Raises:
-        UserError: if it holds next to nothing, or the cameras stand in it.
-    """
+    """The radius of the subject's ball, units."""
     least, most = BALL
     if least <= radius <= most:
         return radius

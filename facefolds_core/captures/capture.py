@@ -127,11 +127,7 @@ class Capture:
 def select_frames(
     names: Sequence[str], wanted: FrameRange | tuple[str, ...] | None, file: Path, what: str
 ) -> list[str]:
-    """The frames that `subjects.<name>.frames` asks for, out of the capture's sorted `names`.
-
-    Raises:
-        UserError: if there is no such frame, or the range is empty.
-    """
+    """The frames that `subjects.<name>.frames` asks for, out of the capture's sorted `names`."""
     wrong = partial(UserError, file=file, place="frames", remedy="correct `frames` of this subject in params.yaml")
     if isinstance(wanted, tuple):
         unknown = [name for name in wanted if name not in names]
@@ -152,11 +148,7 @@ def select_frames(
 
 
 def frame_rate(subject: Subject, default: float, count: int) -> float:
-    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame.
-
-    Raises:
-        UserError: for a rate out of `RATES`.
-    """
+    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame."""
     rate = subject.fps or default
     if not RATES[0] <= rate <= RATES[1]:
         raise UserError(
@@ -183,9 +175,6 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
     Returns:
         cameras, frames, and a fact for each one left out.
-
-    Raises:
-        UserError: if no frame is left.
     """
     total = len(capture.frame_ids)
     has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
@@ -216,11 +205,7 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
 
 def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
-    """(width, height) of all images in use, from their headers (masks and mattes included).
-
-    Raises:
-        UserError: if a header cannot be read or sizes differ; names the file and the size of the others.
-    """
+    """(width, height) of all images in use, from their headers (masks and mattes included)."""
     expected: tuple[int, int] | None = None
     for c in cameras:
         for f in frames:

@@ -44,11 +44,7 @@ def model_folder(root: Path) -> Path | None:
 
 
 def read_model(folder: Path) -> tuple[list[Calibration], Path]:
-    """The registered images, by the order of their names, each with its camera, and the images' file.
-
-    Raises:
-        UserError: if a file is garbled, cut off, or names a camera that is not there or a model that is not read.
-    """
+    """The registered images, by the order of their names, each with its camera, and the images' file."""
     kind = "bin" if is_regular(folder / "cameras.bin") and is_regular(folder / "images.bin") else "txt"
     first, second = folder / f"cameras.{kind}", folder / f"images.{kind}"
     rows = _cameras_bin(first) if kind == "bin" else _cameras_txt(first)

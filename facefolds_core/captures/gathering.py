@@ -96,9 +96,6 @@ def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict
 
     Returns:
         camera -> frame -> picture, and frames a second.
-
-    Raises:
-        UserError: as `check_together`.
     """
     videos = [Video(path, name) for name, path in files.items()]
     stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
@@ -126,9 +123,6 @@ def gather(
         masks: opacity, where the layout has it: training may use it, held-out pictures are scored by it.
         fps: where the subject leaves it null.
         pixel_centres: of the layout, likewise.
-
-    Raises:
-        UserError: if no camera has both calibration and pictures, calibrations cannot be, or sizes do not fit.
     """
     used, facts = cameras_with_pictures(calibrations, photos, root)
     sizes, common = first_sizes(used, photos)
@@ -176,11 +170,7 @@ def placed(photos: Photos, cameras: Sequence[str], frames: Sequence[str]) -> dic
 
 
 def view_of(calibration: Calibration, size: tuple[int, int], pixel_centres: float) -> View:
-    """The camera for pictures of `size` (width, height), its lens taken out.
-
-    Raises:
-        UserError: if K refers to pictures of another shape, the camera cannot be, or the lens cannot be undone.
-    """
+    """The camera for pictures of `size` (width, height), its lens taken out."""
     reference = calibration.size or size
     if abs(reference[0] * size[1] / (reference[1] * size[0]) - 1) > 0.01:  # rounded sides of small pictures
         raise UserError(
@@ -227,9 +217,6 @@ def cameras_with_pictures(
     Args:
         photos: camera -> frame -> picture.
         kinds: of these facts.
-
-    Raises:
-        UserError: if there is no such camera.
     """
     known = {one.name for one in calibrations}
     used = [one for one in calibrations if photos.get(one.name)]
@@ -254,9 +241,6 @@ def chosen_segment(names: Collection[str], wanted: str | None, place: Path, miss
         place: where they were looked for.
         missing: remedy where there are none.
         kind: what the layout calls one; in params.yaml it is `segment` all the same.
-
-    Raises:
-        UserError: if there is none, no such one, or several of which none is chosen.
     """
     if wanted in names:
         return str(wanted)

@@ -23,9 +23,6 @@ def given_mattes(folder: Path, scene: Scene) -> Iterator[tuple[int, int, Image]]
     """(camera, frame, (H, W, 1) opacity) of each picture of the scene that the folder has a matte for.
 
     They are of the scene's pictures, that is without lens distortion, of any size.
-
-    Raises:
-        UserError: if the folder is missing or has none, or a picture is damaged or of another shape.
     """
     files = dict(_files(folder, scene))
     if not files:

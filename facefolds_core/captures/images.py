@@ -64,9 +64,6 @@ def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS
     Args:
         file, place: where they lie, for messages.
         formats: of `open_picture`.
-
-    Raises:
-        UserError: if they are damaged, or no picture.
     """
     image = _open_bytes(data, file, place, formats)
     if image.mode.startswith("I") or image.mode == "F":
@@ -80,7 +77,7 @@ def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS
 def opacity_of(
     data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS, *, largest: bool = False
 ) -> Image:
-    """(H, W, 1) uint8 opacity of a picture's bytes; raises like `rgb_of`.
+    """(H, W, 1) uint8 opacity of a picture's bytes.
 
     Args:
         largest: of a colour picture, the largest channel instead of its luma.

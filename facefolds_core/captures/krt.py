@@ -37,12 +37,7 @@ def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
 
 
 def read_krt(path: Path) -> list[Calibration]:
-    """All cameras of a KRT file, in its order.
-
-    Raises:
-        UserError: if the file is missing, garbled, truncated, names a camera twice, or has a singular K or R; names the
-            line and the camera.
-    """
+    """All cameras of a KRT file, in its order."""
     here = "point `path` at a Multiface subject's folder, which holds KRT"
     text = read_text(path, _REMEDY if is_regular(path) else here, expected="KRT")
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
@@ -97,9 +92,6 @@ def krt_reference(
 
     Returns:
         (width, height), and a fact on what was found out, if anything.
-
-    Raises:
-        UserError: if neither hypothesis fits.
     """
     if given is not None:
         if min(given) < 1 or max(given) > 1 << 20:

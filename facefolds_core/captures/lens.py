@@ -104,9 +104,6 @@ def make_lens(
         K: (3, 3) of the photo.
         coefficients, fisheye: as of `Lens`.
         file, place: for the message.
-
-    Raises:
-        UserError: if even twice the focal length shows places outside the photo: such numbers are no lens.
     """
     if not fisheye and not np.any(coefficients):
         return None

@@ -105,11 +105,7 @@ def _files(path: Path) -> Iterator[Path]:
 
 
 def check_layout(source: str, path: Path) -> None:
-    """Refuse a place that is no capture of this source, and say what it is; an absent place is left to the reader.
-
-    Raises:
-        UserError: if it is something else, or lies above or below what is meant.
-    """
+    """Refuse a place that is no capture of this source, and say what it is; an absent place is left to the reader."""
     recognise = getattr(SOURCES[source], "recognise", None)
     if recognise is None or not (is_folder(path) or is_regular(path)):
         return

@@ -42,9 +42,6 @@ def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity,
     Args:
         frames: indices in the capture of those in use.
         similarity: capture -> normalised coordinates.
-
-    Raises:
-        UserError: if it is asked for, and the capture has nothing to know it from.
     """
     tracking = capture.tracking
     if params.stabilize == "found":

@@ -62,11 +62,7 @@ def _from_tracking(tracking: Tracking) -> tuple[Array, Array]:
 
 
 def _mean_pose(tracking: Tracking) -> tuple[Array, Array]:
-    """Where the head faces and its up (3,), averaged over the frames; neither is of unit length.
-
-    Raises:
-        UserError: if the poses turn every way, so that their means say nothing.
-    """
+    """Where the head faces and its up (3,), averaged over the frames; neither is of unit length."""
     facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
     if min(np.linalg.norm(facing), np.linalg.norm(up), np.linalg.norm(np.cross(facing, up))) < 0.1:
         raise UserError(
@@ -111,9 +107,6 @@ def normalizing_similarity(
 
     Args:
         given: (3,) the centre in the capture's coordinates, instead of either.
-
-    Raises:
-        UserError: if the front camera does not exist, or all cameras stand in the centre.
     """
     notes: list[Fact] = []
     if capture.tracking is not None:
@@ -153,11 +146,7 @@ class Culling:
 
 
 def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Culling:
-    """Leave out normalised cameras beyond `max_elevation` or `max_azimuth`.
-
-    Raises:
-        UserError: if none is left; says the angles.
-    """
+    """Leave out normalised cameras beyond `max_elevation` or `max_azimuth`."""
     angles = view_angles(cameras)
     inside = (np.abs(angles[:, 0]) <= params.max_elevation) & (np.abs(angles[:, 1]) <= params.max_azimuth)
     facts = [
@@ -185,10 +174,6 @@ def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact]
 
     Args:
         unused: facts on cameras that were left out, to say why one that is named is not there.
-
-    Raises:
-        UserError: if a camera that is named is not there, or for both, no camera is left for training, or `every` of
-            `holdout` finds none.
     """
     held = _named("holdout", subject.holdout, names, unused, file)
     if isinstance(subject.holdout, HoldoutEvery) and not held:

@@ -25,9 +25,6 @@ def read_storage(path: Path, missing: str) -> dict[str, Any]:
 
     Args:
         missing: the remedy where there is no such file.
-
-    Raises:
-        UserError: if it is missing or garbled; names the line.
     """
     text = read_text(path, missing, expected=path.name)
     # "%YAML:1.0" is no directive of any YAML, and the tag tells no more than the mapping itself.
@@ -41,11 +38,7 @@ def read_storage(path: Path, missing: str) -> dict[str, Any]:
 def matrix_of(
     storage: dict[str, Any], key: str, shapes: tuple[tuple[int, int], ...], path: Path
 ) -> NDArray[np.float64] | None:
-    """(rows, cols) of finite numbers, or None where the key is not there.
-
-    Raises:
-        UserError: for anything else; names the key.
-    """
+    """(rows, cols) of finite numbers, or None where the key is not there."""
     value = storage.get(key)
     if value is None:
         return None

@@ -166,11 +166,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, Valu
 
 
 def read_member(file: Path, member: str, place: str | None = None, most: int = -1) -> bytes:
-    """Bytes of a member of a zip archive: all, with its checksum, or the first `most`.
-
-    Raises:
-        UserError: if the archive or the member is missing or damaged.
-    """
+    """Bytes of a member of a zip archive: all, with its checksum, or the first `most`."""
     try:
         with open_zip(file).open(member) as stream:
             return stream.read(most)

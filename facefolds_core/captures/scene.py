@@ -155,11 +155,7 @@ class Scene:
         return path if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
-        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many.
-
-        Raises:
-            UserError: if the file is damaged.
-        """
+        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many."""
         path = self.folder / "surface.npz"
         if not is_there(path):
             return None

@@ -26,11 +26,7 @@ _wrong = partial(UserError, remedy=_REMEDY)
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
-    """Vertices (V, 3) and triangles (F, 3) of a Wavefront file; polygons become fans, everything else is skipped.
-
-    Raises:
-        UserError: if the file is not readable as such, or a face names a vertex that is not there; names the line.
-    """
+    """Vertices (V, 3) and triangles (F, 3) of a Wavefront file; polygons become fans, everything else is skipped."""
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     number = 0
@@ -70,9 +66,6 @@ def read_bin(path: Path, count: int | None) -> Array:
 
     Args:
         count: V where it is known.
-
-    Raises:
-        UserError: if the length of the file does not fit, or a part of it is zeros.
     """
     data = read_bytes(path, _REMEDY)
     if not data or len(data) % 12 or (count is not None and len(data) != 12 * count):
@@ -94,17 +87,8 @@ def read_bin(path: Path, count: int | None) -> Array:
     return points
 
 
-def read_pose(path: Path) -> Array:
-    """(3, 4) head -> world.
-
-    Raises:
-        UserError: if the file is garbled, has numbers that are not finite, or R is not a rotation (to 1e-3).
-    """
-    return parse_pose(read_text(path, _REMEDY, expected="a head pose"), path)
-
-
 def parse_pose(text: str, path: Path) -> Array:
-    """(3, 4) head -> world, from the text of a pose; raises like `read_pose`."""
+    """(3, 4) head -> world, from the text of a pose: finite, and R a rotation to 1e-3."""
     try:
         pose = np.array([[float(w) for w in line.split()] for line in text.splitlines() if line.strip()])
     except ValueError:
@@ -152,9 +136,6 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
 
     Returns:
         tracking (None where no frame has any), the frames that it covers (all where None), facts on those left out.
-
-    Raises:
-        UserError: for a damaged file, or a mesh whose number of vertices changes.
     """
 
     def meshes(name: str) -> tuple[Path, Path, Path]:
@@ -186,5 +167,5 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         if position == 0:
             vertices = spilled((len(tracked), count, 3))
         vertices[position] = points
-        poses.append(read_pose(transform))
+        poses.append(parse_pose(read_text(transform, _REMEDY, expected="a head pose"), transform))
     return Tracking(np.array(poses), vertices, faces), tracked, left_out

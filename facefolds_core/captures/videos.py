@@ -69,11 +69,7 @@ class Video:
     camera: str
 
     def facts(self) -> VideoFacts:
-        """Of its index, read once.
-
-        Raises:
-            UserError: if it is missing, cut off or no video, its rate varies, or a tag turns its pictures.
-        """
+        """Of its index, read once."""
         check_regular(self.file, _REMEDY, place=f"camera {self.camera}", missing="a video is missing")
         return _facts(self, self.file.stat().st_mtime_ns)
 
@@ -90,9 +86,6 @@ class Video:
             threads: of the decoder; 0 lets it choose.
             fine: interpolate chroma, which is stored at half the resolution. It takes as long as decoding; a picture
                 that is averaged down to half its size is none the better for it (45 dB without, 39 with, of noise).
-
-        Raises:
-            UserError: if a frame is damaged or missing; names it.
         """
         wanted, size = iter(indices), self.facts().size
         following, position = next(wanted, None), 0
@@ -144,9 +137,6 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
 
     Args:
         most: only so many frames are used; None for all.
-
-    Raises:
-        UserError: if lengths, rates or starts differ; names the first video that differs from most.
     """
     facts = [video.facts() for video in videos]
     rates = [one.rate for one in facts]

@@ -44,11 +44,6 @@ def check_sight(
         frame_ids: K names of frames.
         vertices: (K, V, 3) of the tracked mesh, normalised, or None.
         file: the capture, for the message.
-
-    Raises:
-        UserError: if focal lengths are beyond sense; if cameras stand in one place, absurdly near or far, or look
-            past the subject in all of their frames;
-            if the mesh is absurdly small or large, or in a frame lies in no camera's picture. Names the cameras.
     """
     _check_angles(cameras, str(file))
     _check_places(cameras, str(file))

@@ -48,14 +48,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with calibration.csv.
-
-    Raises:
-        UserError: if the table is missing or garbled, or no camera has pictures; names line and column.
-    """
+    """Of the folder with calibration.csv."""
     path = root / "calibration.csv"
     calibrations = _table(path)
     photos = {camera.name: _pictures(camera, "rgb") for camera in inside(root / "rgbs") if camera.is_dir()}

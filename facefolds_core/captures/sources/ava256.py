@@ -56,15 +56,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with camera_calibration.json.
-        subject: its `segment` is a seg_id of frame_list.csv.
-
-    Raises:
-        UserError: if calibration, list of frames, an archive, a pose or a mesh is missing or damaged; names it.
-    """
+    """Of the folder with camera_calibration.json; `segment` of the subject is a seg_id of frame_list.csv."""
     check_folder(root, _MISSING)
     calibrations = _calibrations(root / "camera_calibration.json")
     frames = _frames(root, subject.segment)

@@ -39,11 +39,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Raises:
-        UserError: if there is no model, it is damaged, or none of its pictures exists.
-    """
+    """Of the folder with sparse and images."""
     folder = model_folder(root)
     if folder is None:
         raise UserError(

@@ -58,14 +58,7 @@ class MaskFile(FilePicture):
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with intri.yml and extri.yml.
-
-    Raises:
-        UserError: if these are missing or garbled, or neither pictures nor videos are there.
-    """
+    """Of the folder with intri.yml and extri.yml."""
     intri = read_storage(root / "intri.yml", _MISSING)
     extri = read_storage(root / "extri.yml", _MISSING)
     names = _names(intri, root / "intri.yml")

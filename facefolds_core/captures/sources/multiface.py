@@ -63,9 +63,6 @@ def read_multiface(root: Path, subject: Subject, fps: float = FPS) -> Capture:
         root: folder with KRT.
         subject: its `segment`, `frames`, `krt_size`, `pixel_centres` and `fps` are used.
         fps: where the subject leaves it null.
-
-    Raises:
-        UserError: for a file that is missing or damaged, and a segment or frame that does not exist.
     """
     calibration = read_krt(root / "KRT")
     segment = _segment(root, subject.segment)

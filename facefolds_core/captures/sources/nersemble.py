@@ -74,16 +74,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: a participant's folder.
-        subject: its `segment` is the sequence.
-
-    Raises:
-        UserError: if the calibration is missing or garbled, the sequence is not there, or its videos do not run side by
-            side.
-    """
+    """Of a participant's folder; `segment` of the subject is the sequence."""
     check_folder(root, _MISSING)
     sequence = _chosen(root, subject.segment)
     folder = root / "sequences" / sequence

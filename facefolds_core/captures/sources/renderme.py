@@ -54,15 +54,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: an .smc file, or a folder of them.
-        subject: `segment` chooses the performance where there are several.
-
-    Raises:
-        UserError: if files are missing or damaged, have no calibration or pictures, or numbers that cannot be.
-    """
+    """Of an .smc file, or a folder of them, of whose performances `segment` of the subject chooses one."""
     files = _files(root, subject.segment)
     calibrated = [file for file in files if isinstance(open_hdf5(file).get("Calibration"), h5py.Group)]
     if not calibrated:

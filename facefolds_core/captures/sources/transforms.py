@@ -86,20 +86,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """See `read_transforms`."""
-    return read_transforms(root, subject)
-
-
-def read_transforms(root: Path, subject: Subject) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: the folder with transforms.json, or that file.
-        subject: its `frames`, `pixel_centres` and `fps` are used.
-
-    Raises:
-        UserError: if the file is missing, garbled, lacks a key or has a matrix that is none; names the entry and key.
-    """
+    """Of the folder with transforms.json, or of that file."""
     path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
     remedy = "point `path` at the folder that holds transforms.json, or make the file again"
     value = read_json(path, remedy=remedy)
