@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -206,20 +207,14 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
 def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
     """(width, height) of all images in use, from their headers (masks and mattes included)."""
-    expected: tuple[int, int] | None = None
-    for c in cameras:
-        for f in frames:
-            place = capture.place(c, f)
-            pictures = [(capture.images[c, f], place)]
-            pictures += [(of[c, f], place) for of in (capture.masks, capture.mattes) if (c, f) in of]
-            for picture, where in pictures:
-                size = picture.size(where)
-                expected = expected or size
-                if size != expected:
-                    first = capture.images[cameras[0], frames[0]].file
-                    raise wrong_size(picture.file, where, size, f"{expected[0]} x {expected[1]}, as {first}")
-    if expected is None:
-        raise ValueError("no cameras or frames to check")
+    first = capture.images[cameras[0], frames[0]]
+    expected = first.size(capture.place(cameras[0], frames[0]))
+    for key in product(cameras, frames):
+        for picture in [of[key] for of in (capture.images, capture.masks, capture.mattes) if key in of]:
+            size = picture.size(capture.place(*key))
+            if size != expected:
+                words = f"{expected[0]} x {expected[1]}, as {first.file}"
+                raise wrong_size(picture.file, capture.place(*key), size, words)
     for c in cameras:
         if c in capture.plates:
             check_plate_size(capture, c, capture.plates[c].size(capture.plate_place(c)))
