@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
-from facefolds_core.captures.videos import Video, check_together, frame_names
+from facefolds_core.captures.videos import Video, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_folder
@@ -100,8 +100,7 @@ def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict
     videos = [Video(path, name) for name, path in files.items()]
     stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
     count, rate = check_together(videos, stop)
-    names = frame_names(count)
-    return {v.camera: {name: VideoFrame(v, i) for i, name in enumerate(names)} for v in videos}, float(rate)
+    return {v.camera: {f"{i:06d}": VideoFrame(v, i) for i in range(count)} for v in videos}, float(rate)
 
 
 def gather(

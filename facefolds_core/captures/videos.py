@@ -100,9 +100,8 @@ class Video:
                     if frame.is_corrupt:
                         raise self.damaged(position, "a damaged frame")
                     if (frame.width, frame.height) != size:
-                        raise self.damaged(
-                            position, f"{frame.width} x {frame.height} pixels, not {size[0]} x {size[1]}"
-                        )
+                        found = f"{frame.width} x {frame.height} pixels, not {size[0]} x {size[1]}"
+                        raise self.damaged(position, found)
                     if position == following:
                         yield _pixels(frame, reformatter, channels, _FINE if fine else Interpolation.BICUBIC)
                         following = next(wanted, None)
@@ -115,14 +114,9 @@ class Video:
 
     def damaged(self, position: int, found: str) -> UserError:
         """The error for a frame that cannot be had."""
-        return UserError(
-            "a damaged video",
-            file=self.file,
-            place=f"camera {self.camera}, frame {position}",
-            expected=f"{self.facts().count} frames, as its index says",
-            found=found,
-            remedy=_REMEDY + "; `frames: {stop: N}` uses the first N frames only",
-        )
+        expected = f"{self.facts().count} frames, as its index says"
+        remedy = _REMEDY + "; `frames: {stop: N}` uses the first N frames only"
+        return self.refused("a damaged video", expected, found, remedy, position)
 
     def refused(
         self, message: str, expected: str, found: str, remedy: str = _REMEDY, frame: int | None = None
@@ -147,11 +141,8 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
     count = max(set(counts), key=counts.count)
     for video, one in zip(videos, facts, strict=True):
         if abs(one.rate / rate - 1) > Fraction(1, 1000):
-            raise video.refused(
-                "videos of different frame rates",
-                f"{float(rate):.6g} frames a second, as the others",
-                f"{float(one.rate):.6g}",
-            )
+            expected, found = f"{float(rate):.6g} frames a second, as the others", f"{float(one.rate):.6g}"
+            raise video.refused("videos of different frame rates", expected, found)
         if abs(one.start - start) * float(rate) > 0.5:
             raise video.refused(
                 "a camera with a time offset",
@@ -167,11 +158,6 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
                 f"copy it again; if only its end is missing, set `frames: {{stop: {min(counts)}}}` of this subject",
             )
     return min(counts), rate
-
-
-def frame_names(count: int) -> list[str]:
-    """Names of a video's frames: 000000, 000001, ..."""
-    return [f"{position:06d}" for position in range(count)]
 
 
 @contextmanager
