@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.errors import UserError
 from tests.captures.fixtures import (
     HEAD,
     RING,
@@ -123,14 +122,6 @@ def test_times_that_six_digits_cannot_tell_apart(tmp_path: Path) -> None:
         entry["time"] += 1699999999.0
     path.write_text(json.dumps(content))
     assert read(tmp_path).frame_ids == ("1699999999.0", "1699999999.25")
-
-
-@pytest.mark.parametrize("angle", [0, -0.5, 4])
-def test_an_angle_of_view_that_is_none(tmp_path: Path, angle: float) -> None:
-    path, _ = write_transforms(tmp_path, camera_angle_x=angle)
-    edit_transforms(path, 0, fl_x=None, fl_y=None)
-    with pytest.raises(UserError, match="angle of view"):
-        read(tmp_path)
 
 
 def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: Path) -> None:
