@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import shutil
-import socket
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +27,7 @@ from tests.captures.fixtures import (
     write_transforms,
 )
 from tests.captures.test_bad_captures import refused, run
+from tests.hostile.structured import ODD
 from tests.hostile.watch import within
 
 
@@ -44,25 +41,6 @@ def test_a_byte_order_mark_hides_no_camera(tmp_path: Path) -> None:
     assert not [one for one in scene["left_out"] if not one["words"].startswith("note")]
 
 
-def fifo(path: Path) -> None:
-    os.mkfifo(path)
-
-
-def unix_socket(path: Path) -> None:
-    beside = Path("/tmp") / f"facefolds-{os.getpid()}"
-    with socket.socket(socket.AF_UNIX) as made:
-        made.bind(str(beside))
-    shutil.move(beside, path)
-
-
-ODD: dict[str, Callable[[Path], object]] = {
-    "FIFO": fifo,
-    "socket": unix_socket,
-    "device": lambda path: path.symlink_to("/dev/null"),
-    "folder": lambda path: path.mkdir(),
-    "loop": lambda path: path.symlink_to(path.name),
-    "link to nothing": lambda path: path.symlink_to("nowhere"),
-}
 FILES = {
     "multiface": [
         "KRT",
@@ -79,16 +57,14 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("make", ODD.values(), ids=ODD)
+@pytest.mark.parametrize("odd", [name for name in ODD if name != "nothing"])
 @pytest.mark.parametrize(("source", "name"), [(s, n) for s, names in FILES.items() for n in names])
-def test_what_is_no_file_is_refused_and_never_opened(
-    tmp_path: Path, source: str, name: str, make: Callable[[Path], object]
-) -> None:
+def test_what_is_no_file_is_refused_and_never_opened(tmp_path: Path, source: str, name: str, odd: str) -> None:
     write_multiface(tmp_path / "c") if source == "multiface" else write_transforms(tmp_path / "c")
     path = tmp_path / "c" / name
     path.unlink(missing_ok=True)
     path.parent.mkdir(parents=True, exist_ok=True)
-    make(path)
+    ODD[odd](path)
     errors: list[UserError] = []
     within(10, lambda: errors.append(refused(tmp_path / "c", source, front="400003")))()
     assert errors[0].file == path
