@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 import av
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
@@ -23,6 +24,7 @@ from facefolds_core.captures.assembly import plan_scene, write_plan
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import SOURCES
+from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
@@ -82,15 +84,23 @@ def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -
     )
 
 
-def reader(source: str, **given: object) -> Callable[..., Capture]:
+class Reader:
     """What reads a capture of a layout: from a place, with keys of its subject besides those given here."""
 
-    def read(root: Path, **keys: object) -> Capture:
-        subject = Subject(source=source, path="x", **{**given, **keys})  # type: ignore[arg-type]
-        capture: Capture = SOURCES[source].read(root, subject, CaptureParams())
+    def __init__(self, source: str, **given: object) -> None:
+        self.source, self.given = source, given
+
+    def __call__(self, root: Path, **keys: object) -> Capture:
+        subject = Subject(source=self.source, path="x", **{**self.given, **keys})  # type: ignore[arg-type]
+        capture: Capture = SOURCES[self.source].read(root, subject, CaptureParams())
         return capture
 
-    return read
+    def refused(self, root: Path, message: str, *words: object, **keys: object) -> None:
+        """AssertionError unless it refuses with that message, and says these words."""
+        with pytest.raises(UserError) as caught:
+            self(root, **keys)
+        missing = [word for word in words if str(word) not in str(caught.value)]
+        assert message in caught.value.message and not missing, caught.value
 
 
 def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **subject: object) -> Scene:

@@ -15,9 +15,9 @@ from facefolds_core.captures.gathering import Calibration
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from tests.captures.fixtures import intrinsics, opengl_matrix, pattern, save
-from tests.filmed import check_same, film, reader, scene_of
+from tests.filmed import Reader, check_same, film, scene_of
 
-read = reader("transforms")
+read = Reader("transforms")
 
 
 def moved(camera: Camera, jitter: float, seed: int) -> Camera:
@@ -64,8 +64,7 @@ def test_a_jittered_focal_length_is_averaged(tmp_path: Path) -> None:
 
 
 def test_a_camera_that_moves_is_none_of_several(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="one time only"):
-        read(write(tmp_path, "{c}/{k}.png", jitter=0.05, timed=True))
+    read.refused(write(tmp_path, "{c}/{k}.png", jitter=0.05, timed=True), "one time only")
 
 
 def test_a_walk_around_a_statue_stays_static(tmp_path: Path) -> None:

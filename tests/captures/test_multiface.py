@@ -24,9 +24,9 @@ from tests.captures.fixtures import (
     save,
     write_multiface,
 )
-from tests.filmed import reader
+from tests.filmed import Reader
 
-read = reader("multiface")
+read = Reader("multiface")
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
 
 

@@ -32,7 +32,7 @@ from tests.captures.fixtures import (
     write_multiface,
     write_transforms,
 )
-from tests.filmed import reader
+from tests.filmed import Reader
 
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
 
@@ -195,7 +195,7 @@ def test_a_camera_that_lacks_most_frames_is_left_out_instead(tmp_path: Path) -> 
     made = write_multiface(tmp_path / "c")
     for frame in ("000006", "000009"):
         made.image("400002", frame).unlink()
-    cameras, frames, lines = complete_subset(reader("multiface")(tmp_path / "c"), range(5))
+    cameras, frames, lines = complete_subset(Reader("multiface")(tmp_path / "c"), range(5))
     assert (cameras, frames, len(lines)) == ([0, 2, 3, 4], [0, 1, 2], 1)
 
 

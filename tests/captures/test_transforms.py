@@ -22,9 +22,9 @@ from tests.captures.fixtures import (
     world_camera,
     write_transforms,
 )
-from tests.filmed import reader
+from tests.filmed import Reader
 
-read = reader("transforms")
+read = Reader("transforms")
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
 
 

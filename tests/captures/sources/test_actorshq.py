@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.sources import actorshq
-from facefolds_core.errors import UserError
 from tests.captures.fixtures import pattern, save
-from tests.filmed import check_same, film, reader, save_jpeg, scene_of
+from tests.filmed import Reader, check_same, film, save_jpeg, scene_of
 
-read = reader("actorshq")
+read = Reader("actorshq")
 
 HEADER = "name,w,h,rx,ry,rz,tx,ty,tz,fx,fy,px,py"
 
@@ -94,18 +93,14 @@ def test_what_is_wrong_with_the_table_is_said(
     text = (filmed / "calibration.csv").read_text()
     assert old in text
     (tmp_path / "calibration.csv").write_text(text.replace(old, new, 1))
-    with pytest.raises(UserError) as caught:
-        read(tmp_path)
-    assert message in caught.value.message
-    assert place in str(caught.value)
+    read.refused(tmp_path, message, place)
 
 
 def test_other_pictures_than_the_table_says_are_refused(filmed: Path, tmp_path: Path) -> None:
     for name in film().names:
         save(tmp_path / "rgbs" / name / f"{name}_rgb000000.jpg", pattern(48, 48, 0))
     shutil.copy(filmed / "calibration.csv", tmp_path)
-    with pytest.raises(UserError, match="another shape"):
-        read(tmp_path)
+    read.refused(tmp_path, "another shape")
 
 
 def test_a_sequence_suggests_the_smallest_scale(filmed: Path, tmp_path: Path) -> None:
