@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from facefolds_core.captures.assembly import Plan, plan_scene
 from facefolds_core.captures.capture import Capture
@@ -115,7 +117,7 @@ def _entry(said: Recognised, subject: Subject, capture: Capture, plan: Plan) -> 
     if "holdout" in said.keys:
         pass
     elif 0 < len(masked) < len(names):
-        yield f"    holdout: [{', '.join(map(_quoted, masked))}]  # those that have masks to score by"
+        yield f"    holdout: {_quoted(masked)}  # those that have masks to score by"
     elif len(names) < default.every:
         yield f"    holdout: [{_quoted(_between(plan))}]  # a camera that others stand around"
     if len(capture.frame_ids) > 1:
@@ -141,9 +143,5 @@ def _name(path: Path) -> str:
 
 
 def _quoted(value: object) -> str:
-    """For YAML: plain where nothing else can be read into it."""
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_quoted, value))}]"
-    text = str(value)
-    plain = re.fullmatch(r"[A-Za-z/.][\w/.-]*", text) and text.lower() not in ("yes", "no", "on", "off", "true", "null")
-    return text if plain else "'" + text.replace("'", "''") + "'"
+    """For YAML, in one line."""
+    return yaml.safe_dump([value], default_flow_style=True, allow_unicode=True, width=math.inf).strip()[1:-1]

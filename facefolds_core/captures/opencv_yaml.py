@@ -53,3 +53,14 @@ def matrix_of(
         found = f"{shape[0]} x {shape[1]} of {len(data)} numbers"
         raise refuse(" or ".join(f"{rows} x {cols}" for rows, cols in shapes[:3]), found)
     return numbers_from(data, path, key, REMEDY).reshape(shape)
+
+
+def needed_matrix(
+    storage: dict[str, Any], keys: dict[str, tuple[tuple[int, int], ...]], path: Path
+) -> NDArray[np.float64]:
+    """`matrix_of` the first key that is there; the shapes that each may have are given with it."""
+    found = [matrix_of(storage, key, shapes, path) for key, shapes in keys.items() if storage.get(key) is not None]
+    if not found or found[0] is None:
+        key = next(iter(keys))
+        raise UserError("a key is missing", file=path, place=key, expected="a matrix", found="nothing", remedy=REMEDY)
+    return found[0]
