@@ -6,8 +6,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -21,13 +22,14 @@ from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import ActorOptions, frame_times, make_rig, render
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.capture import Capture, closest_rotation
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import SOURCES
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from tests.captures.fixtures import intrinsics, opengl_matrix, save
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -133,6 +135,32 @@ def save_video(path: Path, images: Image, fps: float) -> None:
         for image in images:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
         container.mux(stream.encode())
+
+
+def moved(camera: Camera, jitter: float, seed: int) -> Camera:
+    """Its pose after its place moved by `jitter` of 1000 mm, its axes by `jitter` radians."""
+    random = np.random.default_rng(seed)
+    turned = closest_rotation(camera.w2c + jitter * np.pad(random.normal(size=(3, 3)), ((0, 0), (0, 1))))
+    centre = camera.centre + 1000 * jitter * random.normal(size=3)
+    return replace(camera, w2c=np.concatenate([turned[:, :3], -(turned[:, :3] @ centre)[:, None]], 1))
+
+
+def write_film(root: Path, labels: str, jitter: float = 0.0, timed: bool = False, **first: object) -> Path:
+    """The film in transforms.json, each picture with a pose of its own, the last frames first.
+
+    `labels` has camera c, frame k and number n; `first` are keys of the first entry.
+    """
+    truth, entries = film(), []
+    for c, camera in enumerate(truth.cameras):
+        for k in reversed(range(truth.frames)):
+            label = labels.format(c=camera.name, k=k, n=c * truth.frames + k)
+            save(root / label, truth.images[c, k])
+            pose = moved(camera, jitter, 10 * c + k) if jitter else camera
+            entry = {"file_path": label, "transform_matrix": opengl_matrix(pose), **intrinsics(camera)}
+            entries.append(entry | ({"time": k / truth.fps} if timed else {}))
+    entries[0] |= first
+    (root / "transforms.json").write_text(json.dumps({"frames": entries}))
+    return root
 
 
 def relating(found: list[Camera], expected: list[Camera]) -> Similarity:

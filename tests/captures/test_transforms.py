@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,13 +15,12 @@ from tests.captures.fixtures import (
     RING,
     edit_transforms,
     intrinsics,
-    opengl_matrix,
     pattern,
     save,
     world_camera,
     write_transforms,
 )
-from tests.filmed import Reader
+from tests.filmed import Reader, film, write_film
 
 read = Reader("transforms")
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
@@ -85,43 +83,27 @@ def test_a_static_capture_has_one_frame_and_no_rate(tmp_path: Path) -> None:
     assert (capture.frame_ids, capture.fps, len(capture.images)) == (("0",), 0.0, 5)
 
 
-def write_dynamic(root: Path, label: str, times: bool = False) -> None:
-    """Five cameras, two frames; `label` is formatted with camera and frame."""
-    entries: list[dict[str, Any]] = []
-    for view in RING:
-        camera = world_camera(*view)
-        for k in (1, 0):
-            file = label.format(camera=camera.name, frame=f"f{k}")
-            save(root / file, pattern(40, 64, k))
-            entry = {"file_path": file, "transform_matrix": opengl_matrix(camera), **intrinsics(camera)}
-            entries.append(entry | ({"time": 0.25 * k} if times else {}))
-    (root / "transforms.json").write_text(json.dumps({"frames": entries}))
-
-
-@pytest.mark.parametrize("label", ["{camera}/{frame}.png", "images/{frame}/{camera}.png"])
+@pytest.mark.parametrize("label", ["{c}/{k}.png", "images/{k}/{c}.png"])
 def test_folders_of_cameras_or_of_frames(tmp_path: Path, label: str) -> None:
-    write_dynamic(tmp_path, label)
-    capture = read(tmp_path, fps=25.0)
-    assert [view.name for view in capture.views] == [name for name, _, _ in RING]
-    assert (capture.frame_ids, capture.fps) == (("f0", "f1"), 25.0)
-    assert capture.images[1, 0].file == tmp_path / label.format(camera="400002", frame="f0")
+    capture = read(write_film(tmp_path, label), fps=25.0)
+    assert tuple(view.name for view in capture.views) == film().names
+    assert (capture.frame_ids, capture.fps) == (("0", "1", "2"), 25.0)
+    assert capture.images[1, 0].file == tmp_path / label.format(c="A001", k=0)
 
 
 def test_times_order_the_frames(tmp_path: Path) -> None:
-    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
-    capture = read(tmp_path)
-    assert capture.frame_ids == ("0", "0.25")
-    assert capture.images[4, 1].file == tmp_path / "400005" / "f1.png"
+    capture = read(write_film(tmp_path, "{c}/{k}.png", timed=True))
+    assert capture.frame_ids == ("0", "0.0333333", "0.0666667")
+    assert capture.images[4, 1].file == tmp_path / "A004" / "1.png"
 
 
 def test_times_that_six_digits_cannot_tell_apart(tmp_path: Path) -> None:
-    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
-    path = tmp_path / "transforms.json"
+    path = write_film(tmp_path, "{c}/{k}.png", timed=True) / "transforms.json"
     content = json.loads(path.read_text())
     for entry in content["frames"]:
-        entry["time"] += 1699999999.0
+        entry["time"] = 1699999999.0 + round(30 * entry["time"]) / 4
     path.write_text(json.dumps(content))
-    assert read(tmp_path).frame_ids == ("1699999999.0", "1699999999.25")
+    assert read(tmp_path).frame_ids == ("1699999999.0", "1699999999.25", "1699999999.5")
 
 
 def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: Path) -> None:

@@ -13,8 +13,7 @@ from facefolds_core.captures.colmap_model import MODELS
 from facefolds_core.captures.sources import colmap
 from facefolds_core.geometry.cameras import Camera
 from tests.captures.fixtures import pattern, save
-from tests.captures.test_arrangement import moved
-from tests.filmed import Reader, check_same, film, scene_of
+from tests.filmed import Reader, check_same, film, moved, scene_of
 
 read = Reader("colmap")
 
