@@ -7,8 +7,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -125,16 +126,25 @@ def save_jpeg(path: Path, image: Image) -> None:
     Pillow.fromarray(image).save(path, quality=100, subsampling=0)
 
 
-def save_video(path: Path, images: Image, fps: float) -> None:
-    """(K, H, W, 3) as H.264 that loses next to nothing: RGB pixels, where the codec can."""
+def save_video(
+    path: Path,
+    images: Image,
+    fps: float,
+    times: Sequence[int] | None = None,
+    container: Mapping[str, str] | None = None,
+) -> None:
+    """(K, H, W, 3) as H.264 without loss; `times` in frames, `container` are its options."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264rgb", rate=round(fps))
+    base = Fraction(1, 100 * round(fps))
+    with av.open(str(path), "w", options=dict(container or {})) as file:
+        stream = file.add_stream("libx264rgb", rate=round(fps), options={"crf": "0", "g": "5"})
         stream.height, stream.width, stream.pix_fmt = images.shape[1], images.shape[2], "rgb24"
-        stream.options = {"crf": "0"}
-        for image in images:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
-        container.mux(stream.encode())
+        stream.codec_context.time_base = base
+        for k, image in enumerate(images):
+            frame = av.VideoFrame.from_ndarray(image, "rgb24")
+            frame.pts, frame.time_base = 100 * (k if times is None else times[k]), base
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
 
 
 def moved(camera: Camera, jitter: float, seed: int) -> Camera:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import wave
@@ -77,6 +78,13 @@ def pattern(width: int, height: int, seed: int) -> NDArray[np.uint8]:
 def save(path: Path, image: NDArray[Any]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     Pillow.fromarray(image).save(path)
+
+
+def encoded(image: NDArray[Any], kind: str, **options: object) -> bytes:
+    """A picture's bytes, as Pillow writes them."""
+    buffer = io.BytesIO()
+    Pillow.fromarray(image).save(buffer, kind, **options)
+    return buffer.getvalue()
 
 
 def save_wav(path: Path, samples: NDArray[Any], rate: int) -> None:

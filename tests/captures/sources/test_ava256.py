@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 import zipfile
@@ -12,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import frame_times, head_pose, tracked_mesh
 from facefolds_core.captures.sources import ava256
 from facefolds_core.errors import UserError
 from facefolds_core.params import CaptureParams
+from tests.captures.fixtures import encoded
 from tests.filmed import Film, Reader, check_same, film, scene_of
 
 read = Reader("ava256", segment="EXP_a")
@@ -31,9 +30,7 @@ def truth() -> Film:
 
 
 def avif(image: np.ndarray) -> bytes:
-    buffer = io.BytesIO()
-    Pillow.fromarray(image).save(buffer, "AVIF", quality=100, subsampling="4:4:4", speed=8)
-    return buffer.getvalue()
+    return encoded(image, "AVIF", quality=100, subsampling="4:4:4", speed=8)
 
 
 def pack(path: Path, members: dict[str, bytes]) -> None:
@@ -79,11 +76,6 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pack(root / "head_pose" / "head_pose.zip", poses)
     pack(root / "kinematic_tracking" / "registration_vertices.zip", meshes)
     return root
-
-
-@pytest.fixture
-def copied(filmed: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(filmed, tmp_path / "copy"))
 
 
 def test_the_filmed_actor_comes_back_with_its_mesh(filmed: Path, tmp_path: Path) -> None:

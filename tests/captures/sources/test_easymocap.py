@@ -141,18 +141,16 @@ def test_labels_of_parts_are_opaque_and_opacity_stays(tmp_path: Path) -> None:
     assert np.unique(capture.mattes[1, 0].opacity("")).tolist() == [0, 130]
 
 
-def test_of_several_folders_of_masks_one_is_read_and_named(filmed: Path, tmp_path: Path) -> None:
-    root = Path(shutil.copytree(filmed, tmp_path / "two"))
-    shutil.copytree(root / "mask", root / "mask_cihp")
-    assert [str(one) for one in read(root).left_out] == [
+def test_of_several_folders_of_masks_one_is_read_and_named(copied: Path) -> None:
+    shutil.copytree(copied / "mask", copied / "mask_cihp")
+    assert [str(one) for one in read(copied).left_out] == [
         "note: masks are those of the folder mask; mask_cihp are not read"
     ]
 
 
-def test_a_camera_without_pictures_and_one_without_calibration_are_left_out(filmed: Path, tmp_path: Path) -> None:
-    root = Path(shutil.copytree(filmed, tmp_path / "some"))
-    (root / "images" / "A001").rename(root / "images" / "extra")
-    kinds = {(one.kind, one.camera) for one in read(root).left_out}
+def test_a_camera_without_pictures_and_one_without_calibration_are_left_out(copied: Path) -> None:
+    (copied / "images" / "A001").rename(copied / "images" / "extra")
+    kinds = {(one.kind, one.camera) for one in read(copied).left_out}
     assert kinds == {("no_images", "A001"), ("uncalibrated", "extra")}
 
 

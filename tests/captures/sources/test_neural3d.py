@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +30,6 @@ def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         save_video(root / f"{name}.mp4", truth.images[c], truth.fps)
     np.save(root / "poses_bounds.npy", np.array([row(camera) for camera in truth.cameras]))
     return root
-
-
-@pytest.fixture
-def copied(filmed: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(filmed, tmp_path / "copy"))
 
 
 def test_the_filmed_actor_comes_back(filmed: Path, tmp_path: Path) -> None:
@@ -77,13 +71,6 @@ def test_a_row_without_a_rotation(copied: Path) -> None:
 def test_a_garbled_table(copied: Path, content: bytes) -> None:
     (copied / "poses_bounds.npy").write_bytes(content)
     read.refused(copied, "garbled numbers")
-
-
-def test_other_frame_counts_and_a_cut_video(copied: Path) -> None:
-    save_video(copied / "cam01.mp4", film().images[1, :2], 30)
-    read.refused(copied, "videos of different lengths", copied / "cam01.mp4")
-    (copied / "cam01.mp4").write_bytes((copied / "cam01.mp4").read_bytes()[:-400])
-    read.refused(copied, "cannot read a video")
 
 
 def test_it_is_recognised(filmed: Path) -> None:
