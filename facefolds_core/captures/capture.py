@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -178,28 +177,22 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
         cameras, frames, and a fact for each one left out.
     """
     total = len(capture.frame_ids)
-    has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
-    kept = [c for c in cameras if 2 * len(has[c]) >= total]
+    lacks = {c: {f for f in range(total) if (c, f) not in capture.images} for c in cameras}
+    name = {c: capture.views[c].name for c in cameras}
+    kept = [c for c in cameras if 2 * len(lacks[c]) <= total]
     left_out = [
-        fact("camera_incomplete", camera=capture.views[c].name, has=len(has[c]), of=total)
-        for c in cameras
-        if c not in kept
+        fact("camera_incomplete", camera=name[c], has=total - len(lacks[c]), of=total) for c in cameras if c not in kept
     ]
-    frames = []
-    for f in range(total):
-        lacking = [capture.views[c].name for c in kept if f not in has[c]]
-        if lacking:
-            left_out.append(fact("frame_incomplete", frame=capture.frame_ids[f], cameras=lacking))
-        else:
-            frames.append(f)
+    lacking = {f: [name[c] for c in kept if f in lacks[c]] for f in range(total)}
+    left_out += [fact("frame_incomplete", frame=capture.frame_ids[f], cameras=of) for f, of in lacking.items() if of]
+    frames = [f for f in range(total) if not lacking[f]]
     if not kept or not frames:
-        missing = Counter(capture.views[c].name for c in cameras for f in range(total) if f not in has[c])
-        worst = [f"{name} lacks {count}" for name, count in missing.most_common(5)]
+        worst = sorted((c for c in cameras if lacks[c]), key=lambda c: -len(lacks[c]))[:5]
         raise UserError(
             "no frame has an image from every camera",
             file=capture.root,
             expected=f"at least one of {total} frames complete",
-            found="; ".join(worst),
+            found="; ".join(f"{name[c]} lacks {len(lacks[c])}" for c in worst),
             remedy="add the missing images, or choose other frames for this subject in params.yaml",
         )
     return kept, frames, left_out

@@ -57,9 +57,8 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
     """Parse the lines [(number, text)] of one camera."""
     number, name = block[0]
     if len(name.split()) != 1:
-        raise _wrong(
-            "garbled KRT", file=path, place=f"line {number}", expected="the name of a camera", found=repr(name)[:200]
-        )
+        expected = "the name of a camera"
+        raise _wrong("garbled KRT", file=path, place=f"line {number}", expected=expected, found=repr(name)[:200])
     rows = [
         _numbers(text, count, path, f"line {line} (camera {name})")
         for (line, text), count in zip(block[1:], _ROWS, strict=False)
@@ -94,15 +93,6 @@ def krt_reference(
         (width, height), and a fact on what was found out, if anything.
     """
     if given is not None:
-        if min(given) < 1 or max(given) > 1 << 20:
-            raise UserError(
-                "a size that no image has",
-                file="params.yaml",
-                place="krt_size",
-                expected="[width, height] in pixels",
-                found=list(given),
-                remedy="correct `krt_size` of this subject in params.yaml",
-            )
         return given, []
     if image == FULL_SIZE:
         return image, []

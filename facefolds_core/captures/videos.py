@@ -29,7 +29,7 @@ Channels = Literal["rgb", "opacity"]
 
 STRICT = {"err_detect": "crccheck+bitstream+buffer+explode"}
 """Damage is an error: nothing is made up in its place."""
-_CONTAINERS = {
+CONTAINERS = {
     ".mp4": "mov", ".m4v": "mov", ".mov": "mov", ".mkv": "matroska", ".webm": "matroska", ".avi": "avi",
 }  # fmt: skip
 """FFmpeg's demuxer by extension: never one of its guesses, some of which open other files."""
@@ -163,9 +163,9 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
 @contextmanager
 def _opened(video: Video) -> Iterator[tuple[Any, Any]]:
     """(container, its video stream); errors of FFmpeg while it is opened are the user's."""
-    kind = _CONTAINERS.get(video.file.suffix.lower())
+    kind = CONTAINERS.get(video.file.suffix.lower())
     if kind is None:
-        raise video.refused("a video of a kind that is not read", f"one of {', '.join(_CONTAINERS)}", video.file.suffix)
+        raise video.refused("a video of a kind that is not read", f"one of {', '.join(CONTAINERS)}", video.file.suffix)
     try:
         container = av.open(
             f"file:{video.file}", format=kind, container_options=STRICT, stream_options=cast(Any, [STRICT])
@@ -214,7 +214,7 @@ def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
 
     MP4 has a table of all frames; of other containers, all packets are read.
     """
-    if _CONTAINERS[video.file.suffix.lower()] == "mov":
+    if CONTAINERS[video.file.suffix.lower()] == "mov":
         entries = [entry for entry in stream.index_entries if not entry.flags & _DISCARDED]
         return [entry.timestamp for entry in entries], max((entry.pos + entry.size for entry in entries), default=0)
     try:

@@ -28,6 +28,7 @@ from facefolds_core.captures.gathering import Calibration, Recognised, footage, 
 from facefolds_core.captures.numbers import short
 from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, needed_matrix, read_storage
 from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.videos import CONTAINERS
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_regular
@@ -35,7 +36,6 @@ from facefolds_core.params import CaptureParams, Subject
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
-VIDEOS = (".mp4", ".mov", ".mkv", ".avi", ".m4v", ".webm")
 _LABELS = 32
 """A mask of no larger value than this has labels of parts of the body, not opacity."""
 _MISSING = "point `path` at the folder that holds intri.yml and extri.yml"
@@ -110,7 +110,7 @@ def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name:
 
 def _videos(root: Path, subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
     """Camera -> frame -> picture, and frames a second."""
-    files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in VIDEOS}
+    files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in CONTAINERS}
     if not files:
         pickle = is_regular(root / "annots.npy")
         raise UserError(

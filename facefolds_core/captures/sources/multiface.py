@@ -45,7 +45,7 @@ def recognise(root: Path) -> Recognised | None:
     rest = is_folder(root / "images") and (is_folder(root / "tracked_mesh") or is_there(root / "frame_list.txt"))
     if not rest and not is_there(root / "KRT"):
         return None
-    segments = [path.name for path in inside(root / "images") if path.is_dir()] if is_folder(root / "images") else []
+    segments = [path.name for path in inside(root / "images") if path.is_dir()]
     if len(segments) < 2:
         return Recognised("a Multiface subject", root)
     return Recognised(f"a Multiface subject, segments {shorten(segments)}", root, {"segment": segments[0]})
@@ -102,7 +102,7 @@ def _segment(root: Path, wanted: str | None) -> str:
     folder = root / "images"
     for place in (root, folder):
         check_folder(place, "point `path` at a Multiface subject's folder, which holds KRT and images")
-    segments = [path.name for path in inside(folder) if path.is_dir()] if folder.is_dir() else []
+    segments = [path.name for path in inside(folder) if path.is_dir()]
     return chosen_segment(segments, wanted, folder, "download some: images/SEGMENT/CAMERA/FRAME.png")
 
 
