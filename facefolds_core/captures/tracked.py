@@ -109,26 +109,26 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         tracking (None where no frame has any), the frames that it covers (all where None), facts on those left out.
     """
 
-    def meshes(name: str) -> tuple[Path, Path, Path]:
-        return folder / f"{name}.bin", folder / f"{name}.obj", folder / f"{name}_transform.txt"
-
     check_folder(folder, _REMEDY)
-    tracked = [n for n in frames if is_there(meshes(n)[2]) and (is_there(meshes(n)[0]) or is_there(meshes(n)[1]))]
+    poses = {name: folder / f"{name}_transform.txt" for name in frames}
+    meshes = {
+        name: [path for path in (folder / f"{name}.bin", folder / f"{name}.obj") if is_there(path)] for name in frames
+    }
+    tracked = [name for name in frames if is_there(poses[name]) and meshes[name]]
     if not tracked:
         return None, frames, [fact("no_mesh", folder=str(folder))]
     left_out = [fact("frame_without_mesh", frame=name) for name in frames if name not in tracked]
-    topology = next((meshes(name)[1] for name in tracked if is_there(meshes(name)[1])), None)
+    topology = next((meshes[name][-1] for name in tracked if meshes[name][-1].suffix == ".obj"), None)
     faces, count = None, None
     if topology is None:
         left_out.append(fact("mesh_without_faces", folder=str(folder)))
     else:
         points, faces = read_obj(topology)
         count = len(points)
-    vertices, poses = np.empty((0, 0, 3)), []
+    vertices, moves = np.empty((0, 0, 3)), []
     for position, name in enumerate(tracked):
-        binary, text, transform = meshes(name)
-        points = read_bin(binary, count) if is_there(binary) else read_obj(text)[0]
-        file = binary if is_there(binary) else text
+        file = meshes[name][0]
+        points = read_bin(file, count) if file.suffix == ".bin" else read_obj(file)[0]
         count = count or len(points)
         sound = (np.abs(points) <= HUGE).all(1)
         if len(points) != count or not sound.all():
@@ -138,5 +138,5 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         if position == 0:
             vertices = spilled((len(tracked), count, 3))
         vertices[position] = points
-        poses.append(parse_pose(read_text(transform, _REMEDY, expected="a head pose"), transform))
-    return Tracking(np.array(poses), vertices, faces), tracked, left_out
+        moves.append(parse_pose(read_text(poses[name], _REMEDY, expected="a head pose"), poses[name]))
+    return Tracking(np.array(moves), vertices, faces), tracked, left_out

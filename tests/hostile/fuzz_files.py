@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
 
-from facefolds_core.captures.scene import Scene, read_scene, write_scene
+from facefolds_core.captures.scene import read_scene, write_scene
 from facefolds_core.config.params_file import Params, write_configs
 from facefolds_core.config.stages import read_subject, read_train
 from facefolds_core.export.sampling import sample_grids
@@ -39,16 +39,15 @@ from facefolds_core.export.stores import (
     write_surfaces,
 )
 from facefolds_core.files.frame_store import FrameStore, write_frames
-from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.chart import Belt, Chart
 from facefolds_core.geometry.meshes import TexturedMesh
-from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.model.storage import build_model, load_model, save_model
 from facefolds_core.params import Subject
 from facefolds_core.reporting.facts import read_images
 from facefolds_core.subject.cameras import CameraFit
 from facefolds_core.subject.splats import COLUMNS, Splats
 from facefolds_core.subject.storage import FoundSubject, read_found, write_found
+from tests.captures.test_scene import scene as scene_of_two_frames
 from tests.ellipsoids import Ellipsoids
 from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
 from tests.hostile.structured import damage_path, damage_values
@@ -87,7 +86,7 @@ def _scene(folder: Path) -> None:
 
 
 def _surface(folder: Path) -> Any:
-    made = _written_scene(folder / "scene")
+    made = scene_of_two_frames(folder / "scene")
     return made.load_surface()
 
 
@@ -134,13 +133,6 @@ KINDS = (
 )
 
 
-def _written_scene(folder: Path) -> Scene:
-    K = np.array([[30.0, 0, 5], [0, 30, 4], [0, 0, 1]])
-    cameras = tuple(Camera(name, K, np.eye(3, 4) + [[0, 0, 0, i]] * 3, 10, 8) for i, name in enumerate("ab"))
-    similarity = Similarity(0.5, np.eye(3), np.ones(3))
-    return Scene("head", cameras, ("train", "holdout"), ("1", "2"), np.array([0, 0.1]), 10.0, similarity, (), folder)
-
-
 def make(root: Path) -> None:
     """One file of each kind."""
     for kind in KINDS:
@@ -149,7 +141,7 @@ def make(root: Path) -> None:
     random = np.random.default_rng(0)
     rows = [(c, f, random.integers(0, 256, (8, 10, 3), dtype=np.uint8)) for c in range(2) for f in range(2)]
     write_frames(root / "scene" / "frames.arrow", (8, 10, 3), rows)
-    write_scene(_written_scene(root / "scene"), root / "scene")
+    write_scene(scene_of_two_frames(root / "scene"), root / "scene")
     vertices, faces = random.normal(size=(2, 5, 3)).astype(np.float32), np.array([[0, 1, 2], [2, 3, 4]], np.int32)
     np.savez(root / "scene" / "surface.npz", vertices=vertices, faces=faces)
     splats = Splats(random.normal(size=(7, COLUMNS)).astype(np.float32), np.zeros(3, np.float32))
