@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from facefolds_core.captures.assembly import Plan, plan_scene
 from facefolds_core.captures.capture import Capture
@@ -143,5 +141,9 @@ def _name(path: Path) -> str:
 
 
 def _quoted(value: object) -> str:
-    """For YAML, in one line."""
-    return yaml.safe_dump([value], default_flow_style=True, allow_unicode=True, width=math.inf).strip()[1:-1]
+    """For YAML: plain where nothing else can be read into it, by YAML 1.2 (DVC's) either."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_quoted, value))}]"
+    text = str(value)
+    plain = re.fullmatch(r"[A-Za-z/.][\w/.-]*", text) and text.lower() not in ("yes", "no", "on", "off", "true", "null")
+    return text if plain else "'" + text.replace("'", "''") + "'"
