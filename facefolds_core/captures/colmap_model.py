@@ -49,9 +49,9 @@ def read_model(folder: Path) -> tuple[list[Calibration], Path]:
     first, second = folder / f"cameras.{kind}", folder / f"images.{kind}"
     rows = _cameras_bin(first) if kind == "bin" else _cameras_txt(first)
     cameras = {number: _camera(name, size, values, first, place) for number, name, size, values, place in rows}
+    posed = _images_bin(second) if kind == "bin" else _images_txt(second)
     images = []
-    for name, number, pose, place in _images_bin(second) if kind == "bin" else _images_txt(second):
-        w2c = _w2c(pose, second, place)
+    for name, number, w2c, place in [(name, n, _w2c(pose, second, place), place) for name, n, pose, place in posed]:
         if number not in cameras:
             expected, found = f"one of {first.name}", f"camera {number}"
             raise _wrong(second, place, "an image of a camera that is not there", expected, found)
