@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Collection, Iterable
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ def read_npy(path: Path, remedy: str) -> Array:
     try:
         values = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
         numbers = np.asarray(values, np.float64)
-    except (ValueError, EOFError, TypeError, OSError, SyntaxError, MemoryError, OverflowError) as error:
+    except (ValueError, EOFError, TypeError, OSError, SyntaxError, TokenError, MemoryError, OverflowError) as error:
         raise UserError(
             "garbled numbers", file=path, expected="an array of numpy.save", found=str(error)[:200], remedy=remedy
         ) from None

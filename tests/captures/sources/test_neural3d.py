@@ -67,7 +67,7 @@ def test_a_row_without_a_rotation(copied: Path) -> None:
         read.refused(copied, message, words)
 
 
-@pytest.mark.parametrize("content", [b"", b"no array", b"\x93NUMPY\x01\x00"])
+@pytest.mark.parametrize("content", [b"", b"no array", b"\x93NUMPY\x01\x00", b"\x93NUMPY\x01\x00\x02\x00{\n"])
 def test_a_garbled_table(copied: Path, content: bytes) -> None:
     (copied / "poses_bounds.npy").write_bytes(content)
     read.refused(copied, "garbled numbers")

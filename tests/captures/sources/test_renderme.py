@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -132,6 +133,15 @@ def test_a_file_cut_off_and_a_folder_without_any_are_refused(filmed: Path, tmp_p
     data = (filmed / "0026_e0_anno.smc").read_bytes()
     (tmp_path / "0026_e0_anno.smc").write_bytes(data[: len(data) // 2])
     read.refused(tmp_path, "damaged HDF5")
+
+
+@pytest.mark.parametrize("name", ["0026_e0_raw.smc", "0026_e0_anno.smc"])
+def test_damage_anywhere_in_a_file_is_the_users(copied: Path, name: str) -> None:
+    data = (copied / name).read_bytes()
+    for start in range(0, len(data), len(data) // 40):
+        (copied / name).write_bytes(data[:start] + bytes(1000) + data[start + 1000 :])
+        with suppress(UserError):
+            read(copied)
 
 
 def test_a_camera_without_pictures_is_left_out_and_a_damaged_picture_refused(copied: Path, tmp_path: Path) -> None:
