@@ -6,8 +6,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -15,17 +17,20 @@ from unittest.mock import patch
 
 import av
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from facefolds_core.captures.actor import ActorOptions, frame_times, make_rig, render
 from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.capture import Capture
+from facefolds_core.captures.capture import Capture, closest_rotation
 from facefolds_core.captures.scene import Scene
 from facefolds_core.captures.sources import SOURCES
+from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from tests.captures.fixtures import intrinsics, opengl_matrix, save
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -82,15 +87,23 @@ def film(cameras: int = 5, frames: int = 3, width: int = 48, height: int = 64) -
     )
 
 
-def reader(source: str, **given: object) -> Callable[..., Capture]:
+class Reader:
     """What reads a capture of a layout: from a place, with keys of its subject besides those given here."""
 
-    def read(root: Path, **keys: object) -> Capture:
-        subject = Subject(source=source, path="x", **{**given, **keys})  # type: ignore[arg-type]
-        capture: Capture = SOURCES[source].read(root, subject, CaptureParams())
+    def __init__(self, source: str, **given: object) -> None:
+        self.source, self.given = source, given
+
+    def __call__(self, root: Path, **keys: object) -> Capture:
+        subject = Subject(source=self.source, path="x", **{**self.given, **keys})  # type: ignore[arg-type]
+        capture: Capture = SOURCES[self.source].read(root, subject, CaptureParams())
         return capture
 
-    return read
+    def refused(self, root: Path, message: str, *words: object, **keys: object) -> None:
+        """AssertionError unless it refuses with that message, and says these words."""
+        with pytest.raises(UserError) as caught:
+            self(root, **keys)
+        missing = [word for word in words if str(word) not in str(caught.value)]
+        assert message in caught.value.message and not missing, caught.value
 
 
 def scene_of(root: Path, source: str, folder: Path, names: tuple[str, ...], **subject: object) -> Scene:
@@ -113,16 +126,51 @@ def save_jpeg(path: Path, image: Image) -> None:
     Pillow.fromarray(image).save(path, quality=100, subsampling=0)
 
 
-def save_video(path: Path, images: Image, fps: float) -> None:
-    """(K, H, W, 3) as H.264 that loses next to nothing: RGB pixels, where the codec can."""
+def save_video(
+    path: Path,
+    images: Image,
+    fps: float,
+    times: Sequence[int] | None = None,
+    container: Mapping[str, str] | None = None,
+) -> None:
+    """(K, H, W, 3) as H.264 without loss; `times` in frames, `container` are its options."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264rgb", rate=round(fps))
+    base = Fraction(1, 100 * round(fps))
+    with av.open(str(path), "w", options=dict(container or {})) as file:
+        stream = file.add_stream("libx264rgb", rate=round(fps), options={"crf": "0", "g": "5"})
         stream.height, stream.width, stream.pix_fmt = images.shape[1], images.shape[2], "rgb24"
-        stream.options = {"crf": "0"}
-        for image in images:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
-        container.mux(stream.encode())
+        stream.codec_context.time_base = base
+        for k, image in enumerate(images):
+            frame = av.VideoFrame.from_ndarray(image, "rgb24")
+            frame.pts, frame.time_base = 100 * (k if times is None else times[k]), base
+            file.mux(stream.encode(frame))
+        file.mux(stream.encode())
+
+
+def moved(camera: Camera, jitter: float, seed: int) -> Camera:
+    """Its pose after its place moved by `jitter` of 1000 mm, its axes by `jitter` radians."""
+    random = np.random.default_rng(seed)
+    turned = closest_rotation(camera.w2c + jitter * np.pad(random.normal(size=(3, 3)), ((0, 0), (0, 1))))
+    centre = camera.centre + 1000 * jitter * random.normal(size=3)
+    return replace(camera, w2c=np.concatenate([turned[:, :3], -(turned[:, :3] @ centre)[:, None]], 1))
+
+
+def write_film(root: Path, labels: str, jitter: float = 0.0, timed: bool = False, **first: object) -> Path:
+    """The film in transforms.json, each picture with a pose of its own, the last frames first.
+
+    `labels` has camera c, frame k and number n; `first` are keys of the first entry.
+    """
+    truth, entries = film(), []
+    for c, camera in enumerate(truth.cameras):
+        for k in reversed(range(truth.frames)):
+            label = labels.format(c=camera.name, k=k, n=c * truth.frames + k)
+            save(root / label, truth.images[c, k])
+            pose = moved(camera, jitter, 10 * c + k) if jitter else camera
+            entry = {"file_path": label, "transform_matrix": opengl_matrix(pose), **intrinsics(camera)}
+            entries.append(entry | ({"time": k / truth.fps} if timed else {}))
+    entries[0] |= first
+    (root / "transforms.json").write_text(json.dumps({"frames": entries}))
+    return root
 
 
 def relating(found: list[Camera], expected: list[Camera]) -> Similarity:

@@ -115,7 +115,7 @@ def _entry(said: Recognised, subject: Subject, capture: Capture, plan: Plan) -> 
     if "holdout" in said.keys:
         pass
     elif 0 < len(masked) < len(names):
-        yield f"    holdout: [{', '.join(map(_quoted, masked))}]  # those that have masks to score by"
+        yield f"    holdout: {_quoted(masked)}  # those that have masks to score by"
     elif len(names) < default.every:
         yield f"    holdout: [{_quoted(_between(plan))}]  # a camera that others stand around"
     if len(capture.frame_ids) > 1:
@@ -141,7 +141,7 @@ def _name(path: Path) -> str:
 
 
 def _quoted(value: object) -> str:
-    """For YAML: plain where nothing else can be read into it."""
+    """For YAML: plain where nothing else can be read into it, by YAML 1.2 (DVC's) either."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_quoted, value))}]"
     text = str(value)

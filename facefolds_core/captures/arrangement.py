@@ -73,28 +73,22 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
 
     Args:
         path: of the file that lists them, for messages.
-
-    Raises:
-        UserError: if they show a single camera that moves.
     """
-    groups = _by_pose(shots)
+    groups = _grouped(np.round(shot.w2c, 7).tobytes() for shot in shots)
     groups = _gathered(shots, groups) or groups
     times = {shot.time for shot in shots}
     if max(len(group) for group in groups) == 1:
         if len(times) > 1:
-            raise wrong(
-                path,
-                "time",
-                "every camera is seen at one time only, as from a single moving camera",
-                "cameras that see every frame",
-                f"{len(groups)} cameras, {len(times)} times",
-                "use a capture of several fixed cameras; for a static scene, take the `time` keys out",
-            )
+            message = "every camera is seen at one time only, as from a single moving camera"
+            expected, found = "cameras that see every frame", f"{len(groups)} cameras, {len(times)} times"
+            remedy = "use a capture of several fixed cameras; for a static scene, take the `time` keys out"
+            raise wrong(path, "time", message, expected, found, remedy)
         names = _unique([(shots[group[0]].stem, shots[group[0]].folder) for group in groups])
         return Arrangement(dict(zip(names, groups, strict=True)), ["0"], ["0"] * len(shots))
     timed = None not in times
     named = _time_names([time for time in times if time is not None]) if timed else {}
-    stems = _frame_is_folder(shots, groups)
+    # Whether the images of one camera share their name (so that folders are frames) or their folder.
+    stems = all(len({shots[i].stem for i in group}) == 1 for group in groups)
     frame_of = [shot.folder if stems else shot.stem for shot in shots]
     if timed:
         frame_of = [named[shot.time] for shot in shots if shot.time is not None]
@@ -105,19 +99,14 @@ def arrange(shots: Sequence[Shot], path: Path) -> Arrangement:
 
 
 def mean_calibration(some: Sequence[Calibration]) -> Calibration:
-    """One camera whose pictures were calibrated one by one: the mean of its calibrations.
-
-    Raises:
-        UserError: if some of them are a fisheye's and others not.
-    """
+    """One camera whose pictures were calibrated one by one: the mean of its calibrations."""
     first = some[0]
     if len(some) == 1:
         return first
     for other in some:
         if (other.fisheye, other.coefficients.shape) != (first.fisheye, first.coefficients.shape):
-            raise wrong(
-                other.file, other.place, "two lens models of one camera", f"that of {first.place}", "another model"
-            )
+            expected = f"that of {first.place}"
+            raise wrong(other.file, other.place, "two lens models of one camera", expected, "another model")
     K, coefficients = (np.mean(of, axis=0) for of in ([c.K for c in some], [c.coefficients for c in some]))
     return replace(first, K=K, w2c=_mean_pose([c.w2c for c in some]), coefficients=coefficients)
 
@@ -130,10 +119,11 @@ def _mean_pose(poses: Sequence[Array]) -> Array:
     return rotation
 
 
-def _by_pose(shots: Sequence[Shot]) -> list[list[int]]:
-    groups: dict[bytes, list[int]] = defaultdict(list)
-    for i, shot in enumerate(shots):
-        groups[np.round(shot.w2c, 7).tobytes()].append(i)
+def _grouped(labels: Iterable[object]) -> list[list[int]]:
+    """Indices of equal labels."""
+    groups: dict[object, list[int]] = defaultdict(list)
+    for i, label in enumerate(labels):
+        groups[label].append(i)
     return list(groups.values())
 
 
@@ -141,15 +131,9 @@ def _gathered(shots: Sequence[Shot], exact: list[list[int]]) -> list[list[int]] 
     """Shots of poses that differ a little, by camera: None where equal poses tell, or nothing does."""
     if len({len(group) for group in exact}) == 1 and len(exact[0]) > 1:
         return None
-    for labels in (
-        [shot.folder for shot in shots],
-        [shot.stem for shot in shots],
-        _nearest_at_first(shots),
-    ):
-        groups: dict[object, list[int]] = defaultdict(list)
-        for i, label in enumerate(labels):
-            groups[label].append(i)
-        found = list(groups.values())
+    folders, stems = [shot.folder for shot in shots], [shot.stem for shot in shots]
+    for labels in (folders, stems, _nearest_at_first(shots)):
+        found = _grouped(labels)
         if FEWEST <= len(found) < len(exact) and _agree(shots, found):
             return found
     return None
@@ -191,18 +175,10 @@ def _time_names(times: Iterable[float]) -> dict[float, str]:
     return dict(zip(ordered, short if len(set(short)) == len(short) else map(repr, ordered), strict=True))
 
 
-def _frame_is_folder(shots: Sequence[Shot], groups: list[list[int]]) -> bool:
-    """Whether the images of one camera share their name (so that folders are frames) or their folder."""
-    return all(len({shots[i].stem for i in group}) == 1 for group in groups)
-
-
 def _unique(candidates: list[tuple[str, str]]) -> list[str]:
     """Names of cameras: the first choice of each where these differ, else the second, else both, else numbered."""
-    for names in (
-        [first for first, _ in candidates],
-        [second for _, second in candidates],
-        [f"{second}/{first}" for first, second in candidates],
-    ):
+    firsts, seconds = [first for first, _ in candidates], [second for _, second in candidates]
+    for names in (firsts, seconds, [f"{second}/{first}" for first, second in candidates]):
         if max(Counter(names).values()) == 1:
             return names
     return [f"{first}-{i}" for i, (first, _) in enumerate(candidates)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,24 +27,10 @@ from facefolds_core.params import NormalizeParams, Subject
 from facefolds_core.progress import progress
 from facefolds_core.system.spill import by_rows
 
-Negatives = list[Negative]
+Rows = dict[tuple[int, int], tuple[int, int]]
 
 BALL = (0.02, 0.95)
 """Radii of the subject's ball in distances of the cameras: an eye would fill it, and beyond it the cameras stand."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One image of the scene and where it comes from.
-
-    Attributes:
-        camera, frame: indices in the scene.
-        source: (camera index, frame index) in the capture.
-    """
-
-    camera: int
-    frame: int
-    source: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -54,14 +40,14 @@ class Plan:
     Attributes:
         capture: what it is made from.
         scene: all of it but pixels and mesh.
-        rows: its images, ordered by camera, then frame.
+        rows: its images, (camera, frame) in the scene -> in the capture, ordered by camera, then frame.
         vertices: (K, V, 3) float32 tracked mesh in the head's own frame, or None.
         sound_start: seconds, where the first frame lies in the capture's sound; None without a sound that fits.
     """
 
     capture: Capture
     scene: Scene
-    rows: tuple[Row, ...]
+    rows: Rows
     vertices: NDArray[np.float32] | None
     sound_start: float | None = None
 
@@ -77,9 +63,9 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         UserError: for everything that is wrong with the capture and shows without decoding its images.
     """
     similarity, notes = normalizing_similarity(capture, subject.front, subject.centre)
-    culling = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
-    kept, frames, incomplete = complete_subset(capture, culling.kept)
-    left_out = [*capture.left_out, *notes, *culling.facts, *incomplete]
+    inside, culled = cull([view.camera.transformed(similarity) for view in capture.views], params, capture.root)
+    kept, frames, incomplete = complete_subset(capture, inside)
+    left_out = [*capture.left_out, *notes, *culled, *incomplete]
     fps = capture.fps if len(frames) > 1 else 0.0
     sound = None if capture.sound is None else sound_start([capture.sound.seconds[f] for f in frames], fps)
     if capture.sound is not None and sound is None:
@@ -88,9 +74,9 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
     width, height = fit_box(*check_image_sizes(capture, kept, frames), params.long_side, params.short_side)
 
     cameras = [capture.views[c].camera.resized(width, height).transformed(similarity) for c in kept]
-    rows = [Row(i, f, (c, source)) for i, c in enumerate(kept) for f, source in enumerate(frames)]
-    motion = head_motion(capture, frames, similarity, params)
-    left_out += motion.facts
+    rows = {(i, f): (c, source) for i, c in enumerate(kept) for f, source in enumerate(frames)}
+    track, motion = head_motion(capture, frames, similarity, params)
+    left_out += motion
     scene = Scene(
         subject=name,
         cameras=tuple(cameras),
@@ -101,25 +87,21 @@ def plan_scene(capture: Capture, name: str, subject: Subject, params: NormalizeP
         from_capture=similarity,
         left_out=tuple(left_out),
         folder=folder,
-        poses=motion.track,
+        poses=track,
         radius=None if subject.radius is None else _ball(similarity.scale * subject.radius, capture),
     )
     vertices, there = None, None
     if capture.tracking is not None:
-        world, track = capture.tracking.world_vertices(frames), motion.track
+        world = capture.tracking.world_vertices(frames)
         normalised = by_rows(len(world), lambda rows: similarity.apply(world[rows]))
         vertices = by_rows(len(world), lambda rows: in_head(normalised[rows], track, rows.start), np.float32)
         there = by_rows(len(world), lambda rows: normalised[rows], np.float32)
     check_sight(cameras, scene.frame_ids, there, capture.root)
-    return Plan(capture, scene, tuple(rows), vertices, sound)
+    return Plan(capture, scene, rows, vertices, sound)
 
 
 def _ball(radius: float, capture: Capture) -> float:
-    """The radius of the subject's ball, units.
-
-    Raises:
-        UserError: if it holds next to nothing, or the cameras stand in it.
-    """
+    """The radius of the subject's ball, units."""
     least, most = BALL
     if least <= radius <= most:
         return radius
@@ -141,7 +123,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     """
     scene, capture = plan.scene, plan.capture
     width, height = scene.width, scene.height
-    scored = [row for row in plan.rows if scene.splits[row.camera] != "train"]
+    scored = {key: source for key, source in plan.rows.items() if scene.splits[key[0]] != "train"}
     opacity = {
         "masks": _negatives(scored, capture.masks, lambda c, f: f"mask of {capture.place(c, f)}"),
         "mattes": _negatives(plan.rows, capture.mattes, lambda c, f: f"matte of {capture.place(c, f)}"),
@@ -154,7 +136,12 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
             if wanted:
                 rows = opacities(capture, wanted, width, height)
                 write_frames(temporary / f"{name}.arrow", (height, width, 1), rows)
-        if plates := _plates(plan):
+        plates = [
+            Negative(key, view, capture.plates[view], capture.plate_place(view))
+            for key, (view, _) in plan.rows.items()
+            if key[1] == 0 and view in capture.plates
+        ]
+        if plates:
             rows = photos(capture, plates, width, height, params)
             write_frames(temporary / "plates.arrow", (height, width, 3), rows)
         if plan.vertices is not None and capture.tracking is not None and capture.tracking.faces is not None:
@@ -167,21 +154,7 @@ def write_plan(plan: Plan, params: NormalizeParams) -> Scene:
     return scene
 
 
-def _negatives(rows: Sequence[Row], pictures: Mapping[tuple[int, int], Picture], what: Callable[..., str]) -> Negatives:
+def _negatives(rows: Rows, pictures: Mapping[tuple[int, int], Picture], what: Callable[..., str]) -> list[Negative]:
     """Of those rows that have a picture; `what` words its camera and frame in the capture."""
-    return [
-        Negative((row.camera, row.frame), row.source[0], pictures[row.source], what(*row.source))
-        for row in rows
-        if row.source in pictures
-    ]
-
-
-def _plates(plan: Plan) -> Negatives:
-    """The clean plate of each camera that has one, as its frame 0."""
-    capture = plan.capture
-    view_of = {row.camera: row.source[0] for row in plan.rows}
-    return [
-        Negative((camera, 0), view, capture.plates[view], capture.plate_place(view))
-        for camera, view in view_of.items()
-        if view in capture.plates
-    ]
+    there = {key: source for key, source in rows.items() if source in pictures}
+    return [Negative(key, source[0], pictures[source], what(*source)) for key, source in there.items()]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -127,11 +127,7 @@ class Capture:
 def select_frames(
     names: Sequence[str], wanted: FrameRange | tuple[str, ...] | None, file: Path, what: str
 ) -> list[str]:
-    """The frames that `subjects.<name>.frames` asks for, out of the capture's sorted `names`.
-
-    Raises:
-        UserError: if there is no such frame, or the range is empty.
-    """
+    """The frames that `subjects.<name>.frames` asks for, out of the capture's sorted `names`."""
     wrong = partial(UserError, file=file, place="frames", remedy="correct `frames` of this subject in params.yaml")
     if isinstance(wanted, tuple):
         unknown = [name for name in wanted if name not in names]
@@ -152,11 +148,7 @@ def select_frames(
 
 
 def frame_rate(subject: Subject, default: float, count: int) -> float:
-    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame.
-
-    Raises:
-        UserError: for a rate out of `RATES`.
-    """
+    """Frames a second of those in use: a range that takes every n-th divides the rate. 0 for a single frame."""
     rate = subject.fps or default
     if not RATES[0] <= rate <= RATES[1]:
         raise UserError(
@@ -183,58 +175,39 @@ def complete_subset(capture: Capture, cameras: Sequence[int]) -> tuple[list[int]
 
     Returns:
         cameras, frames, and a fact for each one left out.
-
-    Raises:
-        UserError: if no frame is left.
     """
     total = len(capture.frame_ids)
-    has = {c: {f for f in range(total) if (c, f) in capture.images} for c in cameras}
-    kept = [c for c in cameras if 2 * len(has[c]) >= total]
+    lacks = {c: {f for f in range(total) if (c, f) not in capture.images} for c in cameras}
+    name = {c: capture.views[c].name for c in cameras}
+    kept = [c for c in cameras if 2 * len(lacks[c]) <= total]
     left_out = [
-        fact("camera_incomplete", camera=capture.views[c].name, has=len(has[c]), of=total)
-        for c in cameras
-        if c not in kept
+        fact("camera_incomplete", camera=name[c], has=total - len(lacks[c]), of=total) for c in cameras if c not in kept
     ]
-    frames = []
-    for f in range(total):
-        lacking = [capture.views[c].name for c in kept if f not in has[c]]
-        if lacking:
-            left_out.append(fact("frame_incomplete", frame=capture.frame_ids[f], cameras=lacking))
-        else:
-            frames.append(f)
+    lacking = {f: [name[c] for c in kept if f in lacks[c]] for f in range(total)}
+    left_out += [fact("frame_incomplete", frame=capture.frame_ids[f], cameras=of) for f, of in lacking.items() if of]
+    frames = [f for f in range(total) if not lacking[f]]
     if not kept or not frames:
-        missing = Counter(capture.views[c].name for c in cameras for f in range(total) if f not in has[c])
-        worst = [f"{name} lacks {count}" for name, count in missing.most_common(5)]
+        worst = sorted((c for c in cameras if lacks[c]), key=lambda c: -len(lacks[c]))[:5]
         raise UserError(
             "no frame has an image from every camera",
             file=capture.root,
             expected=f"at least one of {total} frames complete",
-            found="; ".join(worst),
+            found="; ".join(f"{name[c]} lacks {len(lacks[c])}" for c in worst),
             remedy="add the missing images, or choose other frames for this subject in params.yaml",
         )
     return kept, frames, left_out
 
 
 def check_image_sizes(capture: Capture, cameras: Sequence[int], frames: Sequence[int]) -> tuple[int, int]:
-    """(width, height) of all images in use, from their headers (masks and mattes included).
-
-    Raises:
-        UserError: if a header cannot be read or sizes differ; names the file and the size of the others.
-    """
-    expected: tuple[int, int] | None = None
-    for c in cameras:
-        for f in frames:
-            place = capture.place(c, f)
-            pictures = [(capture.images[c, f], place)]
-            pictures += [(of[c, f], place) for of in (capture.masks, capture.mattes) if (c, f) in of]
-            for picture, where in pictures:
-                size = picture.size(where)
-                expected = expected or size
-                if size != expected:
-                    first = capture.images[cameras[0], frames[0]].file
-                    raise wrong_size(picture.file, where, size, f"{expected[0]} x {expected[1]}, as {first}")
-    if expected is None:
-        raise ValueError("no cameras or frames to check")
+    """(width, height) of all images in use, from their headers (masks and mattes included)."""
+    first = capture.images[cameras[0], frames[0]]
+    expected = first.size(capture.place(cameras[0], frames[0]))
+    for key in product(cameras, frames):
+        for picture in [of[key] for of in (capture.images, capture.masks, capture.mattes) if key in of]:
+            size = picture.size(capture.place(*key))
+            if size != expected:
+                words = f"{expected[0]} x {expected[1]}, as {first.file}"
+                raise wrong_size(picture.file, capture.place(*key), size, words)
     for c in cameras:
         if c in capture.plates:
             check_plate_size(capture, c, capture.plates[c].size(capture.plate_place(c)))

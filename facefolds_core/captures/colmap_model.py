@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.captures.gathering import Calibration
 from facefolds_core.errors import UserError
 from facefolds_core.files.reading import is_regular, read_bytes, read_text
 from facefolds_core.geometry.cameras import HUGE
@@ -34,41 +35,6 @@ UNREAD = ("FOV", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE")
 _REMEDY = "write the model again (`colmap model_converter`)"
 
 
-@dataclass(frozen=True)
-class ModelCamera:
-    """Intrinsics.
-
-    Attributes:
-        size: (width, height).
-        K: (3, 3).
-        coefficients, fisheye: as of `lens.Lens`.
-        place: in its file.
-    """
-
-    size: tuple[int, int]
-    K: Array
-    coefficients: Array
-    fisheye: bool
-    place: str
-
-
-@dataclass(frozen=True)
-class ModelImage:
-    """A registered image.
-
-    Attributes:
-        name: its path below the folder of images.
-        camera: the number of its camera.
-        w2c: (3, 4).
-        place: in its file.
-    """
-
-    name: str
-    camera: int
-    w2c: Array
-    place: str
-
-
 def model_folder(root: Path) -> Path | None:
     """Where cameras and images of a model lie: in `root`, or where COLMAP's own tools put them below it."""
     for folder in (root, root / "sparse" / "0", root / "sparse", root / "colmap" / "sparse" / "0"):
@@ -77,25 +43,22 @@ def model_folder(root: Path) -> Path | None:
     return None
 
 
-def read_model(folder: Path) -> tuple[dict[int, ModelCamera], list[ModelImage], Path]:
-    """Cameras by number, images in the order of their names, and the images' file.
-
-    Raises:
-        UserError: if a file is garbled, cut off, or names a camera that is not there or a model that is not read.
-    """
+def read_model(folder: Path) -> tuple[list[Calibration], Path]:
+    """The registered images, by the order of their names, each with its camera, and the images' file."""
     kind = "bin" if is_regular(folder / "cameras.bin") and is_regular(folder / "images.bin") else "txt"
     first, second = folder / f"cameras.{kind}", folder / f"images.{kind}"
     rows = _cameras_bin(first) if kind == "bin" else _cameras_txt(first)
     cameras = {number: _camera(name, size, values, first, place) for number, name, size, values, place in rows}
     posed = _images_bin(second) if kind == "bin" else _images_txt(second)
-    images = [ModelImage(name, camera, _w2c(pose, second, place), place) for name, camera, pose, place in posed]
-    for image in images:
-        if image.camera not in cameras:
-            found = f"camera {image.camera}"
-            raise _wrong(second, image.place, "an image of a camera that is not there", f"one of {first.name}", found)
+    images = []
+    for name, number, w2c, place in [(name, n, _w2c(pose, second, place), place) for name, n, pose, place in posed]:
+        if number not in cameras:
+            expected, found = f"one of {first.name}", f"camera {number}"
+            raise _wrong(second, place, "an image of a camera that is not there", expected, found)
+        images.append(replace(cameras[number], name=name, w2c=w2c, file=second, place=place))
     if not images:
         raise _wrong(second, None, "no image is registered", "images with poses", "none")
-    return cameras, sorted(images, key=lambda image: image.name), second
+    return sorted(images, key=lambda image: image.name), second
 
 
 def _wrong(file: Path, place: str | None, message: str, expected: object, found: object) -> UserError:
@@ -106,7 +69,8 @@ Row = tuple[int, str, tuple[int, int], list[float], str]
 Posed = tuple[str, int, list[float], str]
 
 
-def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, place: str) -> ModelCamera:
+def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, place: str) -> Calibration:
+    """A camera of the model `name`, at the origin."""
     counts = dict(MODELS.values())
     if name not in counts or name in UNREAD:
         read = ", ".join(model for model in counts if model not in UNREAD)
@@ -123,11 +87,8 @@ def _camera(name: str, size: tuple[int, int], values: list[float], file: Path, p
         raise _wrong(file, place, "a garbled camera", expected, f"{size[0]} x {size[1]}, {values}")
     focal, rest = (values[:1] * 2, values[1:]) if name in ONE_FOCAL else (values[:2], values[2:])
     K = np.array([[focal[0], 0, rest[0]], [0, focal[1], rest[1]], [0, 0, 1]])
-    fisheye = name.endswith("FISHEYE")
-    given = rest[2:]
     # All but FULL_OPENCV lack the last of OpenCV's coefficients; FULL_OPENCV has k1 k2 p1 p2 k3 k4 k5 k6, as `Lens`.
-    length = 4 if fisheye else max(5, len(given))
-    return ModelCamera(size, K, np.array(given + [0.0] * (length - len(given))), fisheye, place)
+    return Calibration(name, K, np.eye(3, 4), file, place, np.array(rest[2:]), name.endswith("FISHEYE"), size)
 
 
 def _w2c(pose: list[float], file: Path, place: str) -> Array:
@@ -171,48 +132,43 @@ class _Bytes:
     def __init__(self, file: Path) -> None:
         self.file, self.data, self.at = file, read_bytes(file, _REMEDY), 0
 
+    def skip(self, size: int) -> int:
+        """Where the next `size` bytes lie, which are passed over."""
+        start, self.at = self.at, self.at + size
+        if self.at > len(self.data):
+            raise _wrong(self.file, f"byte {start}", "cut off, or garbled", "more bytes", f"{len(self.data)} bytes")
+        return start
+
     def take(self, form: str) -> tuple[float, ...]:
-        size = struct.calcsize("<" + form)
-        self.check(size)
-        self.at += size
-        return struct.unpack_from("<" + form, self.data, self.at - size)
+        return struct.unpack_from("<" + form, self.data, self.skip(struct.calcsize("<" + form)))
 
     def name(self) -> str:
         end = self.data.find(b"\0", self.at)
-        self.check(len(self.data) if end < 0 else 0)
-        start, self.at = self.at, end + 1
+        start = self.skip((end if end >= 0 else len(self.data)) + 1 - self.at)
         try:
             return self.data[start:end].decode()
         except UnicodeDecodeError:
             raise _wrong(self.file, f"byte {start}", "a garbled name", "UTF-8", "other bytes") from None
 
-    def skip(self, size: int) -> None:
-        self.check(size)
-        self.at += size
 
-    def check(self, size: int) -> None:
-        if self.at + size > len(self.data):
-            found = f"{len(self.data)} bytes"
-            raise _wrong(self.file, f"byte {self.at}", "cut off, or garbled", "more bytes", found)
-
-
-def _cameras_bin(file: Path) -> Iterator[Row]:
+def _entries(file: Path) -> Iterator[tuple[_Bytes, str]]:
+    """For each entry of a binary file the file, which stands at it, and the entry's place."""
     data = _Bytes(file)
     (count,) = data.take("Q")
     for _ in range(int(count)):
-        place = f"byte {data.at}"
+        yield data, f"byte {data.at}"
+
+
+def _cameras_bin(file: Path) -> Iterator[Row]:
+    for data, place in _entries(file):
         number, model, width, height = (int(value) for value in data.take("iiQQ"))
         name, parameters = MODELS.get(model, (f"number {model}", 0))
         yield number, name, (width, height), list(data.take("d" * parameters)), place
 
 
 def _images_bin(file: Path) -> Iterator[Posed]:
-    data = _Bytes(file)
-    (count,) = data.take("Q")
-    for _ in range(int(count)):
-        place = f"byte {data.at}"
-        values = data.take("idddddddi")
-        name = data.name()
+    for data, place in _entries(file):
+        values, name = data.take("idddddddi"), data.name()
         (points,) = data.take("Q")
         data.skip(24 * int(points))
         yield name, int(values[8]), list(values[1:8]), place

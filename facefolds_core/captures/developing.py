@@ -50,11 +50,7 @@ Row = tuple[int, int, Image]
 def photos(
     capture: Capture, negatives: Sequence[Negative], width: int, height: int, params: NormalizeParams
 ) -> Iterator[Row]:
-    """Colour pictures (height, width, 3).
-
-    Raises:
-        UserError: if one is damaged, or of another size than its camera's.
-    """
+    """Colour pictures (height, width, 3)."""
 
     def finish(negative: Negative, photo: Image) -> Image:
         colour = capture.views[negative.view].colour
@@ -69,7 +65,7 @@ def photos(
 
 
 def opacities(capture: Capture, negatives: Sequence[Negative], width: int, height: int) -> Iterator[Row]:
-    """Masks or mattes (height, width, 1); raises like `photos`."""
+    """Masks or mattes (height, width, 1)."""
     return _developed(capture, negatives, "opacity", width, lambda _, mask: _averaged(mask, width, height))
 
 

@@ -23,9 +23,6 @@ def find_front(cameras: Sequence[Camera], centre: Array, file: object) -> tuple[
     A rig has most of its cameras before the face, evenly to both sides: the front is the mean of the directions to the
     cameras, made level, since rigs have more room above the face than below. Up is the median of the cameras' ups:
     some may be turned on their sides.
-
-    Raises:
-        UserError: if the cameras stand around evenly, or above one another, so that no direction stands out.
     """
     towards = np.array([camera.centre - centre for camera in cameras])
     towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-12)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
 from facefolds_core.captures.lens import make_lens
 from facefolds_core.captures.picture import FilePicture, Picture, VideoFrame
-from facefolds_core.captures.videos import Video, check_together, frame_names
+from facefolds_core.captures.videos import Video, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_folder
@@ -52,7 +52,7 @@ class Calibration:
         name: as its pictures are called.
         K: (3, 3) in pixels of `size`, in the layout's own pixel coordinates.
         w2c: (3, 4) world -> camera, OpenCV axes.
-        coefficients, fisheye: of the lens (`lens.Lens`).
+        coefficients, fisheye: of the lens (`lens.Lens`); those at the end that are 0 may be left out.
         size: (width, height) that K refers to; None: that of the pictures, whatever it is.
         file, place: where it stands, for messages.
     """
@@ -62,9 +62,13 @@ class Calibration:
     w2c: Array
     file: Path
     place: str
-    coefficients: Array
+    coefficients: Array = field(default_factory=lambda: np.zeros(0))
     fisheye: bool = False
     size: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        left_out = (4 if self.fisheye else 5) - len(self.coefficients)
+        object.__setattr__(self, "coefficients", np.pad(self.coefficients, (0, max(0, left_out))))
 
 
 def inside(folder: Path) -> list[Path]:
@@ -78,9 +82,9 @@ def natural(path: Path | str) -> tuple[tuple[int, int | str], ...]:
     return tuple((0, int(part)) if part.isdigit() else (1, part) for part in re.split(r"(\d+)", name) if part)
 
 
-def pictures_in(folder: Path) -> dict[str, Picture]:
+def pictures_in(folder: Path, suffixes: Collection[str] = SUFFIXES) -> dict[str, Picture]:
     """Stem -> PNG or JPEG file."""
-    return {path.stem: FilePicture(path) for path in inside(folder) if path.suffix.lower() in SUFFIXES}
+    return {path.stem: FilePicture(path) for path in inside(folder) if path.suffix.lower() in suffixes}
 
 
 def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
@@ -92,15 +96,11 @@ def footage(files: Mapping[str, Path], subject: Subject) -> tuple[dict[str, dict
 
     Returns:
         camera -> frame -> picture, and frames a second.
-
-    Raises:
-        UserError: as `check_together`.
     """
     videos = [Video(path, name) for name, path in files.items()]
     stop = subject.frames.stop if isinstance(subject.frames, FrameRange) else None
     count, rate = check_together(videos, stop)
-    names = frame_names(count)
-    return {v.camera: {name: VideoFrame(v, i) for i, name in enumerate(names)} for v in videos}, float(rate)
+    return {v.camera: {f"{i:06d}": VideoFrame(v, i) for i in range(count)} for v in videos}, float(rate)
 
 
 def gather(
@@ -122,17 +122,9 @@ def gather(
         masks: opacity, where the layout has it: training may use it, held-out pictures are scored by it.
         fps: where the subject leaves it null.
         pixel_centres: of the layout, likewise.
-
-    Raises:
-        UserError: if no camera has both calibration and pictures, calibrations cannot be, or sizes do not fit.
     """
-    used, bare, strange = cameras_with_pictures(calibrations, photos, root)
-    facts = [fact("no_images", camera=name) for name in bare] + [fact("uncalibrated", camera=name) for name in strange]
-    sizes = {}
-    for one in used:
-        frame, picture = next(iter(photos[one.name].items()))
-        sizes[one.name] = picture.size(f"camera {one.name}, frame {frame}")
-    common = Counter(sizes.values()).most_common(1)[0][0]
+    used, facts = cameras_with_pictures(calibrations, photos, root)
+    sizes, common = first_sizes(used, photos)
     facts += [
         fact("other_size", camera=name, size=list(size), common=list(common))
         for name, size in sizes.items()
@@ -145,16 +137,15 @@ def gather(
     scaled = [one.name for one in used if one.size not in (None, common)]
     if scaled:
         facts.append(fact("k_is_scaled", cameras=scaled, size=list(common)))
-    keys = [(c, f) for c, one in enumerate(used) for f, frame in enumerate(frames) if frame in photos[one.name]]
-    opacity = {
-        (c, f): masks[used[c].name][frames[f]] for c, f in keys if masks and frames[f] in masks.get(used[c].name, ())
-    }
+    names = [one.name for one in used]
+    images = placed(photos, names, frames)
+    opacity = {key: mask for key, mask in placed(masks or {}, names, frames).items() if key in images}
     return Capture(
         root,
         tuple(view_of(one, common, centres) for one in used),
         tuple(frames),
         frame_rate(subject, fps, len(frames)),
-        {(c, f): photos[used[c].name][frames[f]] for c, f in keys},
+        images,
         opacity,
         None,
         (*left_out, *facts),
@@ -162,12 +153,23 @@ def gather(
     )
 
 
-def view_of(calibration: Calibration, size: tuple[int, int], pixel_centres: float) -> View:
-    """The camera for pictures of `size` (width, height), its lens taken out.
+def first_sizes(used: Sequence[Calibration], photos: Photos) -> tuple[dict[str, tuple[int, int]], tuple[int, int]]:
+    """Camera -> (width, height) of its first picture, and the size that most have."""
+    sizes = {}
+    for name in [one.name for one in used]:
+        frame, picture = next(iter(photos[name].items()))
+        sizes[name] = picture.size(f"camera {name}, frame {frame}")
+    return sizes, Counter(sizes.values()).most_common(1)[0][0]
 
-    Raises:
-        UserError: if K refers to pictures of another shape, the camera cannot be, or the lens cannot be undone.
-    """
+
+def placed(photos: Photos, cameras: Sequence[str], frames: Sequence[str]) -> dict[tuple[int, int], Picture]:
+    """(camera index, frame index) -> picture, of those that there are."""
+    indices = [(c, f) for c, camera in enumerate(cameras) for f in range(len(frames)) if camera in photos]
+    return {(c, f): photos[cameras[c]][frames[f]] for c, f in indices if frames[f] in photos[cameras[c]]}
+
+
+def view_of(calibration: Calibration, size: tuple[int, int], pixel_centres: float) -> View:
+    """The camera for pictures of `size` (width, height), its lens taken out."""
     reference = calibration.size or size
     if abs(reference[0] * size[1] / (reference[1] * size[0]) - 1) > 0.01:  # rounded sides of small pictures
         raise UserError(
@@ -181,11 +183,14 @@ def view_of(calibration: Calibration, size: tuple[int, int], pixel_centres: floa
     K = scaled_intrinsics(calibration.K, reference, size, pixel_centres)
     camera = Camera(calibration.name, K, calibration.w2c, *size)
     check_camera(camera, calibration.file, calibration.place)
-    lens = make_lens(
-        K, calibration.coefficients, *size, calibration.file, calibration.place, fisheye=calibration.fisheye
-    )
-    pinhole = K if lens is None else lens.pinhole
-    return View(Camera(calibration.name, pinhole, closest_rotation(calibration.w2c), *size), lens)
+    return undistorted(calibration, K, closest_rotation(calibration.w2c), size)
+
+
+def undistorted(calibration: Calibration, K: Array, w2c: Array, size: tuple[int, int]) -> View:
+    """The camera of K (3, 3), continuous coordinates of pictures of `size`, and w2c (3, 4), its lens taken out."""
+    one = calibration
+    lens = make_lens(K, one.coefficients, *size, one.file, one.place, one.fisheye)
+    return View(Camera(one.name, K if lens is None else lens.pinhole, w2c, *size), lens)
 
 
 def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, int], pixel_centres: float) -> Array:
@@ -201,15 +206,16 @@ def scaled_intrinsics(K: Array, reference: tuple[int, int], image: tuple[int, in
 
 
 def cameras_with_pictures(
-    calibrations: Sequence[Calibration], photos: Mapping[str, Mapping[str, Any]], root: Path
-) -> tuple[list[Calibration], list[str], list[str]]:
-    """Cameras with both calibration and pictures; names of those without pictures; of those without a calibration.
+    calibrations: Sequence[Calibration],
+    photos: Mapping[str, Mapping[str, Any]],
+    root: Path,
+    kinds: tuple[str, str] = ("no_images", "uncalibrated"),
+) -> tuple[list[Calibration], list[Fact]]:
+    """Cameras with both calibration and pictures, and facts on those without pictures, and without a calibration.
 
     Args:
         photos: camera -> frame -> picture.
-
-    Raises:
-        UserError: if there is no such camera.
+        kinds: of these facts.
     """
     known = {one.name for one in calibrations}
     used = [one for one in calibrations if photos.get(one.name)]
@@ -221,8 +227,9 @@ def cameras_with_pictures(
             found=shorten(list(photos), 5) or "none",
             remedy="copy calibration and pictures of the same subject",
         )
-    bare = [one.name for one in calibrations if not photos.get(one.name)]
-    return used, bare, [name for name in photos if name not in known and photos[name]]
+    bare = [fact(kinds[0], camera=one.name) for one in calibrations if not photos.get(one.name)]
+    strange = [fact(kinds[1], camera=name) for name in photos if name not in known and photos[name]]
+    return used, bare + strange
 
 
 def chosen_segment(names: Collection[str], wanted: str | None, place: Path, missing: str, kind: str = "segment") -> str:
@@ -233,9 +240,6 @@ def chosen_segment(names: Collection[str], wanted: str | None, place: Path, miss
         place: where they were looked for.
         missing: remedy where there are none.
         kind: what the layout calls one; in params.yaml it is `segment` all the same.
-
-    Raises:
-        UserError: if there is none, no such one, or several of which none is chosen.
     """
     if wanted in names:
         return str(wanted)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.captures.images import decode_mask
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
@@ -23,9 +23,6 @@ def given_mattes(folder: Path, scene: Scene) -> Iterator[tuple[int, int, Image]]
     """(camera, frame, (H, W, 1) opacity) of each picture of the scene that the folder has a matte for.
 
     They are of the scene's pictures, that is without lens distortion, of any size.
-
-    Raises:
-        UserError: if the folder is missing or has none, or a picture is damaged or of another shape.
     """
     files = dict(_files(folder, scene))
     if not files:
@@ -39,7 +36,7 @@ def given_mattes(folder: Path, scene: Scene) -> Iterator[tuple[int, int, Image]]
         )
     for (camera, frame), path in files.items():
         place = f"matte of camera {scene.cameras[camera].name}, frame {scene.frame_ids[frame]}"
-        matte = decode_mask(path, place)
+        matte = FilePicture(path).opacity(place)
         height, width = matte.shape[:2]
         if abs(width / height * scene.height / scene.width - 1) > SKEW:
             raise UserError(

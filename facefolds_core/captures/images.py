@@ -13,39 +13,19 @@ from PIL import Image as Pillow
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import FORMATS, DamagedPictureError, open_picture, picture_size
-from facefolds_core.files.reading import LARGEST, check_regular, no_memory, read_bytes
+from facefolds_core.files.reading import no_memory
 
 Image = NDArray[np.uint8]
-_REMEDY = "copy the file again from its source, or take this image out of the capture"
+REMEDY = "copy the file again from its source, or take this image out of the capture"
 
 
-def _check(path: Path, place: str) -> int:
-    """The file's length; raises unless it is a regular file."""
-    return check_regular(path, _REMEDY, place=place, missing="an image is missing", largest=LARGEST)
-
-
-def image_size(path: Path, place: str) -> tuple[int, int]:
-    """(width, height) from an image's header, without decoding it.
-
-    Args:
-        place: camera and frame, for the message.
-
-    Raises:
-        UserError: if the file is missing, empty, not a regular file or not an image.
-    """
-    length = _check(path, place)
-    try:
-        return picture_size(path)
-    except (OSError, DamagedPictureError) as error:
-        raise _unreadable(path, place, length, error) from None
-
-
-def _unreadable(path: Path, place: str, length: int, error: Exception) -> UserError:
+def unreadable(path: Path, place: str, length: int, error: Exception) -> UserError:
+    """The error for a file, or data of a file, of so many bytes that no picture can be read of."""
     if isinstance(error, PermissionError):
         return UserError("no permission", file=path, place=place, remedy="give yourself permission to read it")
     found = "an empty file" if length == 0 else f"{length} bytes that are no image ({error})"
     return UserError(
-        "cannot read an image", file=path, place=place, expected="a PNG or JPEG image", found=found, remedy=_REMEDY
+        "cannot read an image", file=path, place=place, expected="a PNG or JPEG image", found=found, remedy=REMEDY
     )
 
 
@@ -59,35 +39,20 @@ def _open_bytes(data: bytes, file: Path, place: str, formats: Sequence[str]) -> 
         try:
             size = picture_size(data, formats)
         except (OSError, DamagedPictureError) as worse:
-            raise _unreadable(file, place, len(data), worse) from None
+            raise unreadable(file, place, len(data), worse) from None
         raise UserError(
             "a damaged image",
             file=file,
             place=place,
             expected=f"{size[0]} x {size[1]} pixels, as its header says",
             found=f"{error} ({len(data)} bytes in the file)",
-            remedy=_REMEDY,
+            remedy=REMEDY,
         ) from None
 
 
 def _grey_8bit(image: Pillow.Image) -> Image:
     """16-bit (or wider) grey levels -> 8 bits: 65535 becomes 255."""
     return np.round(np.clip(np.asarray(image, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
-
-
-def decode_image(path: Path, place: str) -> Image:
-    """(H, W, 3) uint8 RGB of a photo: `rgb_of` its bytes.
-
-    Raises:
-        UserError: if the file is missing, damaged (see `pictures`) or not an image; names file and `place`
-            (camera and frame).
-    """
-    return rgb_of(read_bytes(path, _REMEDY, place=place, missing="an image is missing"), path, place)
-
-
-def decode_mask(path: Path, place: str) -> Image:
-    """(H, W, 1) uint8 opacity from a grey image; raises like `decode_image`."""
-    return opacity_of(read_bytes(path, _REMEDY, place=place, missing="an image is missing"), path, place)
 
 
 def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS) -> Image:
@@ -99,9 +64,6 @@ def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS
     Args:
         file, place: where they lie, for messages.
         formats: of `open_picture`.
-
-    Raises:
-        UserError: if they are damaged, or no picture.
     """
     image = _open_bytes(data, file, place, formats)
     if image.mode.startswith("I") or image.mode == "F":
@@ -115,7 +77,7 @@ def rgb_of(data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS
 def opacity_of(
     data: bytes, file: Path, place: str, formats: Sequence[str] = FORMATS, *, largest: bool = False
 ) -> Image:
-    """(H, W, 1) uint8 opacity of a picture's bytes; raises like `rgb_of`.
+    """(H, W, 1) uint8 opacity of a picture's bytes.
 
     Args:
         largest: of a colour picture, the largest channel instead of its luma.

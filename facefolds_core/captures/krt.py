@@ -37,12 +37,7 @@ def _numbers(text: str, count: int, path: Path, place: str) -> list[float]:
 
 
 def read_krt(path: Path) -> list[Calibration]:
-    """All cameras of a KRT file, in its order.
-
-    Raises:
-        UserError: if the file is missing, garbled, truncated, names a camera twice, or has a singular K or R; names the
-            line and the camera.
-    """
+    """All cameras of a KRT file, in its order."""
     here = "point `path` at a Multiface subject's folder, which holds KRT"
     text = read_text(path, _REMEDY if is_regular(path) else here, expected="KRT")
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
@@ -62,9 +57,8 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
     """Parse the lines [(number, text)] of one camera."""
     number, name = block[0]
     if len(name.split()) != 1:
-        raise _wrong(
-            "garbled KRT", file=path, place=f"line {number}", expected="the name of a camera", found=repr(name)[:200]
-        )
+        expected = "the name of a camera"
+        raise _wrong("garbled KRT", file=path, place=f"line {number}", expected=expected, found=repr(name)[:200])
     rows = [
         _numbers(text, count, path, f"line {line} (camera {name})")
         for (line, text), count in zip(block[1:], _ROWS, strict=False)
@@ -85,7 +79,7 @@ def _camera(block: list[tuple[int, str]], path: Path) -> Calibration:
 
 def krt_reference(
     cameras: list[Calibration], image: tuple[int, int], given: tuple[int, int] | None, path: Path
-) -> tuple[tuple[int, int], Fact | None]:
+) -> tuple[tuple[int, int], list[Fact]]:
     """Find out which image size K refers to.
 
     Two hypotheses: the images at hand, or the dataset's full size. A principal point lies near the middle of the image,
@@ -96,24 +90,12 @@ def krt_reference(
         given: `krt_size` of params.yaml, which overrides.
 
     Returns:
-        (width, height), and a fact on what was found out, None where there was nothing to find.
-
-    Raises:
-        UserError: if neither hypothesis fits.
+        (width, height), and a fact on what was found out, if anything.
     """
     if given is not None:
-        if min(given) < 1 or max(given) > 1 << 20:
-            raise UserError(
-                "a size that no image has",
-                file="params.yaml",
-                place="krt_size",
-                expected="[width, height] in pixels",
-                found=list(given),
-                remedy="correct `krt_size` of this subject in params.yaml",
-            )
-        return given, None
+        return given, []
     if image == FULL_SIZE:
-        return image, None
+        return image, []
     points = np.median([camera.K[:2, 2] for camera in cameras], axis=0)
     offsets = {size: float(np.abs(points / size - 0.5).max()) for size in (image, FULL_SIZE)}
     best = min(offsets, key=offsets.__getitem__)
@@ -127,4 +109,4 @@ def krt_reference(
             remedy="set `krt_size: [width, height]` of this subject in params.yaml",
         )
     kind = "krt_is_scaled" if best == image else "krt_is_of_full_size"
-    return best, fact(kind, point=[float(x) for x in points], image=list(image))
+    return best, [fact(kind, point=[float(x) for x in points], image=list(image))]

@@ -68,15 +68,18 @@ class Lens:
         """Whether a fisheye's polynomial turns back on the way to pixels (..., 2) of the undistorted image."""
         if not self.fisheye:
             return False
-        homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
-        radius = np.linalg.norm((homogeneous @ np.linalg.inv(self.pinhole).T)[..., :2], axis=-1).max()
+        radius = np.linalg.norm(self._ideal(pixels), axis=-1).max()
         angles = self._angle(np.linspace(0, np.arctan(radius), 256))
         return bool((np.diff(angles) <= 0).any())
 
     def source_of(self, pixels: Array) -> Array:
         """Pixels (..., 2) of the undistorted image -> pixels (..., 2) of the photo."""
+        return self.distort(self._ideal(pixels))
+
+    def _ideal(self, pixels: Array) -> Array:
+        """Pixels (..., 2) of the undistorted image -> points (..., 2) of the image plane, X_c / Z_c."""
         homogeneous = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
-        return self.distort((homogeneous @ np.linalg.inv(self.pinhole).T)[..., :2])
+        return np.asarray((homogeneous @ np.linalg.inv(self.pinhole).T)[..., :2])
 
     def maps(self, width: int, height: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Where each pixel of the undistorted image samples the photo: x and y (height, width), for `cv2.remap`."""
@@ -104,22 +107,23 @@ def make_lens(
         K: (3, 3) of the photo.
         coefficients, fisheye: as of `Lens`.
         file, place: for the message.
-
-    Raises:
-        UserError: if even twice the focal length shows places outside the photo: such numbers are no lens.
     """
     if not fisheye and not np.any(coefficients):
         return None
 
     def zoomed(factor: float) -> Lens:
-        return Lens(K, coefficients, np.diag([factor, factor, 1.0]) @ K + _recentre(K, factor), fisheye)
+        """With focal lengths times `factor`; the principal point stays."""
+        return Lens(K, coefficients, np.concatenate([np.diag([factor, factor, 1.0]) @ K[:, :2], K[:, 2:]], 1), fisheye)
 
     def inside(lens: Lens) -> bool:
-        if lens.folds(_border(width, height)):
-            return False
-        points = lens.source_of(_border(width, height))
-        return bool((points >= 0.5).all() and (points <= [width - 0.5, height - 0.5]).all())
+        points = lens.source_of(border)
+        within = (points >= 0.5).all() and (points <= [width - 0.5, height - 0.5]).all()
+        return bool(within) and not lens.folds(border)
 
+    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+    rows = [np.stack([x, np.full_like(x, v)], -1) for v in (0.5, height - 0.5)]
+    columns = [np.stack([np.full_like(y, v), y], -1) for v in (0.5, width - 0.5)]
+    border = np.concatenate(rows + columns)
     if inside(zoomed(1.0)):
         return zoomed(1.0)
     low, high = 1.0, 2.0
@@ -136,19 +140,3 @@ def make_lens(
         middle = (low + high) / 2
         low, high = (low, middle) if inside(zoomed(middle)) else (middle, high)
     return zoomed(high)
-
-
-def _recentre(K: Array, factor: float) -> Array:
-    """What to add to diag(f, f, 1) K so that the principal point stays."""
-    shift = np.zeros((3, 3))
-    shift[:2, 2] = (1 - factor) * K[:2, 2]
-    return shift
-
-
-def _border(width: int, height: int) -> Array:
-    """(M, 2) centres of the outermost pixels."""
-    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
-    sides = [(x, np.full_like(x, v)) for v in (0.5, height - 0.5)] + [
-        (np.full_like(y, v), y) for v in (0.5, width - 0.5)
-    ]
-    return np.concatenate([np.stack(side, -1) for side in sides])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
-from facefolds_core.captures.gathering import Recognised
+from facefolds_core.captures.gathering import SUFFIXES, Recognised, inside
+from facefolds_core.captures.videos import CONTAINERS
 from facefolds_core.errors import UserError
 from facefolds_core.facts import shorten
 from facefolds_core.files.reading import is_folder, is_regular
@@ -18,7 +18,6 @@ MOST = 2000
 NEAR = 50
 """Folders in it, and files of each of them, likewise."""
 _COLMAP = "calibrate with COLMAP (a folder of pictures a camera), then `source: colmap`"
-_VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi")
 _SIGNS: tuple[tuple[str, str, str], ...] = (
     ("annots.npy", "ZJU-MoCap with annots.npy, a pickle, which can run code and is not read",
      "write intri.yml and extri.yml from it with EasyMocap or EasyVolcap, then `source: easymocap`"),
@@ -55,9 +54,9 @@ def look(path: Path) -> list[tuple[str, Recognised]]:
 def describe(path: Path) -> tuple[str, str]:
     """What a folder or file looks like that nothing recognises, and what can be done, in words."""
     if not is_folder(path):
-        kind = "a film" if path.suffix.lower() in _VIDEOS else "a file"
+        kind = "a film" if path.suffix.lower() in CONTAINERS else "a file"
         return f"{kind}, {path.name}", "point `path` at the folder that holds cameras and pictures"
-    below = [(folder, look(folder)) for folder in islice(_folders(path), NEAR)]
+    below = [(folder, look(folder)) for folder in islice(filter(is_folder, inside(path)), NEAR)]
     known = [f"{folder.name} ({said[0][0]})" for folder, said in below if said]
     if known:
         return f"a folder that holds captures: {shorten(known)}", "point `path` at one of them"
@@ -72,9 +71,11 @@ def describe(path: Path) -> tuple[str, str]:
 
 
 def _contents(path: Path) -> tuple[str, str]:
-    kinds = Counter(file.suffix.lower() for file in islice(_files(path), MOST))
-    pictures = sum(kinds[suffix] for suffix in (".png", ".jpg", ".jpeg"))
-    films = sum(kinds[suffix] for suffix in _VIDEOS)
+    levels = chain.from_iterable(path.glob(level) for level in ("*", "*/*", "*/*/*"))
+    files = (file for file in levels if not file.name.startswith(".") and is_regular(file))
+    kinds = Counter(file.suffix.lower() for file in islice(files, MOST))
+    pictures = sum(kinds[suffix] for suffix in SUFFIXES)
+    films = sum(kinds[suffix] for suffix in CONTAINERS)
     listed = ", ".join(f"{count} {suffix or 'without extension'}" for suffix, count in kinds.most_common(5))
     if films:
         return f"{films} films without a calibration ({listed})", f"cut them into pictures and {_COLMAP}"
@@ -92,24 +93,8 @@ def _needs() -> str:
     return "bring it into a layout that is read: " + "; ".join(first)
 
 
-def _folders(path: Path) -> Iterator[Path]:
-    return (each for each in sorted(path.iterdir()) if not each.name.startswith(".") and is_folder(each))
-
-
-def _files(path: Path) -> Iterator[Path]:
-    """Those in the folder, then some of each folder in it, and of each in these."""
-    for level in ("*", "*/*", "*/*/*"):
-        for file in path.glob(level):
-            if not file.name.startswith(".") and is_regular(file):
-                yield file
-
-
 def check_layout(source: str, path: Path) -> None:
-    """Refuse a place that is no capture of this source, and say what it is; an absent place is left to the reader.
-
-    Raises:
-        UserError: if it is something else, or lies above or below what is meant.
-    """
+    """Refuse a place that is no capture of this source, and say what it is; an absent place is left to the reader."""
     recognise = getattr(SOURCES[source], "recognise", None)
     if recognise is None or not (is_folder(path) or is_regular(path)):
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,53 +24,42 @@ MUCH_SHIFT = 0.02
 """It does so, too, where the head shifts by more, as a share of the tracked mesh's largest extent."""
 
 
-@dataclass(frozen=True)
-class HeadMotion:
-    """Attributes:
-    track: the head's own frame -> world in each frame in use, normalised; None where the head is taken to stand still.
-    facts: what is to be said of it.
-    """
-
-    track: Track | None
-    facts: tuple[Fact, ...]
-
-
-def head_motion(capture: Capture, frames: Sequence[int], similarity: Similarity, params: NormalizeParams) -> HeadMotion:
-    """The track that `normalize.stabilize` asks for.
+def head_motion(
+    capture: Capture, frames: Sequence[int], similarity: Similarity, params: NormalizeParams
+) -> tuple[Track | None, list[Fact]]:
+    """The track that `normalize.stabilize` asks for, and what is to be said of it.
 
     Args:
         frames: indices in the capture of those in use.
         similarity: capture -> normalised coordinates.
 
-    Raises:
-        UserError: if it is asked for, and the capture has nothing to know it from.
+    Returns:
+        the head's own frame -> world in each of these frames, normalised; None where the head is taken to stand still.
     """
     tracking = capture.tracking
-    if params.stabilize == "found":
-        return HeadMotion(None, ())
-    if tracking is None:
-        if params.stabilize is True:
-            raise UserError(
-                "there are no head poses to stabilise by",
-                file=capture.root,
-                expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
-                remedy="set `stabilize: found` in `normalize` for this subject, which looks for them in the pictures",
-            )
-        return HeadMotion(None, ())
+    if tracking is None and params.stabilize is True:
+        raise UserError(
+            "there are no head poses to stabilise by",
+            file=capture.root,
+            expected="tracked_mesh/SEGMENT/FRAME_transform.txt",
+            remedy="set `stabilize: found` in `normalize` for this subject, which looks for them in the pictures",
+        )
+    if tracking is None or params.stabilize == "found":
+        return None, []
     rotations, translations, source = _poses(tracking, frames)
     world = tracking.world_vertices(frames)
     vertices = by_rows(len(world), lambda rows: similarity.apply(world[rows]))
     moves = zip(rotations, translations, strict=True)
     poses = [similarity.after(Similarity(1.0, R, t)).after(similarity.inverse()) for R, t in moves]
-    track = own_track(poses, _middles(vertices))
+    track = own_track(poses, middles(vertices))
     size = float(np.ptp(vertices, axis=1).max(1).mean())
     found = {"degrees": float(track.degrees().max()), "shift": _shift(track, vertices) / max(size, 1e-12)}
     much = is_much(**found)
     if params.stabilize is False or len(frames) < 2:
-        return HeadMotion(None, (fact("head_turns_unheeded", **found),) if much else ())
+        return None, [fact("head_turns_unheeded", **found)] if much else []
     if params.stabilize is True or much:
-        return HeadMotion(track, (fact("head_turns", **found, source=source),))
-    return HeadMotion(None, ())
+        return track, [fact("head_turns", **found, source=source)]
+    return None, []
 
 
 def is_much(degrees: float, shift: float) -> bool:
@@ -102,12 +90,12 @@ def _poses(tracking: Tracking, frames: Sequence[int]) -> tuple[Array, Array, str
     return np.array([R for R, _ in motions]), np.array([t for _, t in motions]), "laid over the tracked meshes"
 
 
-def _middles(vertices: Array) -> Array:
-    """(K, 3) of the bounding boxes."""
+def middles(vertices: Array) -> Array:
+    """(K, 3) of the bounding boxes of vertices (K, V, 3)."""
     return np.asarray((vertices.min(1) + vertices.max(1)) / 2)
 
 
 def _shift(track: Track, vertices: Array) -> float:
     """How far the head's middle goes from where it is on average, units."""
-    middle = _middles(vertices).mean(0)
+    middle = middles(vertices).mean(0)
     return max(float(np.linalg.norm(track.at(k).apply(middle) - middle)) for k in range(len(track)))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture, Tracking
 from facefolds_core.captures.front import find_front
+from facefolds_core.captures.motion import middles
 from facefolds_core.captures.scene import Split
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
@@ -51,21 +52,10 @@ def nearest_to_axes(cameras: Sequence[Camera]) -> Array:
 
 
 def _from_tracking(tracking: Tracking) -> tuple[Array, Array]:
-    """Centre (3,) and rotation (3, 3) from the tracked head, in the capture's world.
+    """Centre (3,) and rotation (3, 3) from the tracked head, averaged over the frames, in the capture's world.
 
-    The centre is the middle of the bounding box, averaged over the frames: unlike the mean of the vertices it does not
-    depend on where the mesh is dense (eyes, lips).
-    """
-    vertices = tracking.world_vertices()
-    centre = ((vertices.min(1) + vertices.max(1)) / 2).mean(0)
-    return centre, orientation(*_mean_pose(tracking))
-
-
-def _mean_pose(tracking: Tracking) -> tuple[Array, Array]:
-    """Where the head faces and its up (3,), averaged over the frames; neither is of unit length.
-
-    Raises:
-        UserError: if the poses turn every way, so that their means say nothing.
+    The centre is the middle of the bounding box: unlike the mean of the vertices it does not depend on where the mesh
+    is dense (eyes, lips).
     """
     facing, up = tracking.poses[:, :, 2].mean(0), tracking.poses[:, :, 1].mean(0)
     if min(np.linalg.norm(facing), np.linalg.norm(up), np.linalg.norm(np.cross(facing, up))) < 0.1:
@@ -76,7 +66,7 @@ def _mean_pose(tracking: Tracking) -> tuple[Array, Array]:
             found=f"mean direction {facing.tolist()}, mean up {up.tolist()}",
             remedy="copy the head poses again, or choose other frames for this subject in params.yaml",
         )
-    return facing, up
+    return middles(tracking.world_vertices()).mean(0), orientation(facing, up)
 
 
 def _from_cameras(capture: Capture, front: str | None) -> tuple[Array, Array, list[Fact]]:
@@ -111,9 +101,6 @@ def normalizing_similarity(
 
     Args:
         given: (3,) the centre in the capture's coordinates, instead of either.
-
-    Raises:
-        UserError: if the front camera does not exist, or all cameras stand in the centre.
     """
     notes: list[Fact] = []
     if capture.tracking is not None:
@@ -141,23 +128,8 @@ def view_angles(cameras: Sequence[Camera]) -> Array:
     return np.asarray(np.degrees(np.stack([elevation, np.arctan2(centres[:, 1], centres[:, 0])], -1)))
 
 
-@dataclass(frozen=True)
-class Culling:
-    """Attributes:
-    kept: indices of the cameras within the angles.
-    facts: on each other one, with its angles.
-    """
-
-    kept: list[int]
-    facts: list[Fact]
-
-
-def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Culling:
-    """Leave out normalised cameras beyond `max_elevation` or `max_azimuth`.
-
-    Raises:
-        UserError: if none is left; says the angles.
-    """
+def cull(cameras: Sequence[Camera], params: NormalizeParams, file: Path | str) -> tuple[list[int], list[Fact]]:
+    """Indices of the normalised cameras within `max_elevation` and `max_azimuth`, and a fact on each other one."""
     angles = view_angles(cameras)
     inside = (np.abs(angles[:, 0]) <= params.max_elevation) & (np.abs(angles[:, 1]) <= params.max_azimuth)
     facts = [
@@ -169,15 +141,17 @@ def cull(cameras: Sequence[Camera], params: NormalizeParams, file: object) -> Cu
         each = [f"{c.name} ({e:.0f}, {a:.0f})" for c, (e, a) in zip(cameras, angles, strict=True)]
         raise UserError(
             "all cameras are culled",
-            file=str(file),
+            file=file,
             expected=f"elevations up to {params.max_elevation:g} and azimuths up to {params.max_azimuth:g} degrees",
             found=f"(elevation, azimuth) of {shorten(each)}",
             remedy="check `front`, or raise `max_elevation` and `max_azimuth` of `normalize` for this subject",
         )
-    return Culling([int(i) for i in np.flatnonzero(inside)], facts)
+    return [int(i) for i in np.flatnonzero(inside)], facts
 
 
-def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact], file: object) -> tuple[Split, ...]:
+def split_cameras(
+    names: Sequence[str], subject: Subject, unused: Sequence[Fact], file: Path | str
+) -> tuple[Split, ...]:
     """ "train", "validate" or "holdout" for each of the cameras that are used, in their order.
 
     `every: n` takes the cameras at positions p (from 0) with (p + 1) % n == 0: of all of them for `holdout`, of those
@@ -185,70 +159,55 @@ def split_cameras(names: Sequence[str], subject: Subject, unused: Sequence[Fact]
 
     Args:
         unused: facts on cameras that were left out, to say why one that is named is not there.
-
-    Raises:
-        UserError: if a camera that is named is not there, or for both, no camera is left for training, or `every` of
-            `holdout` finds none.
     """
-    held = _named("holdout", subject.holdout, names, unused, file)
+
+    def chosen(key: str, choice: Sequence[str] | HoldoutEvery, of: Sequence[str]) -> set[str]:
+        """The cameras that a key of the subject chooses: by their names, or every n-th one of some."""
+        if isinstance(choice, HoldoutEvery):
+            return {name for p, name in enumerate(of) if (p + 1) % choice.every == 0}
+        for name in sorted(set(choice) - set(names)):
+            reasons = [str(one) for one in unused if one.camera == name]
+            raise UserError(
+                "a held-out camera is not there" if key == "holdout" else "a camera for validation is not there",
+                file=file,
+                place=key,
+                expected=f"some of {shorten(names, 200)}",
+                found=reasons[0] if reasons else f"{name}, which the capture does not have",
+                remedy=f"correct `{key}` of this subject in params.yaml",
+            )
+        return set(choice)
+
+    held = chosen("holdout", subject.holdout, names)
     if isinstance(subject.holdout, HoldoutEvery) and not held:
         every, culled = subject.holdout.every, sum(one.kind == "culled" for one in unused)
+        more = f"; {culled} more were culled by elevation and azimuth (`normalize`)" if culled else ""
         raise UserError(
             "too few cameras to hold one out",
-            file=str(file),
+            file=file,
             place="holdout",
             expected=f"at least {every} cameras for `holdout: {{every: {every}}}`",
-            found=f"{len(names)}: {shorten(names)}"
-            + (f"; {culled} more were culled by elevation and azimuth (`normalize`)" if culled else ""),
+            found=f"{len(names)}: {shorten(names)}{more}",
             remedy=f"name one or two in `holdout` of this subject, such as ['{names[len(names) // 2]}']; with "
             "`holdout: []` all are trained on, and `evaluate` has nothing to score",
         )
     rest = [name for name in names if name not in held]
-    validating = _named("validate", subject.validation or (), names, unused, file, rest)
-    both = sorted(held & validating)
-    if both:
+    validating = chosen("validate", subject.validation or (), rest)
+    if both := sorted(held & validating):
         raise UserError(
             "a camera is held out and for validation, too",
-            file=str(file),
+            file=file,
             place="validate",
             expected=f"some of {shorten(rest, 200)}",
             found=shorten(both),
             remedy="correct `validate` or `holdout` of this subject in params.yaml",
         )
-    splits: tuple[Split, ...] = tuple(
-        "holdout" if name in held else "validate" if name in validating else "train" for name in names
-    )
-    if "train" not in splits:
+    if held | validating == set(names):
         raise UserError(
             "no camera is left for training",
-            file=str(file),
+            file=file,
             place="validate" if validating else "holdout",
             expected=f"fewer than {len(names)} cameras that are set aside",
             found=shorten(sorted(held | validating)),
             remedy="hold out fewer cameras",
         )
-    return splits
-
-
-def _named(
-    key: str,
-    chosen: Sequence[str] | HoldoutEvery,
-    names: Sequence[str],
-    unused: Sequence[Fact],
-    file: object,
-    of: Sequence[str] | None = None,
-) -> set[str]:
-    """The cameras that a key of the subject chooses: by their names, or every n-th one of `of` (all)."""
-    if isinstance(chosen, HoldoutEvery):
-        return {name for p, name in enumerate(names if of is None else of) if (p + 1) % chosen.every == 0}
-    for name in sorted(set(chosen) - set(names)):
-        reasons = [str(one) for one in unused if one.camera == name]
-        raise UserError(
-            "a held-out camera is not there" if key == "holdout" else "a camera for validation is not there",
-            file=str(file),
-            place=key,
-            expected=f"some of {shorten(names, 200)}",
-            found=reasons[0] if reasons else f"{name}, which the capture does not have",
-            remedy=f"correct `{key}` of this subject in params.yaml",
-        )
-    return set(chosen)
+    return tuple("holdout" if name in held else "validate" if name in validating else "train" for name in names)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Collection, Iterable
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -33,11 +34,7 @@ def is_number(value: Any) -> bool:
 
 
 def numbers_from(values: Iterable[Any], path: Path, place: str, remedy: str, limit: float = HUGE) -> Array:
-    """(n,) finite numbers.
-
-    Raises:
-        UserError: for anything else, and beyond `limit`; names the first one.
-    """
+    """(n,) finite numbers."""
     values = list(values)
     odd = [value for value in values if not is_number(value) or not abs(value) <= limit]
     if odd:
@@ -51,9 +48,6 @@ def matrix_from(value: Any, shapes: Collection[tuple[int, int]], path: Path, pla
 
     Args:
         shapes: what it may be.
-
-    Raises:
-        UserError: for anything else.
     """
     rows = value if isinstance(value, list) and all(isinstance(row, list) for row in value) else []
     shape = (len(rows), len(rows[0]) if rows else 0)
@@ -66,16 +60,12 @@ def matrix_from(value: Any, shapes: Collection[tuple[int, int]], path: Path, pla
 
 
 def read_npy(path: Path, remedy: str) -> Array:
-    """Finite numbers of a .npy file, without pickles.
-
-    Raises:
-        UserError: if it is missing, damaged, or has anything but finite numbers.
-    """
+    """Finite numbers of a .npy file, without pickles."""
     data = read_bytes(path, remedy)
     try:
         values = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
         numbers = np.asarray(values, np.float64)
-    except (ValueError, EOFError, TypeError, OSError, SyntaxError, MemoryError, OverflowError) as error:
+    except (ValueError, EOFError, TypeError, OSError, SyntaxError, TokenError, MemoryError, OverflowError) as error:
         raise UserError(
             "garbled numbers", file=path, expected="an array of numpy.save", found=str(error)[:200], remedy=remedy
         ) from None

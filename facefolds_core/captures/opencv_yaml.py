@@ -25,9 +25,6 @@ def read_storage(path: Path, missing: str) -> dict[str, Any]:
 
     Args:
         missing: the remedy where there is no such file.
-
-    Raises:
-        UserError: if it is missing or garbled; names the line.
     """
     text = read_text(path, missing, expected=path.name)
     # "%YAML:1.0" is no directive of any YAML, and the tag tells no more than the mapping itself.
@@ -41,11 +38,7 @@ def read_storage(path: Path, missing: str) -> dict[str, Any]:
 def matrix_of(
     storage: dict[str, Any], key: str, shapes: tuple[tuple[int, int], ...], path: Path
 ) -> NDArray[np.float64] | None:
-    """(rows, cols) of finite numbers, or None where the key is not there.
-
-    Raises:
-        UserError: for anything else; names the key.
-    """
+    """(rows, cols) of finite numbers, or None where the key is not there."""
     value = storage.get(key)
     if value is None:
         return None
@@ -60,3 +53,14 @@ def matrix_of(
         found = f"{shape[0]} x {shape[1]} of {len(data)} numbers"
         raise refuse(" or ".join(f"{rows} x {cols}" for rows, cols in shapes[:3]), found)
     return numbers_from(data, path, key, REMEDY).reshape(shape)
+
+
+def needed_matrix(
+    storage: dict[str, Any], keys: dict[str, tuple[tuple[int, int], ...]], path: Path
+) -> NDArray[np.float64]:
+    """`matrix_of` the first key that is there; the shapes that each may have are given with it."""
+    found = [matrix_of(storage, key, shapes, path) for key, shapes in keys.items() if storage.get(key) is not None]
+    if not found or found[0] is None:
+        key = next(iter(keys))
+        raise UserError("a key is missing", file=path, place=key, expected="a matrix", found="nothing", remedy=REMEDY)
+    return found[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,12 @@ class ScenePart(Scene):
     whole: Scene | None = None
     chosen: tuple[int, ...] = ()
 
+    def stored(self, path: Path) -> FrameStore | None:
+        store = super().stored(path)
+        return None if store is None else store.part(self.chosen)
+
     def open_frames(self) -> FrameStore:
         return super().open_frames().part(self.chosen)
-
-    def open_masks(self) -> FrameStore | None:
-        store = super().open_masks()
-        return None if store is None else store.part(self.chosen)
-
-    def open_mattes(self) -> FrameStore | None:
-        store = super().open_mattes()
-        return None if store is None else store.part(self.chosen)
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
         surface = None if self.whole is None else self.whole.load_surface()
@@ -39,8 +36,10 @@ class ScenePart(Scene):
 def part_of(scene: Scene, frames: Sequence[int]) -> ScenePart:
     """Some frames of a scene, in this order."""
     chosen, poses = list(frames), scene.poses
-    values = {one.name: getattr(scene, one.name) for one in fields(Scene)}
-    values["frame_ids"] = tuple(scene.frame_ids[k] for k in chosen)
-    values["times"] = scene.times[chosen]
-    values["poses"] = None if poses is None else Track(poses.quaternions[chosen], poses.translations[chosen])
+    values = {
+        **{one.name: getattr(scene, one.name) for one in fields(Scene)},
+        "frame_ids": tuple(scene.frame_ids[k] for k in chosen),
+        "times": scene.times[chosen],
+        "poses": None if poses is None else Track(poses.quaternions[chosen], poses.translations[chosen]),
+    }
     return ScenePart(**values, whole=scene, chosen=tuple(chosen))

@@ -9,22 +9,23 @@ from __future__ import annotations
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import h5py
 import numpy as np
 
-from facefolds_core.captures.images import Image, decode_image, decode_mask, image_size, opacity_of, rgb_of
+from facefolds_core.captures.images import REMEDY, Image, opacity_of, rgb_of, unreadable
 from facefolds_core.captures.videos import Video
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import FORMATS, DamagedPictureError, picture_size
-from facefolds_core.files.reading import check_regular
+from facefolds_core.files.reading import LARGEST, check_regular, read_bytes
 
 _REMEDY = "copy the file again from its source, or take this camera out of the capture"
+_MISSING = "an image is missing"
 _HEAD = 1 << 16
 """Bytes that hold the header of any picture that a camera or an encoder writes."""
 
@@ -53,13 +54,17 @@ class FilePicture:
     file: Path
 
     def size(self, place: str) -> tuple[int, int]:
-        return image_size(self.file, place)
+        length = check_regular(self.file, REMEDY, place=place, missing=_MISSING, largest=LARGEST)
+        try:
+            return picture_size(self.file)
+        except (OSError, DamagedPictureError) as error:
+            raise unreadable(self.file, place, length, error) from None
 
     def rgb(self, place: str) -> Image:
-        return decode_image(self.file, place)
+        return rgb_of(read_bytes(self.file, REMEDY, place=place, missing=_MISSING), self.file, place)
 
     def opacity(self, place: str) -> Image:
-        return decode_mask(self.file, place)
+        return opacity_of(read_bytes(self.file, REMEDY, place=place, missing=_MISSING), self.file, place)
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,13 @@ class _Stored(ABC):
     """Whether of a coloured mask the largest channel counts."""
 
     def size(self, place: str) -> tuple[int, int]:
-        return _size_of(self._bytes(place, _HEAD), lambda: self._bytes(place), self.file, self._at(place), self.formats)
+        """From its first bytes, or from all of them where its header is longer."""
+        with suppress(OSError, DamagedPictureError):
+            return picture_size(self._bytes(place, _HEAD), self.formats)
+        try:
+            return picture_size(self._bytes(place), self.formats)
+        except (OSError, DamagedPictureError) as error:
+            raise _wrong(self.file, self._at(place), "cannot read an image", str(error)) from None
 
     def rgb(self, place: str) -> Image:
         return rgb_of(self._bytes(place), self.file, self._at(place), self.formats)
@@ -147,20 +158,6 @@ class VideoFrame:
         return next(self.video.frames([self.index], "opacity"))
 
 
-def _size_of(
-    head: bytes, whole: Callable[[], bytes], file: Path, place: str, formats: Sequence[str]
-) -> tuple[int, int]:
-    """(width, height) from a picture's first bytes, or from all of them where its header is longer."""
-    try:
-        return picture_size(head, formats)
-    except (OSError, DamagedPictureError):
-        pass
-    try:
-        return picture_size(whole(), formats)
-    except (OSError, DamagedPictureError) as error:
-        raise _wrong(file, place, "cannot read an image", str(error)) from None
-
-
 def _wrong(file: Path, place: str | None, message: str, found: str) -> UserError:
     return UserError(message, file=file, place=place, found=found, remedy=_REMEDY)
 
@@ -169,11 +166,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, Valu
 
 
 def read_member(file: Path, member: str, place: str | None = None, most: int = -1) -> bytes:
-    """Bytes of a member of a zip archive: all, with its checksum, or the first `most`.
-
-    Raises:
-        UserError: if the archive or the member is missing or damaged.
-    """
+    """Bytes of a member of a zip archive: all, with its checksum, or the first `most`."""
     try:
         with open_zip(file).open(member) as stream:
             return stream.read(most)
@@ -184,36 +177,24 @@ def read_member(file: Path, member: str, place: str | None = None, most: int = -
 
 
 def open_zip(file: Path) -> zipfile.ZipFile:
-    """An archive, opened once; threads may share it.
-
-    Raises:
-        UserError: if it is missing, or none.
-    """
-    check_regular(file, _REMEDY)
-    return _open_zip(file, file.stat().st_mtime_ns)
-
-
-@lru_cache(maxsize=256)
-def _open_zip(file: Path, _changed: int) -> zipfile.ZipFile:
-    try:
-        return zipfile.ZipFile(file)
-    except _DAMAGE as error:
-        raise _wrong(file, None, "a damaged zip archive", str(error) or type(error).__name__) from None
+    """An archive, opened once; threads may share it. Raises `UserError` if it is missing, or none."""
+    archive: zipfile.ZipFile = _open("zip archive", file)
+    return archive
 
 
 def open_hdf5(file: Path) -> h5py.File:
-    """An HDF5 file, opened once; threads may share it.
+    """An HDF5 file, likewise."""
+    return _open("HDF5 file", file)
 
-    Raises:
-        UserError: if it is missing, or none.
-    """
+
+def _open(kind: str, file: Path) -> Any:
     check_regular(file, _REMEDY)
-    return _open_hdf5(file, file.stat().st_mtime_ns)
+    return _opened(kind, file, file.stat().st_mtime_ns)
 
 
-@lru_cache(maxsize=16)
-def _open_hdf5(file: Path, _changed: int) -> h5py.File:
+@lru_cache(maxsize=256)
+def _opened(kind: str, file: Path, _changed: int) -> Any:
     try:
-        return h5py.File(file, "r")
-    except (OSError, RuntimeError, ValueError) as error:
-        raise _wrong(file, None, "a damaged HDF5 file", str(error)) from None
+        return zipfile.ZipFile(file) if kind == "zip archive" else h5py.File(file, "r")
+    except _DAMAGE as error:
+        raise _wrong(file, None, f"a damaged {kind}", str(error) or type(error).__name__) from None

@@ -131,13 +131,16 @@ class Scene:
         ]
         return [self.camera_in_head(i, k) for i, k in zip(np.repeat(indices, count), turns, strict=True)]
 
+    def stored(self, path: Path) -> FrameStore | None:
+        """The scene's frames of a frame store, or None where there is none."""
+        return FrameStore(path) if is_there(path) else None
+
     def open_frames(self) -> FrameStore:
         return FrameStore(self.folder / "frames.arrow")
 
     def open_masks(self) -> FrameStore | None:
         """True opacity (0..255, one channel) of some scored images, or None where the capture has none."""
-        path = self.folder / "masks.arrow"
-        return FrameStore(path) if is_there(path) else None
+        return self.stored(self.folder / "masks.arrow")
 
     def open_plates(self) -> FrameStore | None:
         """Clean plates, (camera, 0) -> the picture without the subject, of some cameras; None where there is none."""
@@ -146,8 +149,7 @@ class Scene:
 
     def open_mattes(self) -> FrameStore | None:
         """Opacity (0..255, one channel) that training may use, of some images of any camera; None without any."""
-        path = self.folder / "mattes.arrow" if self.mattes is None else self.mattes
-        return FrameStore(path) if is_there(path) else None
+        return self.stored(self.folder / "mattes.arrow" if self.mattes is None else self.mattes)
 
     def found_gaussians(self) -> Path | None:
         """File of the subject's Gaussians (subject/storage.py); None until it has been found."""
@@ -155,11 +157,7 @@ class Scene:
         return path if is_there(path) else None
 
     def load_surface(self) -> tuple[NDArray[np.float32], NDArray[np.int32]] | None:
-        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many.
-
-        Raises:
-            UserError: if the file is damaged.
-        """
+        """Tracked mesh: vertices (K, V, 3) and faces (F, 3), or None. They stay in the file: a take has many."""
         path = self.folder / "surface.npz"
         if not is_there(path):
             return None
@@ -184,36 +182,27 @@ class Scene:
 
 def write_scene(scene: Scene, folder: Path) -> None:
     """Write `scene.json` (only) into `folder`."""
-    write_json(
-        folder / "scene.json",
-        {
-            "version": SCENE_VERSION,
-            "subject": scene.subject,
-            "cameras": [
-                {
-                    "name": camera.name,
-                    "split": split,
-                    "width": camera.width,
-                    "height": camera.height,
-                    "K": camera.K.tolist(),
-                    "w2c": camera.w2c.tolist(),
-                }
-                for camera, split in zip(scene.cameras, scene.splits, strict=True)
-            ],
-            "frame_ids": list(scene.frame_ids),
-            "times": scene.times.tolist(),
-            "fps": scene.fps,
-            "from_capture": scene.from_capture.to_json(),
-            "left_out": [one.to_json() for one in scene.left_out],
-            "poses": None if scene.poses is None else _poses_json(scene.poses),
-            "radius": scene.radius,
-        },
-    )
-
-
-def _poses_json(poses: Track) -> list[dict[str, list[float]]]:
-    pairs = zip(poses.quaternions.tolist(), poses.translations.tolist(), strict=True)
-    return [{"quaternion": q, "translation": t} for q, t in pairs]
+    cameras = [
+        {"name": c.name, "split": split, "width": c.width, "height": c.height, "K": c.K.tolist(), "w2c": c.w2c.tolist()}
+        for c, split in zip(scene.cameras, scene.splits, strict=True)
+    ]
+    poses = None
+    if scene.poses is not None:
+        pairs = zip(scene.poses.quaternions.tolist(), scene.poses.translations.tolist(), strict=True)
+        poses = [{"quaternion": q, "translation": t} for q, t in pairs]
+    value = {
+        "version": SCENE_VERSION,
+        "subject": scene.subject,
+        "cameras": cameras,
+        "frame_ids": list(scene.frame_ids),
+        "times": scene.times.tolist(),
+        "fps": scene.fps,
+        "from_capture": scene.from_capture.to_json(),
+        "left_out": [one.to_json() for one in scene.left_out],
+        "poses": poses,
+        "radius": scene.radius,
+    }
+    write_json(folder / "scene.json", value)
 
 
 def _read_poses(value: Any) -> Track | None:
@@ -286,8 +275,8 @@ def _check(scene: Scene) -> None:
         raise ValueError(f"poses: {problems[0]}")
     if scene.radius is not None and not 0 < scene.radius < 10:
         raise ValueError("a ball without a size")
-    similarity = scene.from_capture
-    if (similarity.rotation.shape, similarity.translation.shape) != ((3, 3), (3,)):
-        raise ValueError("from_capture is no similarity")
-    if not (similarity.scale > 0 and np.isfinite([*similarity.rotation.flat, *similarity.translation]).all()):
+    move = scene.from_capture
+    numbers = [move.scale, *move.rotation.flat, *move.translation.flat]
+    shaped = (move.rotation.shape, move.translation.shape) == ((3, 3), (3,))
+    if not (shaped and move.scale > 0 and np.isfinite(numbers).all()):
         raise ValueError("from_capture is no similarity")

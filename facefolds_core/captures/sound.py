@@ -32,11 +32,7 @@ def sound_start(seconds: Sequence[float], fps: float) -> float | None:
 
 
 def cut_sound(source: Path, target: Path, start: float, seconds: float) -> None:
-    """Write `seconds` of a sound file from `start` on as WAV, 16 bits; what lies beyond its end is silent.
-
-    Raises:
-        UserError: if the file is not sound.
-    """
+    """Write `seconds` of a sound file from `start` on as WAV, 16 bits; what lies beyond its end is silent."""
     _check_length(source)
     try:
         with av.open(str(source), format="wav") as container:  # any other would let FFmpeg guess: playlists, addresses

@@ -26,11 +26,7 @@ _wrong = partial(UserError, remedy=_REMEDY)
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
-    """Vertices (V, 3) and triangles (F, 3) of a Wavefront file; polygons become fans, everything else is skipped.
-
-    Raises:
-        UserError: if the file is not readable as such, or a face names a vertex that is not there; names the line.
-    """
+    """Vertices (V, 3) and triangles (F, 3) of a Wavefront file; polygons become fans, everything else is skipped."""
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     number = 0
@@ -44,24 +40,15 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.int32]]:
                 corners = [int(word.split("/")[0]) - 1 for word in words[1:]]
                 faces += [[corners[0], b, c] for b, c in pairwise(corners[1:])]
     except (ValueError, IndexError, OverflowError) as error:
-        raise _wrong(
-            "garbled mesh", file=path, place=f"line {number}", expected="`v x y z` or `f a b c`", found=str(error)
-        ) from None
+        expected = "`v x y z` or `f a b c`"
+        raise _wrong("garbled mesh", file=path, place=f"line {number}", expected=expected, found=str(error)) from None
     points, triangles = np.array(vertices, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
-    if (
-        len(points) == 0
-        or len(triangles) == 0
-        or not (np.abs(points) <= HUGE).all()
-        or triangles.min() < 0
-        or triangles.max() >= len(points)
-    ):
-        raise _wrong(
-            "garbled mesh",
-            file=path,
-            expected="finite vertices, and faces that name them",
-            found=f"{len(points)} vertices, {len(triangles)} triangles"
-            + (f", vertex numbers {triangles.min() + 1} to {triangles.max() + 1}" if len(triangles) else ""),
-        )
+    sound = min(len(points), len(triangles)) > 0 and bool((np.abs(points) <= HUGE).all())
+    if not sound or triangles.min() < 0 or triangles.max() >= len(points):
+        found = f"{len(points)} vertices, {len(triangles)} triangles"
+        if len(triangles):
+            found += f", vertex numbers {triangles.min() + 1} to {triangles.max() + 1}"
+        raise _wrong("garbled mesh", file=path, expected="finite vertices, and faces that name them", found=found)
     return points, triangles.astype(np.int32)
 
 
@@ -70,41 +57,21 @@ def read_bin(path: Path, count: int | None) -> Array:
 
     Args:
         count: V where it is known.
-
-    Raises:
-        UserError: if the length of the file does not fit, or a part of it is zeros.
     """
     data = read_bytes(path, _REMEDY)
     if not data or len(data) % 12 or (count is not None and len(data) != 12 * count):
-        raise _wrong(
-            "the tracked mesh has a wrong length",
-            file=path,
-            expected="a multiple of 12 bytes" if count is None else f"{12 * count} bytes ({count} vertices of 12)",
-            found=f"{len(data)} bytes",
-        )
+        expected = "a multiple of 12 bytes" if count is None else f"{12 * count} bytes ({count} vertices of 12)"
+        raise _wrong("the tracked mesh has a wrong length", file=path, expected=expected, found=f"{len(data)} bytes")
     points = np.frombuffer(data, "<f4").reshape(-1, 3).astype(float)
     zeros = int((points == 0).all(1).sum())
     if zeros > 1:
-        raise _wrong(
-            "a damaged tracked mesh",
-            file=path,
-            expected="vertices in different places",
-            found=f"{zeros} of {len(points)} exactly at 0 0 0, as after an interrupted copy",
-        )
+        found = f"{zeros} of {len(points)} exactly at 0 0 0, as after an interrupted copy"
+        raise _wrong("a damaged tracked mesh", file=path, expected="vertices in different places", found=found)
     return points
 
 
-def read_pose(path: Path) -> Array:
-    """(3, 4) head -> world.
-
-    Raises:
-        UserError: if the file is garbled, has numbers that are not finite, or R is not a rotation (to 1e-3).
-    """
-    return parse_pose(read_text(path, _REMEDY, expected="a head pose"), path)
-
-
 def parse_pose(text: str, path: Path) -> Array:
-    """(3, 4) head -> world, from the text of a pose; raises like `read_pose`."""
+    """(3, 4) head -> world, from the text of a pose: finite, and R a rotation to 1e-3."""
     try:
         pose = np.array([[float(w) for w in line.split()] for line in text.splitlines() if line.strip()])
     except ValueError:
@@ -112,21 +79,13 @@ def parse_pose(text: str, path: Path) -> Array:
     if pose.shape != (3, 4):
         raise _wrong("garbled head pose", file=path, expected="3 rows of 4 numbers", found=repr(text[:60]))
     if not (np.abs(pose) <= HUGE).all():
-        finite = bool(np.isfinite(pose).all())
-        raise _wrong(
-            f"the head pose has numbers that are {'beyond sense' if finite else 'not finite'}",
-            file=path,
-            expected=f"3 rows of 4 finite numbers, none above {HUGE:g}",
-            found=pose.tolist(),
-        )
+        message = f"the head pose has numbers that are {'beyond sense' if np.isfinite(pose).all() else 'not finite'}"
+        expected = f"3 rows of 4 finite numbers, none above {HUGE:g}"
+        raise _wrong(message, file=path, expected=expected, found=pose.tolist())
     R = pose[:, :3]
     if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
-        raise _wrong(
-            "R of a head pose is not a rotation",
-            file=path,
-            expected="R R^T = I and det R = 1",
-            found=f"det R = {np.linalg.det(R):.6g}",
-        )
+        expected, found = "R R^T = I and det R = 1", f"det R = {np.linalg.det(R):.6g}"
+        raise _wrong("R of a head pose is not a rotation", file=path, expected=expected, found=found)
     return pose
 
 
@@ -134,13 +93,9 @@ def check_extent(points: Array, file: Path) -> None:
     """Refuse vertices (V, 3) that all lie in one point or on one line."""
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     if len(points) < 3 or spread[1] <= 1e-4 * spread[0] or spread[0] <= 1e-12:
-        low, high = points.min(0), points.max(0)
-        raise _wrong(
-            "the vertices of the tracked mesh lie in one point or on one line",
-            file=file,
-            expected="the shape of a head",
-            found=f"{len(points)} vertices from {low.tolist()} to {high.tolist()}",
-        )
+        message = "the vertices of the tracked mesh lie in one point or on one line"
+        found = f"{len(points)} vertices from {points.min(0).tolist()} to {points.max(0).tolist()}"
+        raise _wrong(message, file=file, expected="the shape of a head", found=found)
 
 
 def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, list[str], list[Fact]]:
@@ -152,31 +107,28 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
 
     Returns:
         tracking (None where no frame has any), the frames that it covers (all where None), facts on those left out.
-
-    Raises:
-        UserError: for a damaged file, or a mesh whose number of vertices changes.
     """
 
-    def meshes(name: str) -> tuple[Path, Path, Path]:
-        return folder / f"{name}.bin", folder / f"{name}.obj", folder / f"{name}_transform.txt"
-
     check_folder(folder, _REMEDY)
-    tracked = [n for n in frames if is_there(meshes(n)[2]) and (is_there(meshes(n)[0]) or is_there(meshes(n)[1]))]
+    poses = {name: folder / f"{name}_transform.txt" for name in frames}
+    meshes = {
+        name: [path for path in (folder / f"{name}.bin", folder / f"{name}.obj") if is_there(path)] for name in frames
+    }
+    tracked = [name for name in frames if is_there(poses[name]) and meshes[name]]
     if not tracked:
         return None, frames, [fact("no_mesh", folder=str(folder))]
     left_out = [fact("frame_without_mesh", frame=name) for name in frames if name not in tracked]
-    topology = next((meshes(name)[1] for name in tracked if is_there(meshes(name)[1])), None)
+    topology = next((meshes[name][-1] for name in tracked if meshes[name][-1].suffix == ".obj"), None)
     faces, count = None, None
     if topology is None:
         left_out.append(fact("mesh_without_faces", folder=str(folder)))
     else:
         points, faces = read_obj(topology)
         count = len(points)
-    vertices, poses = np.empty((0, 0, 3)), []
+    vertices, moves = np.empty((0, 0, 3)), []
     for position, name in enumerate(tracked):
-        binary, text, transform = meshes(name)
-        points = read_bin(binary, count) if is_there(binary) else read_obj(text)[0]
-        file = binary if is_there(binary) else text
+        file = meshes[name][0]
+        points = read_bin(file, count) if file.suffix == ".bin" else read_obj(file)[0]
         count = count or len(points)
         sound = (np.abs(points) <= HUGE).all(1)
         if len(points) != count or not sound.all():
@@ -186,5 +138,5 @@ def read_tracking(folder: Path, frames: list[str]) -> tuple[Tracking | None, lis
         if position == 0:
             vertices = spilled((len(tracked), count, 3))
         vertices[position] = points
-        poses.append(read_pose(transform))
-    return Tracking(np.array(poses), vertices, faces), tracked, left_out
+        moves.append(parse_pose(read_text(poses[name], _REMEDY, expected="a head pose"), poses[name]))
+    return Tracking(np.array(moves), vertices, faces), tracked, left_out

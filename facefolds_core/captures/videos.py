@@ -29,7 +29,7 @@ Channels = Literal["rgb", "opacity"]
 
 STRICT = {"err_detect": "crccheck+bitstream+buffer+explode"}
 """Damage is an error: nothing is made up in its place."""
-_CONTAINERS = {
+CONTAINERS = {
     ".mp4": "mov", ".m4v": "mov", ".mov": "mov", ".mkv": "matroska", ".webm": "matroska", ".avi": "avi",
 }  # fmt: skip
 """FFmpeg's demuxer by extension: never one of its guesses, some of which open other files."""
@@ -69,11 +69,7 @@ class Video:
     camera: str
 
     def facts(self) -> VideoFacts:
-        """Of its index, read once.
-
-        Raises:
-            UserError: if it is missing, cut off or no video, its rate varies, or a tag turns its pictures.
-        """
+        """Of its index, read once."""
         check_regular(self.file, _REMEDY, place=f"camera {self.camera}", missing="a video is missing")
         return _facts(self, self.file.stat().st_mtime_ns)
 
@@ -90,9 +86,6 @@ class Video:
             threads: of the decoder; 0 lets it choose.
             fine: interpolate chroma, which is stored at half the resolution. It takes as long as decoding; a picture
                 that is averaged down to half its size is none the better for it (45 dB without, 39 with, of noise).
-
-        Raises:
-            UserError: if a frame is damaged or missing; names it.
         """
         wanted, size = iter(indices), self.facts().size
         following, position = next(wanted, None), 0
@@ -107,9 +100,8 @@ class Video:
                     if frame.is_corrupt:
                         raise self.damaged(position, "a damaged frame")
                     if (frame.width, frame.height) != size:
-                        raise self.damaged(
-                            position, f"{frame.width} x {frame.height} pixels, not {size[0]} x {size[1]}"
-                        )
+                        found = f"{frame.width} x {frame.height} pixels, not {size[0]} x {size[1]}"
+                        raise self.damaged(position, found)
                     if position == following:
                         yield _pixels(frame, reformatter, channels, _FINE if fine else Interpolation.BICUBIC)
                         following = next(wanted, None)
@@ -122,14 +114,9 @@ class Video:
 
     def damaged(self, position: int, found: str) -> UserError:
         """The error for a frame that cannot be had."""
-        return UserError(
-            "a damaged video",
-            file=self.file,
-            place=f"camera {self.camera}, frame {position}",
-            expected=f"{self.facts().count} frames, as its index says",
-            found=found,
-            remedy=_REMEDY + "; `frames: {stop: N}` uses the first N frames only",
-        )
+        expected = f"{self.facts().count} frames, as its index says"
+        remedy = _REMEDY + "; `frames: {stop: N}` uses the first N frames only"
+        return self.refused("a damaged video", expected, found, remedy, position)
 
     def refused(
         self, message: str, expected: str, found: str, remedy: str = _REMEDY, frame: int | None = None
@@ -144,9 +131,6 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
 
     Args:
         most: only so many frames are used; None for all.
-
-    Raises:
-        UserError: if lengths, rates or starts differ; names the first video that differs from most.
     """
     facts = [video.facts() for video in videos]
     rates = [one.rate for one in facts]
@@ -157,11 +141,8 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
     count = max(set(counts), key=counts.count)
     for video, one in zip(videos, facts, strict=True):
         if abs(one.rate / rate - 1) > Fraction(1, 1000):
-            raise video.refused(
-                "videos of different frame rates",
-                f"{float(rate):.6g} frames a second, as the others",
-                f"{float(one.rate):.6g}",
-            )
+            expected, found = f"{float(rate):.6g} frames a second, as the others", f"{float(one.rate):.6g}"
+            raise video.refused("videos of different frame rates", expected, found)
         if abs(one.start - start) * float(rate) > 0.5:
             raise video.refused(
                 "a camera with a time offset",
@@ -179,17 +160,12 @@ def check_together(videos: Sequence[Video], most: int | None = None) -> tuple[in
     return min(counts), rate
 
 
-def frame_names(count: int) -> list[str]:
-    """Names of a video's frames: 000000, 000001, ..."""
-    return [f"{position:06d}" for position in range(count)]
-
-
 @contextmanager
 def _opened(video: Video) -> Iterator[tuple[Any, Any]]:
     """(container, its video stream); errors of FFmpeg while it is opened are the user's."""
-    kind = _CONTAINERS.get(video.file.suffix.lower())
+    kind = CONTAINERS.get(video.file.suffix.lower())
     if kind is None:
-        raise video.refused("a video of a kind that is not read", f"one of {', '.join(_CONTAINERS)}", video.file.suffix)
+        raise video.refused("a video of a kind that is not read", f"one of {', '.join(CONTAINERS)}", video.file.suffix)
     try:
         container = av.open(
             f"file:{video.file}", format=kind, container_options=STRICT, stream_options=cast(Any, [STRICT])
@@ -238,7 +214,7 @@ def _index(video: Video, container: Any, stream: Any) -> tuple[list[int], int]:
 
     MP4 has a table of all frames; of other containers, all packets are read.
     """
-    if _CONTAINERS[video.file.suffix.lower()] == "mov":
+    if CONTAINERS[video.file.suffix.lower()] == "mov":
         entries = [entry for entry in stream.index_entries if not entry.flags & _DISCARDED]
         return [entry.timestamp for entry in entries], max((entry.pos + entry.size for entry in entries), default=0)
     try:

@@ -6,8 +6,10 @@ rig. Then some camera looks past the head, and training would fit what is not th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +37,7 @@ def check_sight(
     cameras: Sequence[Camera],
     frame_ids: Sequence[str],
     vertices: NDArray[np.floating] | None,
-    file: object,
+    file: Path | str,
 ) -> None:
     """Refuse cameras that do not see the subject at all; a close-up that shows a part of it is fine.
 
@@ -44,42 +46,34 @@ def check_sight(
         frame_ids: K names of frames.
         vertices: (K, V, 3) of the tracked mesh, normalised, or None.
         file: the capture, for the message.
-
-    Raises:
-        UserError: if focal lengths are beyond sense; if cameras stand in one place, absurdly near or far, or look
-            past the subject in all of their frames;
-            if the mesh is absurdly small or large, or in a frame lies in no camera's picture. Names the cameras.
     """
-    _check_angles(cameras, str(file))
-    _check_places(cameras, str(file))
+    wrong = partial(UserError, file=file, remedy=_CALIBRATION)
+    _check_rig(cameras, wrong)
     if vertices is None:
         around = np.array([d for d in product((-1, 0, 1), repeat=3) if any(d)], float)
         ball = RADIUS * around / np.linalg.norm(around, axis=1, keepdims=True)
         points = np.broadcast_to(np.concatenate([np.zeros((1, 3)), ball]), (len(frame_ids), 27, 3))
         what = f"the centre, or {RADIUS} units around it"
     else:
-        _check_size(vertices, frame_ids, str(file))
+        _check_size(vertices, frame_ids, wrong)
         points = np.asarray(vertices[:, :: max(1, vertices.shape[1] // SAMPLES)], float)
         what = "the tracked mesh"
     views = [in_picture(camera, points) for camera in cameras]
     blind = [camera.name for camera, view in zip(cameras, views, strict=True) if not view.any()]
     if blind:
         every = len(blind) == len(cameras)
-        raise UserError(
+        raise wrong(
             "no camera sees the subject" if every else "cameras that look past the subject",
-            file=str(file),
             place=f"camera{'s' if len(blind) > 1 else ''} {shorten(blind)}",
             expected=f"{what} in front of each camera and in its picture",
             found="nothing of it" + ("; are the matrices inverted, or the axes others?" if every else ""),
-            remedy=_CALIBRATION,
         )
     lost = set(range(len(frame_ids)))
     for view in views:
         lost -= {frame for frame, visible in enumerate(view) if visible.any()}
     if lost:
-        raise UserError(
+        raise wrong(
             "the tracked mesh lies in no camera's picture",
-            file=str(file),
             place=f"frame {shorten([frame_ids[f] for f in sorted(lost)])}",
             remedy="copy the head poses of these frames again, or choose other frames for this subject in params.yaml",
         )
@@ -93,56 +87,32 @@ def in_picture(camera: Camera, points: Array) -> NDArray[np.bool_]:
     return np.asarray(inside.all(-1) & (depth > 0))
 
 
-def _check_angles(cameras: Sequence[Camera], file: str) -> None:
-    odd = [
-        f"{camera.name} ({camera.K[0, 0]:.4g} pixels)"
-        for camera in cameras
-        if not FOCAL[0] <= camera.K[0, 0] / max(camera.width, camera.height) <= FOCAL[1]
-    ]
-    if odd:
-        raise UserError(
-            "focal lengths that no camera has",
-            file=file,
-            place=f"camera {shorten(odd)}",
-            expected=f"{FOCAL[0]} to {FOCAL[1]:g} times the picture's long side",
-            remedy=_CALIBRATION,
-        )
-
-
-def _check_places(cameras: Sequence[Camera], file: str) -> None:
+def _check_rig(cameras: Sequence[Camera], wrong: Callable[..., UserError]) -> None:
+    focal = {f"{c.name} ({c.K[0, 0]:.4g} pixels)": c.K[0, 0] / max(c.width, c.height) for c in cameras}
+    if odd := [words for words, value in focal.items() if not FOCAL[0] <= value <= FOCAL[1]]:
+        expected = f"{FOCAL[0]} to {FOCAL[1]:g} times the picture's long side"
+        raise wrong("focal lengths that no camera has", place=f"camera {shorten(odd)}", expected=expected)
     centres = np.array([camera.centre for camera in cameras])
-    distances = np.linalg.norm(centres, axis=1)
-    odd = [
-        f"{camera.name} ({distance:.3g})"
-        for camera, distance in zip(cameras, distances, strict=True)
-        if not NEAR <= distance <= FAR
-    ]
-    if odd:
-        raise UserError(
-            "cameras absurdly near to the subject, or far from it",
-            file=file,
-            place=f"camera {shorten(odd)}",
-            expected=f"{NEAR} to {FAR:g} times the median camera's distance",
-            remedy=_CALIBRATION,
-        )
+    away = {f"{c.name} ({np.linalg.norm(c.centre):.3g})": np.linalg.norm(c.centre) for c in cameras}
+    if odd := [words for words, value in away.items() if not NEAR <= value <= FAR]:
+        message, expected = "cameras absurdly near to the subject, or far from it", "times the median camera's distance"
+        raise wrong(message, place=f"camera {shorten(odd)}", expected=f"{NEAR} to {FAR:g} {expected}")
     if len(centres) > 1 and np.linalg.norm(centres - centres[0], axis=1).max() < 1e-3:
-        raise UserError(
+        raise wrong(
             "all cameras stand in one place",
-            file=file,
             expected="cameras around the subject",
             found=f"{len(centres)} cameras less than a thousandth of their distance from the subject apart",
             remedy="check the camera poses; cameras must look at one subject from different places",
         )
 
 
-def _check_size(vertices: NDArray[np.floating], frame_ids: Sequence[str], file: str) -> None:
+def _check_size(vertices: NDArray[np.floating], frame_ids: Sequence[str], wrong: Callable[..., UserError]) -> None:
     sizes = np.linalg.norm(vertices.max(1) - vertices.min(1), axis=1)
     odd = ~((sizes >= SMALL) & (sizes <= LARGE))
     if odd.any():
         frame = int(np.flatnonzero(odd)[0])
-        raise UserError(
+        raise wrong(
             "the tracked mesh is absurdly small or large",
-            file=file,
             place=f"frame {frame_ids[frame]}",
             expected=f"{SMALL} to {LARGE:g} times the median camera's distance across",
             found=f"{sizes[frame]:.3g} times",

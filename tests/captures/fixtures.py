@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import wave
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
+from facefolds_core.captures.assembly import Plan, plan_scene
 from facefolds_core.geometry.cameras import Camera
+from facefolds_core.params import CaptureParams, NormalizeParams, Subject
+from facefolds_core.registry import SOURCES
 
 Array = NDArray[np.float64]
 SEGMENT = "E001_Neutral"
@@ -73,6 +78,28 @@ def pattern(width: int, height: int, seed: int) -> NDArray[np.uint8]:
 def save(path: Path, image: NDArray[Any]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     Pillow.fromarray(image).save(path)
+
+
+def encoded(image: NDArray[Any], kind: str, **options: object) -> bytes:
+    """A picture's bytes, as Pillow writes them."""
+    buffer = io.BytesIO()
+    Pillow.fromarray(image).save(buffer, kind, **options)
+    return buffer.getvalue()
+
+
+def save_wav(path: Path, samples: NDArray[Any], rate: int) -> None:
+    """16 bits, one channel."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, rate, 0, "NONE", ""))
+        file.writeframes(samples.astype("<i2").tobytes())
+
+
+def plan_of(root: Path, params: NormalizeParams | None = None, source: str = "multiface", **keys: Any) -> Plan:
+    """What `normalize` would make of a capture, in `scene` beside it; `keys` are the subject's."""
+    subject = Subject(source=source, path=str(root), **{"holdout": ("400003",), "front": "400003", **keys})
+    capture = SOURCES[source].read(root, subject, CaptureParams())
+    return plan_scene(capture, "head", subject, params or NormalizeParams(), root.parent / "scene")
 
 
 def krt_text(cameras: tuple[Camera, ...], scale: float = 1.0, pixel_centres: float = 0.0) -> str:

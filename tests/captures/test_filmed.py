@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from facefolds_core.captures.actor.capture import krt_block
 from facefolds_core.captures.scene import Scene
-from facefolds_core.files.writing import write_json
-from tests.captures.fixtures import intrinsics, opengl_matrix, save
+from tests.captures.fixtures import save
 from tests.filmed import check_same, film, scene_of
 
 
@@ -29,18 +27,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_multiface_brings_the_film_back(scene: Scene) -> None:
     check_same(scene, film(), mattes="held")
-
-
-def test_so_does_transforms_json_whose_axes_are_others(tmp_path: Path) -> None:
-    truth, entries = film(), []
-    for c, camera in enumerate(truth.cameras):
-        for k in range(truth.frames):
-            save(tmp_path / camera.name / f"{k}.png", truth.images[c, k])
-            entry = {"file_path": f"{camera.name}/{k}.png", "transform_matrix": opengl_matrix(camera)}
-            entries.append(entry | intrinsics(camera))
-    write_json(tmp_path / "transforms.json", {"frames": entries})
-    scene = scene_of(tmp_path, "transforms", tmp_path / "scene", truth.names)
-    check_same(scene, truth)
 
 
 @pytest.mark.parametrize("what", ["pose", "K", "pixels", "mattes", "names"])

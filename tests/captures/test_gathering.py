@@ -43,8 +43,9 @@ def test_what_cannot_be_chosen(names: list[str], wanted: str | None, words: str,
 def test_cameras_without_pictures_and_pictures_without_calibration_are_said() -> None:
     """An empty folder of a camera that nobody calibrated is nothing."""
     cameras = [Camera("a"), Camera("b"), Camera("c")]
-    found = cameras_with_pictures(cameras, {"a": {"0": 1}, "b": {}, "x": {"0": 1}, "y": {}}, PLACE)
-    assert found == ([cameras[0]], ["b", "c"], ["x"])
+    used, facts = cameras_with_pictures(cameras, {"a": {"0": 1}, "b": {}, "x": {"0": 1}, "y": {}}, PLACE)
+    kinds = [(one.kind, one.camera) for one in facts]
+    assert (used, kinds) == ([cameras[0]], [("no_images", "b"), ("no_images", "c"), ("uncalibrated", "x")])
 
 
 def test_no_camera_with_both_is_refused() -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.captures.images import decode_image, display_colour, downsample, fit_box
+from facefolds_core.captures.images import display_colour, downsample, fit_box
+from facefolds_core.captures.picture import FilePicture
 from tests.captures.fixtures import (
     save,
 )
@@ -51,5 +52,5 @@ def test_display_colour_of_black_and_of_full_grey() -> None:
 )
 def test_grey_16_bit_and_transparent_images_become_rgb(tmp_path: Path, stored: np.ndarray, expected: list[int]) -> None:
     save(tmp_path / "a.png", stored)
-    image = decode_image(tmp_path / "a.png", "here")
+    image = FilePicture(tmp_path / "a.png").rgb("here")
     assert (image.shape, image.dtype, image[1, 2].tolist()) == ((2, 3, 3), np.uint8, expected)

@@ -8,7 +8,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from facefolds_core.captures.appraisal import appraise
+from facefolds_core.captures.appraisal import _quoted, appraise
 from facefolds_core.captures.looking import describe, look
 from facefolds_core.captures.sources import read_capture
 from facefolds_core.cli import app
@@ -48,6 +48,7 @@ def test_the_yaml_that_is_printed_is_read(tmp_path: Path) -> None:
     write_transforms(tmp_path / "statue")
     entry = entry_of(list(appraise(tmp_path / "statue")))
     assert entry["front"] == "400003"
+    assert _quoted("0018") == "'0018'"  # plain, a number of YAML 1.2
     subject = Subject.model_validate(entry)
     assert read_capture(subject, SubjectFolders(tmp_path / "data" / "x"), CaptureParams()).views
 

@@ -11,9 +11,8 @@ import pytest
 
 from facefolds_core.captures.krt import read_krt
 from facefolds_core.captures.picture import FilePicture
-from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.captures.tracked import read_obj
-from facefolds_core.params import FrameRange, Subject
+from facefolds_core.params import FrameRange
 from tests.captures.fixtures import (
     FACES,
     HEAD,
@@ -25,12 +24,10 @@ from tests.captures.fixtures import (
     save,
     write_multiface,
 )
+from tests.filmed import Reader
 
+read = Reader("multiface")
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
-
-
-def subject(path: Path, **keys: Any) -> Subject:
-    return Subject(source="multiface", path=str(path), **keys)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +45,7 @@ def test_projection_in_continuous_coordinates(
     made = write_multiface(tmp_path)
     full = scale == 32.0
     made.krt.write_text(krt_text(made.cameras, scale, pixel_centres))
-    capture = read_multiface(tmp_path, subject(tmp_path, **keys))
+    capture = read(tmp_path, **keys)
     for camera, view in zip(made.cameras, capture.views, strict=True):
         difference = view.camera.project(POINTS)[0] - camera.project(POINTS)[0]
         if full:  # KRT is for 1334 x 2048, of which 40 x 64 is not quite the same shape
@@ -60,14 +57,14 @@ def test_projection_in_continuous_coordinates(
 def test_it_says_what_it_found_out_about_the_calibration(tmp_path: Path, scale: float, words: str) -> None:
     made = write_multiface(tmp_path)
     made.krt.write_text(krt_text(made.cameras, scale))
-    (note,) = read_multiface(tmp_path, subject(tmp_path)).left_out
+    (note,) = read(tmp_path).left_out
     assert words in str(note)
     assert "krt_size" in str(note)
 
 
 def test_world_vertices_of_the_tracked_mesh(tmp_path: Path) -> None:
     write_multiface(tmp_path)
-    tracking = read_multiface(tmp_path, subject(tmp_path)).tracking
+    tracking = read(tmp_path).tracking
     assert tracking is not None
     expected = VERTICES @ HEAD_TO_WORLD.T + HEAD + 2 * np.array([3.0, 1.0, -2.0])
     assert tracking.world_vertices()[2] == pytest.approx(expected)
@@ -82,7 +79,7 @@ def test_the_binary_mesh_is_preferred_and_an_obj_alone_will_do(tmp_path: Path) -
         else:
             for frame in made.frames:
                 made.mesh(frame, ".bin").unlink()
-        tracking = read_multiface(tmp_path, subject(tmp_path)).tracking
+        tracking = read(tmp_path).tracking
         assert tracking is not None
         assert tracking.vertices[0] == pytest.approx(factor * VERTICES)
 
@@ -91,7 +88,7 @@ def test_a_binary_alone_gives_no_faces_and_says_so(tmp_path: Path) -> None:
     made = write_multiface(tmp_path)
     for frame in made.frames:
         made.mesh(frame, ".obj").unlink()
-    capture = read_multiface(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert capture.tracking is not None
     assert capture.tracking.faces is None
     assert any(one.kind == "mesh_without_faces" for one in capture.left_out)
@@ -105,7 +102,7 @@ def test_polygons_become_fans(tmp_path: Path) -> None:
 def test_without_tracked_meshes_there_is_no_tracking(tmp_path: Path) -> None:
     write_multiface(tmp_path)
     shutil.rmtree(tmp_path / "tracked_mesh")
-    capture = read_multiface(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert capture.tracking is None
     assert capture.frame_ids == ("000003", "000006", "000009")
 
@@ -113,7 +110,7 @@ def test_without_tracked_meshes_there_is_no_tracking(tmp_path: Path) -> None:
 def test_a_frame_without_tracked_mesh_is_left_out(tmp_path: Path) -> None:
     made = write_multiface(tmp_path)
     made.mesh("000006", "_transform.txt").unlink()
-    capture = read_multiface(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert capture.frame_ids == ("000003", "000009")
     assert "frame 000006: no tracked mesh or no head pose" in map(str, capture.left_out)
 
@@ -122,7 +119,7 @@ def test_cameras_without_images_or_calibration_are_left_out(tmp_path: Path) -> N
     made = write_multiface(tmp_path)
     shutil.rmtree(tmp_path / "images" / SEGMENT / "400002")
     save(made.image("400099", "000003"), pattern(40, 64, 0))
-    capture = read_multiface(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert [view.name for view in capture.views] == ["400001", "400003", "400004", "400005"]
     assert "camera 400002: in KRT, but has no images" in map(str, capture.left_out)
     assert "camera 400099: has images, but is not in KRT" in map(str, capture.left_out)
@@ -132,7 +129,7 @@ def test_a_listed_frame_without_images_is_reported(tmp_path: Path) -> None:
     write_multiface(tmp_path)
     with (tmp_path / "frame_list.txt").open("a") as file:
         file.write(f"{SEGMENT} 000012\nANOTHER 000015\n")
-    lines = [str(one) for one in read_multiface(tmp_path, subject(tmp_path)).left_out]
+    lines = [str(one) for one in read(tmp_path).left_out]
     assert [line for line in lines if "frame_list" in line] == [
         "frame 000012: in frame_list.txt, but no camera has an image"
     ]
@@ -151,7 +148,7 @@ def test_frames_and_their_rate(
     tmp_path: Path, frames: FrameRange | tuple[str, ...] | None, expected: tuple[str, ...], fps: float
 ) -> None:
     write_multiface(tmp_path)
-    capture = read_multiface(tmp_path, subject(tmp_path, frames=frames))
+    capture = read(tmp_path, frames=frames)
     assert (capture.frame_ids, capture.fps) == (expected, fps)
 
 
@@ -159,7 +156,7 @@ def test_masks_are_found_where_they_are(tmp_path: Path) -> None:
     write_multiface(tmp_path)
     mask = tmp_path / "masks" / SEGMENT / "400003" / "000006.png"
     save(mask, np.zeros((64, 40), np.uint8))
-    assert read_multiface(tmp_path, subject(tmp_path)).masks == {(2, 1): FilePicture(mask)}
+    assert read(tmp_path).masks == {(2, 1): FilePicture(mask)}
 
 
 def test_distortion_in_krt_gives_the_camera_a_lens(tmp_path: Path) -> None:
@@ -167,7 +164,7 @@ def test_distortion_in_krt_gives_the_camera_a_lens(tmp_path: Path) -> None:
     lines = made.krt.read_text().splitlines()
     lines[4] = "-0.1 0.02 0.001 -0.002 0"
     made.krt.write_text("\n".join(lines))
-    first, second, *_ = read_multiface(tmp_path, subject(tmp_path)).views
+    first, second, *_ = read(tmp_path).views
     assert first.lens is not None
     assert first.lens.coefficients.tolist() == [-0.1, 0.02, 0.001, -0.002, 0]
     assert second.lens is None
@@ -176,7 +173,7 @@ def test_distortion_in_krt_gives_the_camera_a_lens(tmp_path: Path) -> None:
 @pytest.mark.captures
 def test_the_shared_capture_has_its_calibration_at_image_size(captures_folder: Path) -> None:
     root = captures_folder / "mugsy"
-    capture = read_multiface(root, subject(root))
+    capture = read(root)
     assert (len(capture.views), len(capture.frame_ids)) == (38, 12)
     assert any("already scaled" in str(one) for one in capture.left_out)
 
@@ -191,13 +188,13 @@ def test_the_scaled_calibration_is_the_real_one_times_a_plain_factor(captures_fo
 
 def test_what_other_systems_leave_in_folders_is_no_picture(tmp_path: Path) -> None:
     fixture = write_multiface(tmp_path)
-    sound = read_multiface(tmp_path, subject(tmp_path))
+    sound = read(tmp_path)
     images = fixture.image("x", "x").parents[2]
     for folder in [images, *(path for path in images.rglob("*") if path.is_dir())]:
         (folder / "._000003.png").write_bytes(b"\0\5\26\7")
         (folder / ".Trash").mkdir()
     for path in fixture.image("400001", "x").parent.glob("0*.png"):
         path.rename(path.with_suffix(".PNG"))
-    found = read_multiface(tmp_path, subject(tmp_path))
+    found = read(tmp_path)
     assert found.frame_ids == sound.frame_ids
     assert {k: p.file.stem for k, p in found.images.items()} == {k: p.file.stem for k, p in sound.images.items()}

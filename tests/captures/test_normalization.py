@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
+from facefolds_core.captures.assembly import write_plan
 from facefolds_core.captures.capture import complete_subset
-from facefolds_core.captures.images import decode_image
 from facefolds_core.captures.normalization import nearest_to_axes, split_cameras, view_angles
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.captures.sources.multiface import read_multiface
-from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.errors import UserError
 from facefolds_core.facts import fact
 from facefolds_core.params import HoldoutEvery, NormalizeParams, Subject
@@ -29,32 +26,20 @@ from tests.captures.fixtures import (
     edit_transforms,
     head_pose,
     opengl_matrix,
+    plan_of,
     save,
     world_camera,
     write_multiface,
     write_transforms,
 )
+from tests.filmed import Reader
 
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
 
 
-def plan_multiface(root: Path, params: NormalizeParams | None = None, **keys: Any) -> Plan:
-    subject = Subject(source="multiface", path=str(root), **{"holdout": ("400003",), **keys})
-    return plan_scene(
-        read_multiface(root, subject), "head", subject, params or NormalizeParams(), root.parent / "scene"
-    )
-
-
-def plan_transforms(root: Path, params: NormalizeParams | None = None, **keys: Any) -> Plan:
-    subject = Subject(source="transforms", path=str(root), **{"holdout": ("400003",), "front": "400003", **keys})
-    return plan_scene(
-        read_transforms(root, subject), "head", subject, params or NormalizeParams(), root.parent / "scene"
-    )
-
-
 def test_projection_agrees_before_and_after_normalisation_and_downsampling(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
-    scene = plan_multiface(tmp_path / "c", NormalizeParams(long_side=32, short_side=32)).scene
+    scene = plan_of(tmp_path / "c", NormalizeParams(long_side=32, short_side=32)).scene
     assert (scene.width, scene.height) == (20, 32)
     for before, after in zip(made.cameras, scene.cameras, strict=True):
         pixels, _ = after.project(scene.from_capture.apply(POINTS))
@@ -63,7 +48,7 @@ def test_projection_agrees_before_and_after_normalisation_and_downsampling(tmp_p
 
 def test_projection_agrees_for_a_distorted_transforms_capture(tmp_path: Path) -> None:
     write_transforms(tmp_path / "c", k1=0.2, k2=-0.03, p1=0.002, p2=0.001)
-    plan = plan_transforms(tmp_path / "c", NormalizeParams(long_side=32, short_side=32))
+    plan = plan_of(tmp_path / "c", NormalizeParams(long_side=32, short_side=32), source="transforms")
     for camera, view in zip(plan.scene.cameras, plan.capture.views, strict=True):
         assert view.lens is not None
         in_camera = POINTS @ view.camera.rotation.T + view.camera.w2c[:, 3]
@@ -74,7 +59,7 @@ def test_projection_agrees_for_a_distorted_transforms_capture(tmp_path: Path) ->
 
 def test_a_tracked_head_is_at_the_origin_and_faces_x(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
-    move = plan_multiface(tmp_path / "c").scene.from_capture
+    move = plan_of(tmp_path / "c").scene.from_capture
     rotation, translation = head_pose(1)  # the middle one of three
     head = np.stack([translation, translation + 100 * rotation[:, 2], translation + 100 * rotation[:, 1]])
     origin, face, top = move.apply(head)
@@ -89,7 +74,7 @@ def test_a_tracked_head_is_at_the_origin_and_faces_x(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("front", "degrees"), [("400003", 1e-6), (None, 1.5)])
 def test_without_a_tracked_head_the_cameras_say_where_it_is(tmp_path: Path, front: str | None, degrees: float) -> None:
     write_transforms(tmp_path / "c")
-    plan = plan_transforms(tmp_path / "c", front=front)
+    plan = plan_of(tmp_path / "c", front=front, source="transforms")
     assert plan.scene.from_capture.apply(HEAD) == pytest.approx([0, 0, 0], abs=1e-6)
     angles = view_angles(plan.scene.cameras)
     assert angles[:, 1] == pytest.approx([azimuth for _, azimuth, _ in RING], abs=degrees)
@@ -107,7 +92,7 @@ def test_the_point_nearest_to_the_axes_ignores_a_camera_that_looks_elsewhere() -
 def test_cameras_beyond_the_angles_are_culled_and_named(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
     params = NormalizeParams(max_elevation=9, max_azimuth=90)
-    scene = plan_multiface(tmp_path / "c", params).scene
+    scene = plan_of(tmp_path / "c", params).scene
     assert [camera.name for camera in scene.cameras] == ["400001", "400003", "400005"]
     assert [(one.kind, one.camera) for one in scene.left_out[1:]] == [("culled", "400002"), ("culled", "400004")]
 
@@ -157,12 +142,12 @@ def test_a_wrong_choice_for_validation_is_named(validate: list[str], says: str) 
 
 def test_the_frame_store_holds_the_photos(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
-    plan = plan_multiface(tmp_path / "c")
+    plan = plan_of(tmp_path / "c")
     write_plan(plan, NormalizeParams())
     scene = read_scene(tmp_path / "scene")
     store = scene.open_frames()
     assert store.keys() == [(c, f) for c in range(5) for f in range(3)]
-    expected = decode_image(made.image("400004", "000006"), "")
+    expected = FilePicture(made.image("400004", "000006")).rgb("")
     assert np.array_equal(store.image(3, 1), expected)
 
 
@@ -170,7 +155,7 @@ def test_masks_are_kept_for_cameras_held_out_and_for_validation(tmp_path: Path) 
     write_multiface(tmp_path / "c")
     for camera in ("400001", "400003", "400004"):
         save(tmp_path / "c" / "masks" / SEGMENT / camera / "000006.png", np.full((64, 40), 200, np.uint8))
-    write_plan(plan_multiface(tmp_path / "c", validate=("400001",)), NormalizeParams())
+    write_plan(plan_of(tmp_path / "c", validate=("400001",)), NormalizeParams())
     masks = read_scene(tmp_path / "scene").open_masks()
     assert masks is not None
     assert masks.keys() == [(0, 1), (2, 1)]
@@ -179,7 +164,7 @@ def test_masks_are_kept_for_cameras_held_out_and_for_validation(tmp_path: Path) 
 
 def test_the_surface_projects_where_the_tracked_mesh_does(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c", turn=10)
-    write_plan(plan_multiface(tmp_path / "c"), NormalizeParams())
+    write_plan(plan_of(tmp_path / "c"), NormalizeParams())
     scene = read_scene(tmp_path / "scene")
     surface = scene.load_surface()
     assert surface is not None
@@ -193,7 +178,7 @@ def test_the_surface_projects_where_the_tracked_mesh_does(tmp_path: Path) -> Non
 def test_a_frame_that_one_camera_lacks_is_left_out_of_everything(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
     made.image("400002", "000006").unlink()
-    plan = plan_multiface(tmp_path / "c")
+    plan = plan_of(tmp_path / "c")
     assert plan.scene.frame_ids == ("000003", "000009")
     assert plan.vertices is not None
     assert len(plan.vertices) == 2
@@ -203,15 +188,14 @@ def test_a_frame_that_one_camera_lacks_is_left_out_of_everything(tmp_path: Path)
 def test_a_frame_that_only_a_culled_camera_lacks_stays(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
     made.image("400001", "000006").unlink()
-    assert plan_multiface(tmp_path / "c", NormalizeParams(max_azimuth=45)).scene.num_frames == 3
+    assert plan_of(tmp_path / "c", NormalizeParams(max_azimuth=45)).scene.num_frames == 3
 
 
 def test_a_camera_that_lacks_most_frames_is_left_out_instead(tmp_path: Path) -> None:
     made = write_multiface(tmp_path / "c")
     for frame in ("000006", "000009"):
         made.image("400002", frame).unlink()
-    subject = Subject(source="multiface", path=str(tmp_path / "c"))
-    cameras, frames, lines = complete_subset(read_multiface(tmp_path / "c", subject), range(5))
+    cameras, frames, lines = complete_subset(Reader("multiface")(tmp_path / "c"), range(5))
     assert (cameras, frames, len(lines)) == ([0, 2, 3, 4], [0, 1, 2], 1)
 
 
@@ -219,20 +203,20 @@ def test_entries_turned_by_90_degrees_do_not_matter_when_there_is_a_front_camera
     path, cameras = write_transforms(tmp_path / "c")
     turned = replace(cameras[1], w2c=np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) @ cameras[1].w2c)
     edit_transforms(path, 1, transform_matrix=opengl_matrix(turned))
-    scene = plan_transforms(tmp_path / "c").scene
+    scene = plan_of(tmp_path / "c", source="transforms").scene
     assert view_angles(scene.cameras)[1] == pytest.approx([10, -20], abs=1e-6)
 
 
 @pytest.mark.captures
 def test_the_shared_captures_keep_the_cameras_that_see_the_front(captures_folder: Path) -> None:
-    face = plan_multiface(captures_folder / "mugsy", holdout=("400013", "400060"), pixel_centres=0.5).scene
-    statue = plan_transforms(captures_folder / "buddha", holdout=("00022", "00031"), front="00036").scene
+    face = plan_of(captures_folder / "mugsy", holdout=("400013", "400060"), pixel_centres=0.5).scene
+    statue = plan_of(captures_folder / "buddha", holdout=("00022", "00031"), front="00036", source="transforms").scene
     assert [(len(s.indices("train")), len(s.indices("holdout"))) for s in (face, statue)] == [(30, 2), (19, 2)]
 
 
 def test_notes_are_said_before_lists_of_what_is_missing(tmp_path: Path) -> None:
     write_multiface(tmp_path / "c")
-    scene = plan_multiface(tmp_path / "c").scene
+    scene = plan_of(tmp_path / "c").scene
     missing = [fact("culled", camera=str(i), elevation=60.0, azimuth=0.0) for i in range(9)]
     lines = left_out(replace(scene, left_out=(*missing, fact("front_found", camera="1", share=0.9))))
     assert lines[1].startswith("  note: no `front`")

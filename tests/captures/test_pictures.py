@@ -15,19 +15,14 @@ import pytest
 from PIL import EpsImagePlugin
 from PIL import Image as Pillow
 
-from facefolds_core.captures.images import decode_image, image_size
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import DamagedPictureError, open_picture, picture_size
+from tests.captures.fixtures import encoded
 from tests.hostile.damage import flip_bits, truncate, zero_tail
 
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 40 64\nshowpage\n%%EOF\n"
 SMOOTH = np.clip(np.cumsum(np.random.default_rng(0).integers(-3, 4, (96, 64, 3)), 0) + 128, 0, 255).astype(np.uint8)
-
-
-def encoded(kind: str, image: np.ndarray = SMOOTH, **options: object) -> bytes:
-    buffer = io.BytesIO()
-    Pillow.fromarray(image).save(buffer, kind, **options)
-    return buffer.getvalue()
 
 
 def chunks(data: bytes) -> list[tuple[bytes, bytes]]:
@@ -46,9 +41,9 @@ def png(parts: list[tuple[bytes, bytes]]) -> bytes:
 
 
 @pytest.mark.parametrize("name", ["x.png", "poster.jpg"])
-@pytest.mark.parametrize("call", [image_size, decode_image])
+@pytest.mark.parametrize("call", [FilePicture.size, FilePicture.rgb])
 def test_nothing_is_started_for_an_eps_by_another_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, call: Callable[[Path, str], object]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, call: Callable[[FilePicture, str], object]
 ) -> None:
     reached: list[str] = []
     monkeypatch.setattr(
@@ -59,14 +54,14 @@ def test_nothing_is_started_for_an_eps_by_another_name(
     monkeypatch.setattr(os, "posix_spawn", lambda *_, **__: reached.append("process"))
     (tmp_path / name).write_bytes(EPS)
     with pytest.raises(UserError, match="cannot read an image"):
-        call(tmp_path / name, "camera 1")
+        call(FilePicture(tmp_path / name), "camera 1")
     assert reached == []
 
 
 @pytest.mark.parametrize("kind", ["TIFF", "BMP", "WEBP", "GIF", "PPM"])
 def test_other_formats_are_refused(kind: str) -> None:
     with pytest.raises(DamagedPictureError, match="no PNG or JPEG"):
-        open_picture(encoded(kind))
+        open_picture(encoded(SMOOTH, kind))
 
 
 @pytest.mark.parametrize("kind", ["PNG", "JPEG"])
@@ -84,7 +79,7 @@ def test_sound_pictures_are_what_pillow_makes_of_them(kind: str, mode: str) -> N
     "options", [{"progressive": True}, {"restart_marker_rows": 1}, {"subsampling": 0}, {"quality": 10}]
 )
 def test_kinds_of_jpeg(options: dict[str, object]) -> None:
-    data = encoded("JPEG", **options)
+    data = encoded(SMOOTH, "JPEG", **options)
     for whole in (data, data + b"what a camera put behind it"):
         with Pillow.open(io.BytesIO(data)) as plain:
             np.testing.assert_array_equal(np.asarray(open_picture(whole)), np.asarray(plain))
@@ -93,7 +88,7 @@ def test_kinds_of_jpeg(options: dict[str, object]) -> None:
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.parametrize("mutation", [flip_bits, truncate, zero_tail])
 def test_no_png_is_accepted_with_other_pixels(mutation: Callable[..., bytes], seed: int) -> None:
-    data = png([*chunks(encoded("PNG"))[:1], *_in_parts(1000), (b"IEND", b"")])
+    data = png([*chunks(encoded(SMOOTH, "PNG"))[:1], *_in_parts(1000), (b"IEND", b"")])
     changed = mutation(data, np.random.default_rng(seed))
     try:
         found = np.asarray(open_picture(changed))
@@ -103,11 +98,11 @@ def test_no_png_is_accepted_with_other_pixels(mutation: Callable[..., bytes], se
 
 
 def _in_parts(size: int) -> list[tuple[bytes, bytes]]:
-    pixels = b"".join(d for kind, d in chunks(encoded("PNG")) if kind == b"IDAT")
+    pixels = b"".join(d for kind, d in chunks(encoded(SMOOTH, "PNG")) if kind == b"IDAT")
     return [(b"IDAT", pixels[i : i + size]) for i in range(0, len(pixels), size)]
 
 
-HEAD, END = chunks(encoded("PNG"))[0], (b"IEND", b"")
+HEAD, END = chunks(encoded(SMOOTH, "PNG"))[0], (b"IEND", b"")
 
 
 @pytest.mark.parametrize(
@@ -132,11 +127,11 @@ def test_a_header_that_promises_more_than_the_file_holds(tmp_path: Path, size: t
     header = struct.pack(">IIBBBBB", *size, 8, 2, 0, 0, 0)
     (tmp_path / "x.png").write_bytes(png([(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), END]))
     with pytest.raises(UserError):
-        decode_image(tmp_path / "x.png", "camera 1")
+        FilePicture(tmp_path / "x.png").rgb("camera 1")
 
 
 def test_a_jpeg_that_is_cut_or_lacks_a_part() -> None:
-    data = encoded("JPEG", restart_marker_rows=1)
+    data = encoded(SMOOTH, "JPEG", restart_marker_rows=1)
     start = data.index(b"\xff\xd2")
     missing = data[:start] + data[data.index(b"\xff\xd4") :]
     for damaged in (data[:-2], data[: len(data) // 2], data[: len(data) // 2] + bytes(len(data) // 2), missing):
@@ -147,7 +142,7 @@ def test_a_jpeg_that_is_cut_or_lacks_a_part() -> None:
 @pytest.mark.parametrize("options", [{}, {"progressive": True}])
 def test_a_jpeg_with_a_lost_block_is_refused_more_often_than_not(options: dict[str, object]) -> None:
     image = np.random.default_rng(1).integers(0, 256, (200, 200, 3), dtype=np.uint8)
-    data = encoded("JPEG", image, quality=90, **options)
+    data = encoded(image, "JPEG", quality=90, **options)
     refused = 0
     for start in range(2000, len(data) - 2000, len(data) // 20):
         try:
@@ -159,7 +154,7 @@ def test_a_jpeg_with_a_lost_block_is_refused_more_often_than_not(options: dict[s
 
 @pytest.mark.parametrize("options", [{}, {"progressive": True}, {"restart_marker_rows": 1}, {"optimize": True}])
 def test_blocks_that_were_never_written_are_found(options: dict[str, object]) -> None:
-    data = encoded("JPEG", np.random.default_rng(0).integers(0, 256, (240, 240, 3), dtype=np.uint8), **options)
+    data = encoded(np.random.default_rng(0).integers(0, 256, (240, 240, 3), dtype=np.uint8), "JPEG", **options)
     for block in range(1, len(data) // 4096):
         for count in (1, 2):
             hole = data[: block * 4096] + bytes(4096 * count) + data[(block + count) * 4096 :]
@@ -171,7 +166,7 @@ def test_an_even_picture_is_no_block_that_was_never_written() -> None:
     """Its codes are zeros for long, from anywhere to anywhere."""
     image = np.zeros((4000, 4000, 3), np.uint8)
     image[1000:1100, 1000:1100] = np.random.default_rng(0).integers(0, 256, (100, 100, 3))
-    data = encoded("JPEG", image, optimize=True)
+    data = encoded(image, "JPEG", optimize=True)
     assert bytes(4 * 4096) in data
     assert open_picture(data).size == (4000, 4000)
 
@@ -184,14 +179,14 @@ def test_what_is_no_file_is_not_opened(tmp_path: Path, call: Callable[[Path], ob
 
 
 def test_memory_that_runs_out_is_not_called_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "x.png").write_bytes(encoded("PNG"))
+    (tmp_path / "x.png").write_bytes(encoded(SMOOTH, "PNG"))
 
     def fails(self: object) -> None:
         raise MemoryError
 
     monkeypatch.setattr("PIL.ImageFile.ImageFile.load", fails)
     with pytest.raises(UserError, match="memory ran out"):
-        decode_image(tmp_path / "x.png", "camera 1")
+        FilePicture(tmp_path / "x.png").rgb("camera 1")
 
 
 def test_pillow_opens_files_in_one_place_only() -> None:

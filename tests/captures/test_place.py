@@ -8,21 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from facefolds_core.captures.assembly import Plan, plan_scene, write_plan
+from facefolds_core.captures.assembly import Plan, write_plan
 from facefolds_core.captures.place import BALL, ball_outline
 from facefolds_core.captures.scene import read_scene
-from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
 from facefolds_core.files.pictures import open_picture
 from facefolds_core.geometry.similarity import Similarity
-from facefolds_core.params import NormalizeParams, Subject
-from tests.captures.fixtures import HEAD, world_camera, write_multiface
+from facefolds_core.params import NormalizeParams
+from tests.captures.fixtures import HEAD, plan_of, world_camera, write_multiface
 
 
 def _plan(root: Path, **keys: Any) -> Plan:
     write_multiface(root)
-    subject = Subject(source="multiface", path=str(root), holdout=("400003",), **keys)
-    return plan_scene(read_multiface(root, subject), "head", subject, NormalizeParams(), root.parent / "scene")
+    return plan_of(root, **keys)
 
 
 def test_a_given_centre_is_the_origin(tmp_path: Path) -> None:

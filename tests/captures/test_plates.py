@@ -8,24 +8,22 @@ import numpy as np
 import pytest
 
 from facefolds_core.captures.actor import write_capture
-from facefolds_core.captures.assembly import plan_scene, write_plan
-from facefolds_core.captures.images import decode_image, decode_mask
+from facefolds_core.captures.assembly import write_plan
+from facefolds_core.captures.picture import FilePicture
 from facefolds_core.captures.scene import Scene
-from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
-from facefolds_core.params import CaptureParams, NormalizeParams, Subject
-from tests.captures.fixtures import SEGMENT, pattern, save, write_multiface
+from facefolds_core.params import CaptureParams, NormalizeParams
+from tests.captures.fixtures import SEGMENT, pattern, plan_of, save, write_multiface
 
 
-def normalized(root: Path, out: Path) -> Scene:
-    subject = Subject(source="multiface", path=str(root), holdout=("400003",))
+def normalized(root: Path) -> Scene:
     params = NormalizeParams(long_side=32, short_side=20)
-    return write_plan(plan_scene(read_multiface(root, subject), "head", subject, params, out), params)
+    return write_plan(plan_of(root, params), params)
 
 
 def test_a_capture_without_them_gives_none(tmp_path: Path) -> None:
     write_multiface(tmp_path / "capture")
-    scene = normalized(tmp_path / "capture", tmp_path / "scene")
+    scene = normalized(tmp_path / "capture")
     assert (scene.open_plates(), scene.open_mattes()) == (None, None)
 
 
@@ -36,14 +34,14 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
         plate = pattern(40, 64, 10 + c)
         save(root / "plates" / f"{camera.name}.png", plate)
         save(root / "mattes" / SEGMENT / camera.name / "000006.png", np.full((64, 40), 50 * c, np.uint8))
-    scene = normalized(root, tmp_path / "scene")
+    scene = normalized(root)
     plates, mattes = scene.open_plates(), scene.open_mattes()
     assert plates is not None and mattes is not None
     names = [camera.name for camera in scene.cameras]
     assert plates.keys() == [(c, 0) for c in range(len(names))]
     assert mattes.keys() == [(c, 1) for c in range(len(names))]
     for c, name in enumerate(names):
-        whole = decode_image(root / "plates" / f"{name}.png", "").astype(float)
+        whole = FilePicture(root / "plates" / f"{name}.png").rgb("").astype(float)
         assert np.abs(plates.image(c, 0) - whole.reshape(32, 2, 20, 2, 3).mean((1, 3))).max() <= 0.5
         assert np.ptp(mattes.image(c, 1)) == 0
         assert mattes.image(c, 1)[0, 0, 0] == 50 * [camera.name for camera in made.cameras].index(name)
@@ -51,10 +49,10 @@ def test_plates_and_mattes_of_all_cameras_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_plate_of_another_shape_is_refused(tmp_path: Path) -> None:
-    write_multiface(tmp_path)
-    save(tmp_path / "plates" / "400002.png", pattern(20, 30, 0))
+    write_multiface(tmp_path / "capture")
+    save(tmp_path / "capture" / "plates" / "400002.png", pattern(20, 30, 0))
     with pytest.raises(UserError, match="different sizes") as caught:
-        normalized(tmp_path, tmp_path / "scene")
+        normalized(tmp_path / "capture")
     assert "clean plate of camera 400002" in str(caught.value)
 
 
@@ -62,9 +60,9 @@ def test_the_actor_has_them_when_asked_and_they_agree_with_its_pictures(tmp_path
     params = CaptureParams(cameras=3, frames=1, height=48, width=32, plates=True, mattes=True)
     write_capture(tmp_path, params)
     for camera in ("A000", "A001", "A002"):
-        image = decode_image(next((tmp_path / "images").glob(f"*/{camera}/*.png")), "")
-        matte = decode_mask(next((tmp_path / "mattes").glob(f"*/{camera}/*.png")), "")
-        plate = decode_image(tmp_path / "plates" / f"{camera}.png", "")
+        image = FilePicture(next((tmp_path / "images").glob(f"*/{camera}/*.png"))).rgb("")
+        matte = FilePicture(next((tmp_path / "mattes").glob(f"*/{camera}/*.png"))).opacity("")
+        plate = FilePicture(tmp_path / "plates" / f"{camera}.png").rgb("")
         # Pixels beside the subject are smoothed with it: away from it the room is the same to the bit.
         near = np.pad(matte[..., 0], 1)
         beside = np.max([near[i : i + 48, j : j + 32] for i in range(3) for j in range(3)], 0) > 0

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from facefolds_core.captures.assembly import plan_scene, write_plan
+from facefolds_core.captures.assembly import write_plan
 from facefolds_core.captures.sound import cut_sound, sound_start
-from facefolds_core.captures.sources.multiface import read_multiface
 from facefolds_core.errors import UserError
-from facefolds_core.params import FrameRange, NormalizeParams, Subject
-from tests.captures.fixtures import SEGMENT, write_multiface
+from facefolds_core.params import FrameRange, NormalizeParams
+from tests.captures.fixtures import SEGMENT, plan_of, save_wav, write_multiface
 
 RATE = 6000
 FRAMES = tuple(f"{3 * k:06d}" for k in range(6))
@@ -22,21 +21,15 @@ FRAMES = tuple(f"{3 * k:06d}" for k in range(6))
 def scene_sound(root: Path, frames: FrameRange | tuple[str, ...] | None, samples: np.ndarray) -> tuple[Path, list[str]]:
     """Normalise a capture with a sound; where its sound would lie, and what was left out."""
     write_multiface(root / "capture", FRAMES)
-    path = root / "capture" / "audio" / f"{SEGMENT}.wav"
-    path.parent.mkdir()
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 2, RATE, 0, "NONE", ""))
-        file.writeframes(samples.astype("<i2").tobytes())
-    subject = Subject(source="multiface", path=str(root / "capture"), frames=frames, holdout=("400003",))
-    capture = read_multiface(root / "capture", subject)
-    plan = plan_scene(capture, "x", subject, NormalizeParams(), root / "scene")
+    save_wav(root / "capture" / "audio" / f"{SEGMENT}.wav", samples, RATE)
+    plan = plan_of(root / "capture", frames=frames)
     write_plan(plan, NormalizeParams())
     return root / "scene" / "audio.wav", [str(one) for one in plan.scene.left_out]
 
 
-def heard(path: Path) -> np.ndarray:
+def heard(path: Path, rate: int = RATE) -> np.ndarray:
     with wave.open(str(path), "rb") as file:
-        assert file.getframerate() == RATE
+        assert file.getframerate() == rate
         return np.frombuffer(file.readframes(file.getnframes()), "<i2")
 
 
@@ -50,15 +43,10 @@ def test_sound_begins_with_the_first_frame_in_use(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("start", range(6))
 def test_a_cut_that_falls_between_samples_has_its_length(tmp_path: Path, start: int) -> None:
-    source = tmp_path / "sound.wav"
-    with wave.open(str(source), "wb") as file:
-        file.setparams((1, 2, 16_000, 0, "NONE", ""))
-        file.writeframes(np.arange(16_000, dtype="<i2").tobytes())
-    cut_sound(source, tmp_path / "cut.wav", start / 30, 4 / 30)
-    with wave.open(str(tmp_path / "cut.wav"), "rb") as file:
-        found = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+    save_wav(tmp_path / "sound.wav", np.arange(16_000), 16_000)
+    cut_sound(tmp_path / "sound.wav", tmp_path / "cut.wav", start / 30, 4 / 30)
     first = round(start * 16_000 / 30)
-    np.testing.assert_array_equal(found, np.arange(first, first + round(4 * 16_000 / 30)))
+    np.testing.assert_array_equal(heard(tmp_path / "cut.wav", 16_000), np.arange(first, first + round(4 * 16_000 / 30)))
 
 
 def test_frames_that_are_not_evenly_spaced_have_no_sound(tmp_path: Path) -> None:
@@ -76,7 +64,5 @@ def test_a_damaged_sound_is_named(tmp_path: Path) -> None:
     path = tmp_path / "capture" / "audio" / f"{SEGMENT}.wav"
     path.parent.mkdir()
     path.write_bytes(b"no sound" * 50)
-    subject = Subject(source="multiface", path=str(tmp_path / "capture"), holdout=("400003",))
-    plan = plan_scene(read_multiface(tmp_path / "capture", subject), "x", subject, NormalizeParams(), tmp_path / "s")
     with pytest.raises(UserError, match="sound cannot be read"):
-        write_plan(plan, NormalizeParams())
+        write_plan(plan_of(tmp_path / "capture"), NormalizeParams())

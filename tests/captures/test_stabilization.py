@@ -8,29 +8,40 @@ from typing import Any
 import numpy as np
 import pytest
 
+from facefolds_core.captures.assembly import Plan
 from facefolds_core.params import NormalizeParams
 from tests.captures.fixtures import (
     HEAD,
     HEAD_TO_WORLD,
     VERTICES,
     head_pose,
+    plan_of,
     pose_text,
     write_multiface,
 )
-from tests.captures.test_normalization import plan_multiface
 
 
-def test_a_stabilised_head_stands_still(tmp_path: Path) -> None:
-    write_multiface(tmp_path / "c", turn=10)
-    plan = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=True))
-    assert plan.vertices is not None
-    assert np.abs(plan.vertices - plan.vertices[:1]).max() < 1e-6
+@pytest.fixture(scope="module")
+def plans(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Plan]:
+    """Of a head that turns by 0, 10, 20 degrees: not stabilised, and stabilised."""
+    root = tmp_path_factory.mktemp("turning") / "c"
+    write_multiface(root, turn=10)
+    still, turned = (plan_of(root, NormalizeParams(stabilize=wanted)) for wanted in (False, True))
+    return still, turned
 
 
-def test_a_stabilised_scene_has_the_cameras_and_views_of_an_unstabilised_one(tmp_path: Path) -> None:
+def test_a_stabilised_head_stands_still_in_its_mean_pose(plans: tuple[Plan, Plan]) -> None:
+    """The mean is the second frame, whose vertices stay where they were in the world."""
+    still, turned = plans
+    assert still.vertices is not None and turned.vertices is not None and turned.scene.poses is not None
+    assert np.abs(turned.vertices - turned.vertices[:1]).max() < 1e-6
+    assert turned.scene.poses.degrees() == pytest.approx([10, 0, 10], abs=1e-6)
+    assert np.abs(still.vertices[1] - turned.vertices[1]).max() < 2e-3  # of 0.3: turns shorten the mean, the box
+
+
+def test_a_stabilised_scene_has_the_cameras_and_views_of_an_unstabilised_one(plans: tuple[Plan, Plan]) -> None:
     """So that scores compare."""
-    write_multiface(tmp_path / "c", turn=10)
-    still, turned = (plan_multiface(tmp_path / "c", NormalizeParams(stabilize=wanted)) for wanted in (False, True))
+    still, turned = plans
     assert still.scene.poses is None and turned.scene.poses is not None
     assert (still.scene.splits, still.rows) == (turned.scene.splits, turned.rows)
     for a, b in zip(still.scene.cameras, turned.scene.cameras, strict=True):
@@ -48,18 +59,9 @@ def test_a_stabilised_scene_has_the_cameras_and_views_of_an_unstabilised_one(tmp
 )
 def test_how_much_motion_is_stabilised(tmp_path: Path, turn: float, stabilize: Any, kinds: list[str]) -> None:
     write_multiface(tmp_path / "c", turn=turn)
-    scene = plan_multiface(tmp_path / "c", NormalizeParams(stabilize=stabilize)).scene
+    scene = plan_of(tmp_path / "c", NormalizeParams(stabilize=stabilize)).scene
     found = [one.kind for one in scene.left_out if one.kind.startswith("head_")]
     assert (found, scene.poses is not None) == (kinds, kinds == ["head_turns"])
-
-
-def test_the_head_is_still_in_its_mean_pose(tmp_path: Path) -> None:
-    """Turns of 0, 10, 20 degrees: the mean is the second frame, whose vertices stay where they were in the world."""
-    write_multiface(tmp_path / "c", turn=10)
-    still, turned = (plan_multiface(tmp_path / "c", NormalizeParams(stabilize=wanted)) for wanted in (False, True))
-    assert still.vertices is not None and turned.vertices is not None and turned.scene.poses is not None
-    assert turned.scene.poses.degrees() == pytest.approx([10, 0, 10], abs=1e-6)
-    assert np.abs(still.vertices[1] - turned.vertices[1]).max() < 2e-3  # of 0.3: turns shorten the mean, the box
 
 
 def test_meshes_that_stand_in_the_world_tell_the_poses(tmp_path: Path) -> None:
@@ -72,6 +74,6 @@ def test_meshes_that_stand_in_the_world_tell_the_poses(tmp_path: Path) -> None:
         made.mesh(frame, ".obj").unlink()
         vertices.astype("<f4").tofile(made.mesh(frame, ".bin"))
         made.mesh(frame, "_transform.txt").write_text(pose_text(rotation, HEAD))
-    scene = plan_multiface(tmp_path / "c").scene
+    scene = plan_of(tmp_path / "c").scene
     assert scene.poses is not None
     assert scene.poses.degrees() == pytest.approx([10, 0, 10], abs=0.3)

@@ -5,41 +5,34 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from facefolds_core.captures.lens import make_lens
-from facefolds_core.captures.sources.transforms import read_transforms
-from facefolds_core.errors import UserError
-from facefolds_core.params import Subject
 from tests.captures.fixtures import (
     HEAD,
     RING,
     edit_transforms,
     intrinsics,
-    opengl_matrix,
     pattern,
     save,
     world_camera,
     write_transforms,
 )
+from tests.filmed import Reader, film, write_film
 
+read = Reader("transforms")
 POINTS = HEAD + np.random.default_rng(0).uniform(-100, 100, (40, 3))
 
 
-def subject(path: Path, **keys: Any) -> Subject:
-    return Subject(source="transforms", path=str(path), **keys)
-
-
 def names(root: Path) -> list[str]:
-    return [view.name for view in read_transforms(root, subject(root)).views]
+    return [view.name for view in read(root).views]
 
 
 def test_projection_with_opengl_axes_and_intrinsics_of_each_entry(tmp_path: Path) -> None:
     _, cameras = write_transforms(tmp_path)
-    views = read_transforms(tmp_path, subject(tmp_path)).views
+    views = read(tmp_path).views
     worst = max(
         np.abs(view.camera.project(POINTS)[0] - camera.project(POINTS)[0]).max()
         for view, camera in zip(views, cameras, strict=True)
@@ -51,7 +44,7 @@ def test_global_intrinsics(tmp_path: Path) -> None:
     path, cameras = write_transforms(tmp_path, **intrinsics(world_camera(*RING[0])))
     for entry in range(5):
         edit_transforms(path, entry, fl_x=None, fl_y=None, cx=None, cy=None, w=None, h=None)
-    view = read_transforms(tmp_path, subject(tmp_path)).views[3]
+    view = read(tmp_path).views[3]
     assert pytest.approx(cameras[3].K) == view.camera.K
 
 
@@ -59,21 +52,21 @@ def test_angles_of_view_and_centred_principal_point(tmp_path: Path) -> None:
     path, _ = write_transforms(tmp_path, camera_angle_x=math.radians(60))
     for entry in range(5):
         edit_transforms(path, entry, fl_x=None, fl_y=None, cx=None, cy=None, w=None, h=None)
-    K = read_transforms(tmp_path, subject(tmp_path)).views[0].camera.K
+    K = read(tmp_path).views[0].camera.K
     f = 20 / math.tan(math.radians(30))
     assert pytest.approx(np.array([[f, 0, 20], [0, f, 32], [0, 0, 1]])) == K
 
 
 def test_pixel_centres_at_whole_numbers_shift_the_principal_point(tmp_path: Path) -> None:
     _, cameras = write_transforms(tmp_path)
-    view = read_transforms(tmp_path, subject(tmp_path, pixel_centres=0.0)).views[0]
+    view = read(tmp_path, pixel_centres=0.0).views[0]
     assert view.camera.K[:2, 2] == pytest.approx(cameras[0].K[:2, 2] + 0.5)
 
 
 def test_entries_without_image_are_left_out_and_reported(tmp_path: Path) -> None:
     write_transforms(tmp_path)
     (tmp_path / "images" / "400002.png").unlink()
-    capture = read_transforms(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert [view.name for view in capture.views] == ["400001", "400003", "400004", "400005"]
     assert [str(one) for one in capture.left_out] == ["frames[1] (images/400002.png): no image images/400002.png"]
 
@@ -86,55 +79,31 @@ def test_paths_without_extension(tmp_path: Path) -> None:
 
 def test_a_static_capture_has_one_frame_and_no_rate(tmp_path: Path) -> None:
     write_transforms(tmp_path)
-    capture = read_transforms(tmp_path, subject(tmp_path))
+    capture = read(tmp_path)
     assert (capture.frame_ids, capture.fps, len(capture.images)) == (("0",), 0.0, 5)
 
 
-def write_dynamic(root: Path, label: str, times: bool = False) -> None:
-    """Five cameras, two frames; `label` is formatted with camera and frame."""
-    entries: list[dict[str, Any]] = []
-    for view in RING:
-        camera = world_camera(*view)
-        for k in (1, 0):
-            file = label.format(camera=camera.name, frame=f"f{k}")
-            save(root / file, pattern(40, 64, k))
-            entry = {"file_path": file, "transform_matrix": opengl_matrix(camera), **intrinsics(camera)}
-            entries.append(entry | ({"time": 0.25 * k} if times else {}))
-    (root / "transforms.json").write_text(json.dumps({"frames": entries}))
-
-
-@pytest.mark.parametrize("label", ["{camera}/{frame}.png", "images/{frame}/{camera}.png"])
+@pytest.mark.parametrize("label", ["{c}/{k}.png", "images/{k}/{c}.png"])
 def test_folders_of_cameras_or_of_frames(tmp_path: Path, label: str) -> None:
-    write_dynamic(tmp_path, label)
-    capture = read_transforms(tmp_path, subject(tmp_path, fps=25.0))
-    assert [view.name for view in capture.views] == [name for name, _, _ in RING]
-    assert (capture.frame_ids, capture.fps) == (("f0", "f1"), 25.0)
-    assert capture.images[1, 0].file == tmp_path / label.format(camera="400002", frame="f0")
+    capture = read(write_film(tmp_path, label), fps=25.0)
+    assert tuple(view.name for view in capture.views) == film().names
+    assert (capture.frame_ids, capture.fps) == (("0", "1", "2"), 25.0)
+    assert capture.images[1, 0].file == tmp_path / label.format(c="A001", k=0)
 
 
 def test_times_order_the_frames(tmp_path: Path) -> None:
-    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
-    capture = read_transforms(tmp_path, subject(tmp_path))
-    assert capture.frame_ids == ("0", "0.25")
-    assert capture.images[4, 1].file == tmp_path / "400005" / "f1.png"
+    capture = read(write_film(tmp_path, "{c}/{k}.png", timed=True))
+    assert capture.frame_ids == ("0", "0.0333333", "0.0666667")
+    assert capture.images[4, 1].file == tmp_path / "A004" / "1.png"
 
 
 def test_times_that_six_digits_cannot_tell_apart(tmp_path: Path) -> None:
-    write_dynamic(tmp_path, "{camera}/{frame}.png", times=True)
-    path = tmp_path / "transforms.json"
+    path = write_film(tmp_path, "{c}/{k}.png", timed=True) / "transforms.json"
     content = json.loads(path.read_text())
     for entry in content["frames"]:
-        entry["time"] += 1699999999.0
+        entry["time"] = 1699999999.0 + round(30 * entry["time"]) / 4
     path.write_text(json.dumps(content))
-    assert read_transforms(tmp_path, subject(tmp_path)).frame_ids == ("1699999999.0", "1699999999.25")
-
-
-@pytest.mark.parametrize("angle", [0, -0.5, 4])
-def test_an_angle_of_view_that_is_none(tmp_path: Path, angle: float) -> None:
-    path, _ = write_transforms(tmp_path, camera_angle_x=angle)
-    edit_transforms(path, 0, fl_x=None, fl_y=None)
-    with pytest.raises(UserError, match="angle of view"):
-        read_transforms(tmp_path, subject(tmp_path))
+    assert read(tmp_path).frame_ids == ("1699999999.0", "1699999999.25", "1699999999.5")
 
 
 def test_same_file_names_in_folders_of_cameras_give_the_folders_names(tmp_path: Path) -> None:
@@ -158,5 +127,5 @@ def test_the_undistorted_image_shows_nothing_from_outside_the_photo(k1: float) -
 
 @pytest.mark.captures
 def test_the_shared_statue(captures_folder: Path) -> None:
-    capture = read_transforms(captures_folder / "buddha", subject(captures_folder / "buddha"))
+    capture = read(captures_folder / "buddha")
     assert (len(capture.views), capture.frame_ids, capture.left_out) == (67, ("0",), ())

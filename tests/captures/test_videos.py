@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -21,24 +19,14 @@ from facefolds_core.captures.videos import Video, check_together
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import NormalizeParams
+from tests.filmed import save_video
 
 FRAMES = np.random.default_rng(0).integers(0, 256, (12, 16, 24, 3), dtype=np.uint8)
 """Of 24 x 16 pixels."""
 
 
-def write(
-    path: Path, frames: np.ndarray = FRAMES, times: Sequence[int] | None = None, rate: int = 25, **options: Any
-) -> Path:
-    """A video without loss; `times` in frames."""
-    with av.open(str(path), "w", options=options) as container:
-        stream = container.add_stream("libx264rgb", rate=rate, options={"crf": "0", "g": "5"})
-        stream.width, stream.height, stream.pix_fmt = frames.shape[2], frames.shape[1], "rgb24"
-        stream.codec_context.time_base = Fraction(1, 100 * rate)
-        for k, image in enumerate(frames):
-            frame = av.VideoFrame.from_ndarray(image, "rgb24")
-            frame.pts, frame.time_base = 100 * (k if times is None else times[k]), Fraction(1, 100 * rate)
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
+def write(path: Path, frames: np.ndarray = FRAMES, rate: int = 25, **options: Any) -> Path:
+    save_video(path, frames, rate, **options)
     return path
 
 
@@ -139,7 +127,7 @@ def test_a_video_without_its_end(tmp_path: Path) -> None:
 
 
 def test_a_video_that_is_cut_behind_its_index(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mp4", movflags="faststart")
+    path = write(tmp_path / "a.mp4", container={"movflags": "faststart"})
     path.write_bytes(path.read_bytes()[:-3000])
     refused(path, "a video is cut off")
 

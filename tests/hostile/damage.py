@@ -100,6 +100,11 @@ def fingerprint(folder: Path) -> dict[str, str]:
     return found
 
 
+def differing(one: dict[str, str], other: dict[str, str]) -> list[str]:
+    """Sorted names of the files whose digests are not the same in both."""
+    return sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
+
+
 @dataclass
 class Counts:
     """What a run of one fuzzer found. `fuzz_AREA.py` has `run(count, seed, folder) -> Counts`: the tests call it with a

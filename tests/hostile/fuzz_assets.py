@@ -11,7 +11,6 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Callable
 from functools import partial
@@ -25,6 +24,7 @@ from facefolds_core.asset.reader import AssetLevel
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.rendering.reference import AssetCaster, composite
 from tests.hostile.damage import MUTATIONS, Counts, Outcome, fingerprint, outcome
+from tests.hostile.structured import ODD
 from tests.hostile.watch import within
 from tests.scenes import look_at_origin
 from tests.viewer.fixtures import rich_asset
@@ -130,21 +130,15 @@ def replace_file(place: Path, random: np.random.Generator) -> Damage:
     path = place / random.choice(names(place))
     content = path.read_bytes()
     path.unlink()
-    kinds: dict[str, Callable[[], object]] = {
-        "nothing": lambda: None,
-        "a FIFO": lambda: os.mkfifo(path),
-        "a folder": path.mkdir,
-        "a link to nowhere": lambda: path.symlink_to("nowhere"),
-        "a link to itself": lambda: path.symlink_to(path.name),
-        "a link to /dev/zero": lambda: path.symlink_to("/dev/zero"),
-        "a link outside": lambda: (
-            (place.parent / "linked").write_bytes(content),
-            path.symlink_to(place.parent / "linked"),
-        ),
-        "another of its files": lambda: shutil.copy(place / random.choice(names(place)), path),
+    outside = place.parent / "linked"
+    kinds: dict[str, Callable[[Path], object]] = {
+        **ODD,
+        "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
+        "a link outside": lambda path: (outside.write_bytes(content), path.symlink_to(outside)),
+        "another of its files": lambda path: shutil.copy(place / random.choice(names(place)), path),
     }
     what = random.choice(sorted(kinds))
-    kinds[what]()
+    kinds[what](path)
     return f"{what} for {path.name}", what != "a link outside"
 
 

@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from facefolds_core.captures.assembly import plan_scene, write_plan
+from facefolds_core.captures.assembly import write_plan
 from facefolds_core.captures.scene import Scene, read_scene
-from facefolds_core.captures.sources.multiface import read_multiface
-from facefolds_core.captures.sources.transforms import read_transforms
 from facefolds_core.captures.visibility import in_picture
-from facefolds_core.params import NormalizeParams, Subject
-from tests.captures.fixtures import write_multiface, write_transforms
+from facefolds_core.params import NormalizeParams
+from tests.captures.fixtures import SEGMENT, plan_of, save_wav, write_multiface, write_transforms
 from tests.hostile.damage import MUTATIONS, Counts, attempt, fingerprint
 from tests.hostile.structured import damage_lines, damage_path, damage_values
 
@@ -28,16 +26,11 @@ PARAMS = NormalizeParams()
 Images = dict[tuple[str, str], np.ndarray]
 
 
-def subject_of(source: str, root: Path) -> Subject:
-    return Subject(source=source, path=str(root), holdout=("400003",), front="400003")
-
-
-def normalise(source: str, root: Path, out: Path) -> Scene:
-    """What the stage does, without its command."""
-    subject = subject_of(source, root)
-    capture = (read_multiface if source == "multiface" else read_transforms)(root, subject)
-    write_plan(plan_scene(capture, "head", subject, PARAMS, out), PARAMS)
-    return read_scene(out)
+def normalise(source: str, root: Path) -> Scene:
+    """What the stage does, without its command: into `scene` beside the capture."""
+    plan = plan_of(root, PARAMS, source)
+    write_plan(plan, PARAMS)
+    return read_scene(plan.scene.folder)
 
 
 def images_of(scene: Scene) -> Images:
@@ -52,15 +45,10 @@ def make(source: str, root: Path) -> None:
         return
     made = write_multiface(root)
     for camera in ("400002", "400003"):
-        mask = root / "masks" / made.image("x", "x").parents[1].name / camera / "000003.png"
+        mask = root / "masks" / SEGMENT / camera / "000003.png"
         mask.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(made.image(camera, "000003"), mask)
-    sound = root / "audio" / f"{made.image('x', 'x').parents[1].name}.wav"
-    sound.parent.mkdir()
-    samples = np.arange(4000, dtype="<i2").tobytes()
-    header = b"RIFF" + (36 + len(samples)).to_bytes(4, "little") + b"WAVEfmt " + (16).to_bytes(4, "little")
-    form = b"\1\0\1\0" + (8000).to_bytes(4, "little") + (16000).to_bytes(4, "little") + b"\2\0\20\0"
-    sound.write_bytes(header + form + b"data" + len(samples).to_bytes(4, "little") + samples)
+    save_wav(root / "audio" / f"{SEGMENT}.wav", np.arange(4000), 8000)
 
 
 def damage(root: Path, random: np.random.Generator) -> str:
@@ -121,7 +109,7 @@ def remove(path: Path) -> None:
 def try_one(counts: Counts, what: str, source: str, root: Path, out: Path, sound: Images) -> None:
     """Normalise one damaged capture, and count what became of it."""
     with redirect_stderr(io.StringIO()):  # bars of progress
-        result, scenes = attempt(counts, what, SECONDS, lambda: normalise(source, root, out))
+        result, scenes = attempt(counts, what, SECONDS, lambda: normalise(source, root))
     if scenes and (words := wrong(scenes[0], sound, ".png" in what)):
         counts.kept_wrong.append(f"{what}: {words}")
     if result.kind == "refused" and out.exists():
@@ -133,7 +121,7 @@ def run(count: int, seed: int, folder: Path) -> Counts:
     counts, sound = Counts(), {}
     for source in ("multiface", "transforms"):
         make(source, folder / source)
-        sound[source] = images_of(normalise(source, folder / source, folder / "scene"))
+        sound[source] = images_of(normalise(source, folder / source))
     for i in range(count):
         random = np.random.default_rng([seed, i])
         source = ("multiface", "transforms")[i % 2]

@@ -33,7 +33,7 @@ from facefolds_core.pipeline.texture import texture
 from facefolds_core.pipeline.train import train
 from stages.configure import configure
 from tests.golden import digests
-from tests.hostile.damage import Counts, Outcome, fingerprint, outcome
+from tests.hostile.damage import Counts, Outcome, differing, fingerprint, outcome
 
 Stage = Callable[[SubjectFolders], str]
 STAGES: dict[str, tuple[Stage, tuple[str, ...]]] = {
@@ -133,7 +133,7 @@ def run(count: int, seed: int, folder: Path) -> Counts:
         for name, (work, _) in STAGES.items():
             _quietly(work, folders)
             write_json(folders.timing(name), {"stage": name, "seconds": 1.0})
-        good = _digests(folders)
+        good = all_digests(folders.root)
         for number in range(count):
             random = np.random.default_rng((seed, number))
             name = list(STAGES)[number % len(STAGES)]
@@ -142,11 +142,10 @@ def run(count: int, seed: int, folder: Path) -> Counts:
     return counts
 
 
-def _digests(folders: SubjectFolders) -> dict[str, str]:
+def all_digests(root: Path) -> dict[str, str]:
     """What all stages made: the subject's files, and those that `configure` writes beside them."""
-    data = folders.root.parent
-    beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(data / n).items()}
-    return {**digests(folders.root), **beside}
+    beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(root.parent / n).items()}
+    return {**digests(root), **beside}
 
 
 def _quietly(work: Stage, folders: SubjectFolders) -> None:
@@ -185,13 +184,11 @@ def _case(
         result = outcome(lambda: _quietly(work, folders))
     counts.add(what, result)
     if result.kind == "accepted":
-        found = _digests(folders)
-        wrong = sorted(n for n in {*found, *good} if found.get(n) != good.get(n))
+        wrong = differing(all_digests(folders.root), good)
         counts.kept_wrong += [f"{what}: other results: {', '.join(wrong)}"] if wrong else []
     else:
-        after = fingerprint(folders.root.parent)
-        changed = [n for n in {*before, *after} if before.get(n) != after.get(n)]
-        harmed = sorted(n for n in changed if not n.startswith(("tight/training", "tight/checkpoints")))
+        changed = differing(before, fingerprint(folders.root.parent))
+        harmed = [n for n in changed if not n.startswith(("tight/training", "tight/checkpoints"))]
         counts.harmed += [f"{what}: {result.text}: changed {', '.join(harmed)}"] if harmed else []
     left = [str(path) for path in folders.root.parent.rglob(f"{PREFIX}*")]
     counts.harmed += [f"{what}: left {', '.join(left)}"] if left else []
@@ -201,8 +198,7 @@ def _case(
 
 def _again(work: Stage, folders: SubjectFolders, good: dict[str, str], what: str) -> list[str]:
     result = outcome(lambda: _quietly(work, folders))
-    found = _digests(folders)
-    wrong = sorted(n for n in {*found, *good} if found.get(n) != good.get(n))
+    wrong = differing(all_digests(folders.root), good)
     if result != Outcome("accepted") or wrong:
         return [f"{what}: again, with room: {result.text} {', '.join(wrong)}"]
     return []

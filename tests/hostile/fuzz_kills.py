@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from facefolds_core.files.writing import PREFIX
-from tests.golden import digests
-from tests.hostile.damage import Counts, Outcome, fingerprint
+from tests.hostile.damage import Counts, Outcome, differing, fingerprint
+from tests.hostile.fuzz_disk import all_digests
 from tests.pipeline.test_dvc_yaml import STAGES
 from tests.pipeline.tiny import TinyProject
 
@@ -94,9 +94,7 @@ class Project(TinyProject):
         self.done("dvc", "checkout", "--force", *self.targets)
 
     def made(self) -> dict[str, str]:
-        data = self.root / "data"
-        beside = {f"{n}/{k}": v for n in (".config", ".code") for k, v in fingerprint(data / n).items()}
-        return {**digests(data / NAME), **beside}
+        return all_digests(self.root / "data" / NAME)
 
     def untouched(self) -> dict[str, str]:
         """What is neither a stage's output nor DVC's own."""
@@ -134,11 +132,9 @@ def _recover(project: Project, command: tuple[str, ...], what: str, counts: Coun
             counts.add(what, Outcome("crashed", f"{' '.join(step)}: {output[-600:]}"))
             return
     counts.add(what, Outcome("accepted"))
-    found, outside = project.made(), project.untouched()
-    wrong = sorted(name for name in {*found, *project.results} if found.get(name) != project.results.get(name))
-    if wrong:
+    if wrong := differing(project.made(), project.results):
         counts.kept_wrong.append(f"{what}: other results than undisturbed: {', '.join(wrong)}")
-    harmed = sorted(n for n in {*outside, *project.outside} if outside.get(n) != project.outside.get(n))
+    harmed = differing(project.untouched(), project.outside)
     harmed += [str(path) for path in project.root.rglob(f"{PREFIX}*")]
     if harmed:
         counts.harmed.append(f"{what}: touched, or left: {', '.join(harmed)}")

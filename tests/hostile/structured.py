@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -70,27 +71,17 @@ def damage_values(value: Any, random: np.random.Generator) -> str:
 
 
 def damage_path(path: Path, random: np.random.Generator) -> str:
-    """Something else in the file's place: nothing, a folder, a FIFO, a socket, links, a file without permission."""
-    way = str(random.choice(["nothing", "folder", "fifo", "socket", "device", "loop", "broken", "eps", "parent"]))
+    """Something else in the file's place: see `ODD`; or an EPS, or a file where its folder was."""
+    way = str(random.choice([*ODD, "eps", "parent"]))
     if way == "parent" and path.parent.parent.name != "":
         shutil.rmtree(path.parent)
         path.parent.write_bytes(b"a file where a folder was")
         return way
     path.unlink()
-    if way == "folder":
-        path.mkdir()
-    elif way == "fifo":
-        os.mkfifo(path)
-    elif way == "socket":
-        _socket(path)
-    elif way == "device":
-        path.symlink_to("/dev/null")  # /dev/zero would take all memory of a reader that is fooled
-    elif way == "loop":
-        path.symlink_to(path.name)
-    elif way == "broken":
-        path.symlink_to("nowhere")
-    elif way == "eps":
+    if way == "eps":
         path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 40 64\nshowpage\n%%EOF\n")
+    elif way in ODD:
+        ODD[way](path)
     return way
 
 
@@ -100,3 +91,15 @@ def _socket(path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as made:
         made.bind(str(short))
     shutil.move(short, path)
+
+
+ODD: dict[str, Callable[[Path], object]] = {
+    "nothing": lambda path: None,
+    "FIFO": os.mkfifo,
+    "socket": _socket,
+    "device": lambda path: path.symlink_to("/dev/null"),  # /dev/zero would take all memory of a reader that is fooled
+    "folder": Path.mkdir,
+    "loop": lambda path: path.symlink_to(path.name),
+    "link to nothing": lambda path: path.symlink_to("nowhere"),
+}
+"""What may lie where a file should be, and how it is put there."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.actor.mesh import TrackedMesh, tracked_mesh
 from facefolds_core.captures.actor.motion import head_pose
-from facefolds_core.captures.actor.render import ActorOptions, Picture, render
+from facefolds_core.captures.actor.render import ActorOptions, render
 from facefolds_core.captures.actor.rig import ActorRig, make_rig
 from facefolds_core.captures.actor.voice import speak
 from facefolds_core.files.writing import atomic_folder
@@ -31,15 +31,6 @@ Progress = Callable[[], None]
 def frame_times(params: CaptureParams) -> NDArray[np.float64]:
     """(frames,) seconds within the take: evenly spread, the last one a step before the end, so that the film loops."""
     return np.arange(params.frames) / params.frames * params.seconds
-
-
-def options_of(params: CaptureParams) -> ActorOptions:
-    """What the parameters say of the actor."""
-    return ActorOptions(head_motion=math.radians(params.head_motion), clutter=params.clutter)
-
-
-def frame_name(position: int) -> str:
-    return f"{position + 1:06d}"
 
 
 def krt_block(camera: Camera) -> str:
@@ -59,14 +50,6 @@ def _write_png(path: Path, image: NDArray[np.uint8]) -> None:
     if not encoded:
         raise OSError(f"cannot encode {path}")
     path.write_bytes(data.tobytes())
-
-
-def _write_picture(folder: Path, camera: str, frame: str, picture: Picture, mattes: bool) -> None:
-    _write_png(folder / "images" / SEGMENT / camera / f"{frame}.png", picture.rgb[..., ::-1])
-    mask = np.rint(255 * picture.opacity).astype(np.uint8)
-    _write_png(folder / "masks" / SEGMENT / camera / f"{frame}.png", mask)
-    if mattes:
-        _write_png(folder / "mattes" / SEGMENT / camera / f"{frame}.png", mask)
 
 
 def _write_mesh(folder: Path, frame: str, mesh: TrackedMesh, head_to_world: NDArray[np.float64]) -> None:
@@ -97,11 +80,11 @@ def write_capture(
         options: see `ActorOptions`; by default as `params` have it.
         rig: other cameras than those of `make_rig`.
     """
-    options = options or options_of(params)
+    options = options or ActorOptions(head_motion=math.radians(params.head_motion), clutter=params.clutter)
     rig = rig or make_rig(params)
     with atomic_folder(folder) as temporary:
         (temporary / "KRT").write_text("".join(krt_block(camera) for camera in rig.cameras), encoding="utf-8")
-        frames = [(frame_name(k), float(time)) for k, time in enumerate(frame_times(params))]
+        frames = [(f"{k + 1:06d}", float(time)) for k, time in enumerate(frame_times(params))]
         listing = "".join(f"{SEGMENT} {name}\n" for name, _ in frames)
         (temporary / "frame_list.txt").write_text(listing, encoding="utf-8")
         if params.plates:
@@ -114,6 +97,10 @@ def write_capture(
             head_to_world = np.concatenate([rotation, translation[:, None]], 1)
             _write_mesh(temporary / "tracked_mesh" / SEGMENT, name, tracked_mesh(time, options.nose), head_to_world)
             for camera in rig.cameras:
-                _write_picture(temporary, camera.name, name, render(camera, time, options), params.mattes)
+                picture = render(camera, time, options)
+                mask = np.rint(255 * picture.opacity).astype(np.uint8)
+                kinds = {"images": picture.rgb[..., ::-1], "masks": mask} | ({"mattes": mask} if params.mattes else {})
+                for kind, image in kinds.items():
+                    _write_png(temporary / kind / SEGMENT / camera.name / f"{name}.png", image)
                 if progress:
                     progress()

@@ -48,14 +48,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with calibration.csv.
-
-    Raises:
-        UserError: if the table is missing or garbled, or no camera has pictures; names line and column.
-    """
+    """Of the folder with calibration.csv."""
     path = root / "calibration.csv"
     calibrations = _table(path)
     photos = {camera.name: _pictures(camera, "rgb") for camera in inside(root / "rgbs") if camera.is_dir()}
@@ -127,4 +120,4 @@ def _camera(values: dict[str, str], path: Path, line: int) -> Calibration:
     w2c = np.concatenate([rotation, -(rotation @ centre)[:, None]], 1)
     K = np.concatenate([K, [[0, 0, 1]]])
     size = (max(1, round(width)), max(1, round(height)))
-    return Calibration(values["name"], K, w2c, path, f"line {line} (camera {values['name']})", np.zeros(5), size=size)
+    return Calibration(values["name"], K, w2c, path, f"line {line} (camera {values['name']})", size=size)

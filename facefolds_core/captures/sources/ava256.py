@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -40,8 +41,10 @@ FULL_SIZE = (2668, 4096)
 FPS = 30.0
 PIXEL_CENTRES = 0.0
 """OpenCV's calibration, as Multiface's, whose successor this is."""
+POSES, VERTICES = "head_pose/head_pose.zip", "kinematic_tracking/registration_vertices.zip"
 FORMATS = ("AVIF", "PNG", "JPEG")
 _REMEDY = "copy the file again from the dataset"
+_wrong = partial(UserError, remedy=_REMEDY)
 _MISSING = "point `path` at the folder that holds camera_calibration.json and image/"
 
 
@@ -56,26 +59,23 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with camera_calibration.json.
-        subject: its `segment` is a seg_id of frame_list.csv.
-
-    Raises:
-        UserError: if calibration, list of frames, an archive, a pose or a mesh is missing or damaged; names it.
-    """
+    """Of the folder with camera_calibration.json; `segment` of the subject is a seg_id of frame_list.csv."""
     check_folder(root, _MISSING)
     calibrations = _calibrations(root / "camera_calibration.json")
-    frames = _frames(root, subject.segment)
-    poses, meshes = _members(root / "head_pose" / "head_pose.zip"), _members(_vertices_file(root))
+    segments = _listed(root)
+    chosen = chosen_segment(segments, subject.segment, root / "frame_list.csv", _REMEDY)
+    frames = sorted(set(segments[chosen]))
+    poses, meshes = _members(root / POSES), _members(root / VERTICES)
     left_out: list[Fact] = []
     if poses and meshes:
         left_out += [fact("frame_without_mesh", frame=name) for name in frames if name not in poses.keys() & meshes]
         frames = [name for name in frames if name in poses and name in meshes]
     else:
         left_out.append(fact("no_mesh", folder=str(root / "kinematic_tracking")))
-    photos = {camera: _photos(archive, frames) for camera, archive in _archives(root).items()}
+    photos: dict[str, dict[str, Picture]] = {}
+    for camera, archive in _archives(root).items():
+        members = _members(archive)
+        photos[camera] = {name: ZipPicture(archive, members[name], FORMATS) for name in frames if name in members}
     steps = np.diff([int(name) for name in frames])
     fps = FPS / float(np.median(steps)) if len(steps) else FPS
     capture = gather(root, calibrations, photos, subject, fps=fps, pixel_centres=PIXEL_CENTRES, left_out=left_out)
@@ -83,10 +83,6 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
         return capture
     tracking, facts = _tracking(root, capture.frame_ids, poses, meshes)
     return replace(capture, tracking=tracking, left_out=(*capture.left_out, *facts))
-
-
-def _vertices_file(root: Path) -> Path:
-    return root / "kinematic_tracking" / "registration_vertices.zip"
 
 
 def _archives(root: Path) -> dict[str, Path]:
@@ -103,22 +99,17 @@ def _members(archive: Path) -> dict[str, str]:
     return {f"{int(name.stem):06d}": str(name) for name in names if name.stem.isdecimal() and len(name.stem) < 12}
 
 
-def _photos(archive: Path, frames: list[str]) -> dict[str, Picture]:
-    members = _members(archive)
-    return {name: ZipPicture(archive, members[name], FORMATS) for name in frames if name in members}
-
-
 def _calibrations(path: Path) -> list[Calibration]:
     check_regular(path, _MISSING)
     value = read_json(path, remedy=_REMEDY)
     entries = value.get("KRT") if isinstance(value, dict) else None
     if not isinstance(entries, list) or not entries:
-        raise UserError("no cameras", file=path, place="KRT", expected="a list", found=short(entries), remedy=_REMEDY)
+        raise _wrong("no cameras", file=path, place="KRT", expected="a list", found=short(entries))
     cameras = [_calibration(entry, path, f"KRT[{i}]") for i, entry in enumerate(entries)]
     names = [camera.name for camera in cameras]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise UserError("a camera appears twice", file=path, place="KRT", found=twice, remedy=_REMEDY)
+        raise _wrong("a camera appears twice", file=path, place="KRT", found=twice)
     return cameras
 
 
@@ -126,16 +117,15 @@ def _calibration(entry: Any, path: Path, place: str) -> Calibration:
     name = entry.get("cameraId") if isinstance(entry, dict) else None
     if not isinstance(name, str) or not name:
         expected = "an object with cameraId, K, T, distortion"
-        raise UserError("no camera", file=path, place=place, expected=expected, found=short(entry), remedy=_REMEDY)
+        raise _wrong("no camera", file=path, place=place, expected=expected, found=short(entry))
     place = f"{place} (camera {name})"
     K = matrix_from(entry.get("K"), ((3, 3),), path, f"{place}, K", _REMEDY).T
     w2c = matrix_from(entry.get("T"), ((4, 4), (4, 3)), path, f"{place}, T", _REMEDY)[:4, :3].T
     bent = entry.get("distortion", [])
     if not isinstance(bent, list) or len(bent) > 5 or not all(is_number(b) and abs(b) <= HUGE for b in bent):
-        expected = "k1, k2, p1, p2"
         where = f"{place}, distortion"
-        raise UserError("no distortion", file=path, place=where, expected=expected, found=short(bent), remedy=_REMEDY)
-    return Calibration(name, K, w2c, path, place, np.array([*bent, *[0.0] * (5 - len(bent))]), size=FULL_SIZE)
+        raise _wrong("no distortion", file=path, place=where, expected="k1, k2, p1, p2", found=short(bent))
+    return Calibration(name, K, w2c, path, place, np.array(bent, float), size=FULL_SIZE)
 
 
 def _listed(root: Path) -> dict[str, list[str]]:
@@ -147,32 +137,20 @@ def _listed(root: Path) -> dict[str, list[str]]:
     for line, row in enumerate(rows, 2):
         segment, frame = row.get("seg_id"), row.get("frame_id") or ""
         if segment is None or not frame.isdecimal() or len(frame) > 11:
-            raise UserError(
-                "garbled list of frames",
-                file=path,
-                place=f"line {line}",
-                expected="columns seg_id and frame_id, a number",
-                found=short({key: row[key] for key in list(row)[:4]}) if not row else ", ".join(map(str, row.values())),
-                remedy=_REMEDY,
-            )
+            found = short({key: row[key] for key in list(row)[:4]}) if not row else ", ".join(map(str, row.values()))
+            expected = "columns seg_id and frame_id, a number"
+            raise _wrong("garbled list of frames", file=path, place=f"line {line}", expected=expected, found=found)
         segments.setdefault(segment, []).append(f"{int(frame):06d}")
     if not segments:
-        raise UserError("an empty list of frames", file=path, expected="seg_id,frame_id", remedy=_REMEDY)
+        raise _wrong("an empty list of frames", file=path, expected="seg_id,frame_id")
     return segments
-
-
-def _frames(root: Path, wanted: str | None) -> list[str]:
-    """Sorted frames of the segment."""
-    segments = _listed(root)
-    chosen = chosen_segment(segments, wanted, root / "frame_list.csv", _REMEDY)
-    return sorted(set(segments[chosen]))
 
 
 def _tracking(
     root: Path, frames: tuple[str, ...], poses: dict[str, str], meshes: dict[str, str]
 ) -> tuple[Tracking, list[Fact]]:
     """Of these frames, and a note where the mesh has no faces."""
-    archive, vertices_file = root / "head_pose" / "head_pose.zip", _vertices_file(root)
+    archive, vertices_file = root / POSES, root / VERTICES
     moved: list[Array] = []
     vertices: list[Array] = []
     faces: Any = None
@@ -210,4 +188,4 @@ def _mesh(archive: Path, member: str) -> tuple[Array, Any]:
 
 
 def _damaged(file: Path, expected: str, found: str) -> UserError:
-    return UserError("a damaged tracked mesh", file=file, expected=expected, found=found, remedy=_REMEDY)
+    return _wrong("a damaged tracked mesh", file=file, expected=expected, found=found)

@@ -12,11 +12,12 @@ needed: it is a large binary, and the formats are small.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from facefolds_core.captures.arrangement import Shot, arrange, mean_calibration
 from facefolds_core.captures.capture import Capture
-from facefolds_core.captures.colmap_model import ModelCamera, ModelImage, model_folder, read_model
+from facefolds_core.captures.colmap_model import model_folder, read_model
 from facefolds_core.captures.gathering import Calibration, Recognised, gather, inside, pictures_in
 from facefolds_core.captures.picture import FilePicture, Picture
 from facefolds_core.errors import UserError
@@ -38,11 +39,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Raises:
-        UserError: if there is no model, it is damaged, or none of its pictures exists.
-    """
+    """Of the folder with sparse and images."""
     folder = model_folder(root)
     if folder is None:
         raise UserError(
@@ -51,7 +48,7 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
             expected="cameras and images (.bin or .txt) in sparse/0, sparse or the folder itself",
             remedy="point `path` at the folder that holds sparse and images",
         )
-    cameras, images, file = read_model(folder)
+    images, file = read_model(folder)
     near = (root / "images", folder / "images", folder.parent.parent / "images")
     pictures = next((place for place in near if is_folder(place)), root)
     films = _films(images, pictures)
@@ -60,18 +57,13 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
     else:
         groups = {name: [image] for name, (image, _) in films.items()}
         photos, left_out = {name: pictures_in(place) for name, (_, place) in films.items()}, []
-    each = [[_calibration(name, image, cameras[image.camera], file) for image in of] for name, of in groups.items()]
+    each = [[replace(i, name=name, place=f"{i.place} ({i.name})") for i in of] for name, of in groups.items()]
     left_out += _other_models(folder)
     means = [mean_calibration(some) for some in each]
     return gather(root, means, photos, subject, fps=FPS, pixel_centres=PIXEL_CENTRES, left_out=left_out)
 
 
-def _calibration(name: str, image: ModelImage, camera: ModelCamera, file: Path) -> Calibration:
-    place = f"{image.place} ({image.name})"
-    return Calibration(name, camera.K, image.w2c, file, place, camera.coefficients, camera.fisheye, camera.size)
-
-
-def _films(images: list[ModelImage], pictures: Path) -> dict[str, tuple[ModelImage, Path]] | None:
+def _films(images: list[Calibration], pictures: Path) -> dict[str, tuple[Calibration, Path]] | None:
     """Camera -> its one registered picture and the folder of its film; None unless every picture has one of its own."""
     found = {}
     for image in images:
@@ -85,8 +77,8 @@ def _films(images: list[ModelImage], pictures: Path) -> dict[str, tuple[ModelIma
 
 
 def _registered(
-    images: list[ModelImage], pictures: Path, file: Path
-) -> tuple[dict[str, list[ModelImage]], Photos, list[Fact]]:
+    images: list[Calibration], pictures: Path, file: Path
+) -> tuple[dict[str, list[Calibration]], Photos, list[Fact]]:
     """Cameras with their registered pictures, the pictures by frame, and facts on those that are missing.
 
     Of a camera that has a folder of its own, pictures count that were not registered, too.
@@ -102,21 +94,18 @@ def _registered(
             found="no such file",
             remedy="put the pictures that COLMAP saw into the folder images",
         )
-    arranged = arrange([_shot(image) for image in images], file)
+    paths_there = [PurePosixPath(image.name) for image in images]
+    shots = [Shot(p.stem, p.parent.name, None, image.w2c) for p, image in zip(paths_there, images, strict=True)]
+    arranged = arrange(shots, file)
     groups = {name: [images[i] for i in of] for name, of in arranged.cameras.items()}
     photos: Photos = {}
     for name, of in arranged.cameras.items():
-        own = PurePosixPath(images[of[0]].name).parent
+        own = paths_there[of[0]].parent
         if len(of) > 1 and own.name == name:
             photos[name] = pictures_in(pictures / own)
         else:
             photos[name] = {arranged.frame_of[i]: FilePicture(pictures / images[i].name) for i in of}
     return groups, photos, facts
-
-
-def _shot(image: ModelImage) -> Shot:
-    path = PurePosixPath(image.name)
-    return Shot(path.stem, path.parent.name, None, image.w2c)
 
 
 def _find(pictures: Path, name: str) -> bool:

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from facefolds_core.captures.capture import Capture
 from facefolds_core.captures.gathering import Calibration, Recognised, footage, gather, inside, pictures_in
-from facefolds_core.captures.images import decode_mask
 from facefolds_core.captures.numbers import short
-from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, read_storage
+from facefolds_core.captures.opencv_yaml import REMEDY, matrix_of, needed_matrix, read_storage
 from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.captures.videos import CONTAINERS
 from facefolds_core.errors import UserError
 from facefolds_core.facts import Fact, fact, shorten
 from facefolds_core.files.reading import is_regular
@@ -36,7 +36,6 @@ from facefolds_core.params import CaptureParams, Subject
 
 FPS = 30.0
 PIXEL_CENTRES = 0.0
-VIDEOS = (".mp4", ".mov", ".mkv", ".avi", ".m4v", ".webm")
 _LABELS = 32
 """A mask of no larger value than this has labels of parts of the body, not opacity."""
 _MISSING = "point `path` at the folder that holds intri.yml and extri.yml"
@@ -54,19 +53,12 @@ class MaskFile(FilePicture):
     """A mask of opacity, or of labels."""
 
     def opacity(self, place: str) -> NDArray[np.uint8]:
-        values = decode_mask(self.file, place)
+        values = super().opacity(place)
         return np.where(values > 0, 255, 0).astype(np.uint8) if values.max() <= _LABELS else values
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with intri.yml and extri.yml.
-
-    Raises:
-        UserError: if these are missing or garbled, or neither pictures nor videos are there.
-    """
+    """Of the folder with intri.yml and extri.yml."""
     intri = read_storage(root / "intri.yml", _MISSING)
     extri = read_storage(root / "extri.yml", _MISSING)
     names = _names(intri, root / "intri.yml")
@@ -100,22 +92,15 @@ def _names(intri: dict[str, Any], path: Path) -> list[str]:
 
 def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name: str) -> Calibration:
     inner, outer = root / "intri.yml", root / "extri.yml"
-    K = matrix_of(intri, f"K_{name}", ((3, 3),), inner)
-    if K is None:
-        raise _lacks(inner, f"K_{name}")
+    vector = ((3, 1), (1, 3))
+    K = needed_matrix(intri, {f"K_{name}": ((3, 3),)}, inner)
     lengths = tuple(shape for n in (5, 4, 8) for shape in ((n, 1), (1, n)))
-    bent = matrix_of(intri, f"D_{name}", lengths, inner)
-    bent = matrix_of(intri, f"dist_{name}", lengths, inner) if bent is None else bent
-    coefficients = np.zeros(5) if bent is None else np.pad(bent.ravel(), (0, max(0, 5 - bent.size)))
-    turn = matrix_of(extri, f"R_{name}", ((3, 1), (1, 3)), outer)
-    rotation = matrix_of(extri, f"Rot_{name}", ((3, 3),), outer)
-    if turn is not None:
-        rotation = np.asarray(cv2.Rodrigues(turn.ravel())[0], float)
-    if rotation is None:
-        raise _lacks(outer, f"R_{name}")
-    translation = matrix_of(extri, f"T_{name}", ((3, 1), (1, 3)), outer)
-    if translation is None:
-        raise _lacks(outer, f"T_{name}")
+    bent = [matrix_of(intri, f"{kind}_{name}", lengths, inner) for kind in ("D", "dist")]
+    coefficients = next((one.ravel() for one in bent if one is not None), np.zeros(0))
+    rotation = needed_matrix(extri, {f"R_{name}": vector, f"Rot_{name}": ((3, 3),)}, outer)
+    if rotation.size == 3:
+        rotation = np.asarray(cv2.Rodrigues(rotation.ravel())[0], float)
+    translation = needed_matrix(extri, {f"T_{name}": vector}, outer)
     w2c = np.concatenate([rotation, translation.reshape(3, 1)], 1)
     sides = [intri.get(f"{side}_{name}") for side in "WH"]
     known = all(isinstance(s, int | float) and not isinstance(s, bool) and 1 <= s < 1e6 for s in sides)
@@ -123,13 +108,9 @@ def _calibration(root: Path, intri: dict[str, Any], extri: dict[str, Any], name:
     return Calibration(name, K, w2c, inner, f"camera {name}", coefficients, size=size)
 
 
-def _lacks(path: Path, key: str) -> UserError:
-    return UserError("a key is missing", file=path, place=key, expected="a matrix", found="nothing", remedy=REMEDY)
-
-
 def _videos(root: Path, subject: Subject) -> tuple[dict[str, dict[str, Picture]], float]:
     """Camera -> frame -> picture, and frames a second."""
-    files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in VIDEOS}
+    files = {path.stem: path for path in inside(root / "videos") if path.suffix.lower() in CONTAINERS}
     if not files:
         pickle = is_regular(root / "annots.npy")
         raise UserError(

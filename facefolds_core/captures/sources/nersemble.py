@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,22 +73,14 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: a participant's folder.
-        subject: its `segment` is the sequence.
-
-    Raises:
-        UserError: if the calibration is missing or garbled, the sequence is not there, or its videos do not run side by
-            side.
-    """
+    """Of a participant's folder; `segment` of the subject is the sequence."""
     check_folder(root, _MISSING)
-    sequence = _chosen(root, subject.segment)
+    sequence = chosen_segment(_sequences(root), subject.segment, root / "sequences", _MISSING, "sequence")
     folder = root / "sequences" / sequence
     if is_folder(folder / "images"):
-        photos, fps = footage(_videos(folder / "images"), subject) if _videos(folder / "images") else ({}, FPS)
-        alpha = footage(_videos(folder / "alpha_maps"), subject)[0] if _videos(folder / "alpha_maps") else {}
+        films, mattes = _videos(folder / "images"), _videos(folder / "alpha_maps")
+        photos, fps = footage(films, subject) if films else ({}, FPS)
+        alpha = footage(mattes, subject)[0] if mattes else {}
     else:
         photos, alpha, fps = _moments(folder)
     sizes = Counter(next(iter(of.values())).size(f"camera {name}") for name, of in photos.items() if of)
@@ -115,10 +106,6 @@ def _calibration_file(root: Path) -> Path | None:
 
 def _sequences(root: Path) -> list[str]:
     return [path.name for path in inside(root / "sequences") if path.is_dir() and path.name != BACKGROUND]
-
-
-def _chosen(root: Path, wanted: str | None) -> str:
-    return chosen_segment(_sequences(root), wanted, root / "sequences", _MISSING, "sequence")
 
 
 def _videos(folder: Path) -> dict[str, Path]:
@@ -176,7 +163,7 @@ def _calibrations(root: Path, image: tuple[int, int]) -> list[Calibration]:
         each = isinstance(inner, dict)
         K = matrix_from(inner[serial] if each else inner, ((3, 3),), path, f"intrinsics, {serial}", _REMEDY)
         size = _size_of(K, image)
-        calibrations.append(Calibration(serial, K, w2c, path, f"camera {serial}", np.zeros(5), size=size))
+        calibrations.append(Calibration(serial, K, w2c, path, f"camera {serial}", size=size))
     return calibrations
 
 
@@ -197,20 +184,13 @@ def _colours(root: Path, sequence: str, serials: list[str]) -> tuple[dict[str, C
             raise UserError(
                 "no colour calibration", file=path, expected="an object", found=short(value), remedy=_REMEDY
             )
-        colours = _read_colours(value, serials, lambda rows, serial: _linear(rows, path, serial))
-        return colours, [fact("colours_corrected", count=len(colours), file=path.name)] if colours else []
-    for folder in (root / "annotations" / sequence, root / "sequences" / sequence / "annotations"):
-        files = {path.stem: path for path in inside(folder / "color_correction") if path.suffix == ".npy"}
-        colours = _read_colours(files, serials, lambda file, _: _affine(file))
-        if colours:
-            return colours, [fact("colours_corrected", count=len(colours), file="color_correction")]
-    return {}, []
-
-
-def _read_colours(
-    values: Mapping[str, Any], serials: list[str], read_one: Callable[[Any, str], Colour]
-) -> dict[str, Colour]:
-    return {serial: read_one(values[serial], serial) for serial in serials if serial in values}
+        colours = {serial: _linear(value[serial], path, serial) for serial in serials if serial in value}
+    else:
+        folders = (root / "annotations" / sequence, root / "sequences" / sequence / "annotations")
+        files = [path for folder in folders for path in inside(folder / "color_correction") if path.suffix == ".npy"]
+        path = next((file.parent for file in files if file.stem in serials), path)
+        colours = {file.stem: _affine(file) for file in files if file.parent == path and file.stem in serials}
+    return colours, [fact("colours_corrected", count=len(colours), file=path.name)] if colours else []
 
 
 def _linear(rows: Any, path: Path, serial: str) -> Colour:

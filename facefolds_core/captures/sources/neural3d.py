@@ -40,14 +40,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: folder with poses_bounds.npy and the videos.
-
-    Raises:
-        UserError: if rows and videos are not as many, a row is no camera, or the videos do not run side by side.
-    """
+    """Of the folder with poses_bounds.npy and the videos."""
     path = root / "poses_bounds.npy"
     rows = read_npy(path, "point `path` at the folder that holds poses_bounds.npy")
     files = _videos(root)
@@ -86,4 +79,4 @@ def _camera(name: str, row: NDArray[np.float64], path: Path, index: int) -> Cali
         )
     K = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     w2c = np.concatenate([rotation, -(rotation @ centre)[:, None]], 1)
-    return Calibration(name, K, w2c, path, place, np.zeros(5), size=(round(width), round(height)))
+    return Calibration(name, K, w2c, path, place, size=(round(width), round(height)))

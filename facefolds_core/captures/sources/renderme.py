@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,17 +56,12 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: an .smc file, or a folder of them.
-        subject: `segment` chooses the performance where there are several.
-
-    Raises:
-        UserError: if files are missing or damaged, have no calibration or pictures, or numbers that cannot be.
-    """
+    """Of an .smc file, or a folder of them, of whose performances `segment` of the subject chooses one."""
     files = _files(root, subject.segment)
-    calibrated = [file for file in files if isinstance(open_hdf5(file).get("Calibration"), h5py.Group)]
+    calibrated = []
+    for file in files:
+        with _sound(file):
+            calibrated += [file] if isinstance(open_hdf5(file).get("Calibration"), h5py.Group) else []
     if not calibrated:
         raise UserError(
             "no calibration",
@@ -74,9 +71,10 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
             found=shorten([file.name for file in files]),
             remedy="put the performance's ..._anno.smc beside ..._raw.smc: it has the calibration",
         )
-    group = open_hdf5(calibrated[0])["Calibration"]
-    size = _resolution(calibrated[0])
-    calibrations = [_calibration(calibrated[0], name, group[name], size) for name in sorted(group)]
+    with _sound(calibrated[0]):
+        group = open_hdf5(calibrated[0])["Calibration"]
+        size = _resolution(calibrated[0])
+        calibrations = [_calibration(calibrated[0], name, group[name], size) for name in sorted(group)]
     return gather(
         root,
         calibrations,
@@ -86,6 +84,15 @@ def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
         fps=FPS,
         pixel_centres=PIXEL_CENTRES,
     )
+
+
+@contextmanager
+def _sound(file: Path) -> Iterator[None]:
+    """What is raised while a damaged file is walked is the user's."""
+    try:
+        yield
+    except (KeyError, OSError, RuntimeError, ValueError) as error:
+        raise UserError("a damaged HDF5 file", file=file, found=str(error), remedy=_REMEDY) from None
 
 
 def _performances(root: Path) -> dict[str, list[Path]]:
@@ -115,11 +122,12 @@ def _pictures(files: list[Path], kind: str) -> dict[str, dict[str, Picture]]:
     """Camera -> frame -> picture, of the first file that has any of the camera."""
     found: dict[str, dict[str, Picture]] = {}
     for file in files:
-        cameras = open_hdf5(file).get("Camera")
-        for name in cameras if isinstance(cameras, h5py.Group) else ():
-            frames = cameras[name].get(kind) if isinstance(cameras[name], h5py.Group) else None
-            if isinstance(frames, h5py.Group) and len(frames) and not found.get(name):
-                found[name] = {frame: Hdf5Picture(file, f"Camera/{name}/{kind}/{frame}") for frame in frames}
+        with _sound(file):
+            cameras = open_hdf5(file).get("Camera")
+            for name in cameras if isinstance(cameras, h5py.Group) else ():
+                frames = cameras[name].get(kind) if isinstance(cameras[name], h5py.Group) else None
+                if isinstance(frames, h5py.Group) and len(frames) and not found.get(name):
+                    found[name] = {frame: Hdf5Picture(file, f"Camera/{name}/{kind}/{frame}") for frame in frames}
     return found
 
 
@@ -140,15 +148,12 @@ def _calibration(file: Path, name: str, group: Any, size: tuple[int, int] | None
     D = _matrix(file, place, group, "D", [(n,) for n in (4, 5, 8)] + [s for n in (4, 5, 8) for s in ((1, n), (n, 1))])
     rotation = RT[:, :3].T
     w2c = np.concatenate([rotation, -(rotation @ RT[:, 3])[:, None]], 1)
-    return Calibration(name, K, w2c, file, place, np.pad(D.ravel(), (0, max(0, 5 - D.size))), size=size)
+    return Calibration(name, K, w2c, file, place, D.ravel(), size=size)
 
 
 def _matrix(file: Path, place: str, group: Any, key: str, shapes: list[tuple[int, ...]]) -> Array:
     value = group.get(key) if isinstance(group, h5py.Group) else None
-    try:
-        found = np.asarray(value[()]) if isinstance(value, h5py.Dataset) else None
-    except (OSError, RuntimeError) as error:
-        raise UserError("a damaged HDF5 file", file=file, place=place, found=str(error), remedy=_REMEDY) from None
+    found = np.asarray(value[()]) if isinstance(value, h5py.Dataset) else None
     if found is None or found.dtype.kind not in "iuf" or found.shape not in shapes:
         what = "nothing" if found is None else f"{found.dtype} {found.shape}"
         expected = f"numbers {' or '.join(map(str, shapes[:2]))}"

@@ -21,12 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facefolds_core.captures.arrangement import REMEDY, Shot, arrange, mean_calibration, wrong
-from facefolds_core.captures.capture import Capture, View, closest_rotation, frame_rate, select_frames
-from facefolds_core.captures.gathering import Calibration, Recognised
-from facefolds_core.captures.images import image_size
-from facefolds_core.captures.lens import make_lens
+from facefolds_core.captures.capture import Capture, closest_rotation, frame_rate, select_frames
+from facefolds_core.captures.gathering import Calibration, Recognised, undistorted
 from facefolds_core.captures.numbers import matrix_from, numbers_from, short
 from facefolds_core.captures.picture import FilePicture, Picture
+from facefolds_core.errors import UserError
 from facefolds_core.facts import fact, shorten
 from facefolds_core.files.reading import is_folder, is_regular, is_there
 from facefolds_core.files.writing import read_json
@@ -52,7 +51,7 @@ class Entry:
     Attributes:
         file, place: where it stands, for messages.
         label: its file_path.
-        image: the file, or None where it is missing.
+        image: the file, which may be missing.
         values: the entry's keys over the global ones.
         w2c: (3, 4) world -> camera, OpenCV axes.
     """
@@ -60,18 +59,20 @@ class Entry:
     file: Path
     place: str
     label: str
-    image: Path | None
+    image: Path
     values: dict[str, Any]
     w2c: Array
 
-    @property
-    def time(self) -> float | None:
-        return None if self.values.get("time") is None else _number(self, "time")
+    def number(self, key: str, default: float = 0.0) -> float:
+        """The value of a key, or `default` where it is not there."""
+        if key not in self.values:
+            return default
+        limit = LATEST if key == "time" else HUGE
+        return float(numbers_from([self.values[key]], self.file, f"{self.place}, {key}", REMEDY, limit)[0])
 
-
-def _number(entry: Entry, key: str) -> float:
-    limit = LATEST if key == "time" else HUGE
-    return float(numbers_from([entry.values[key]], entry.file, f"{entry.place}, {key}", REMEDY, limit)[0])
+    def wrong(self, message: str, expected: object, found: object, key: str = "", remedy: str = REMEDY) -> UserError:
+        """The error for the entry, or for a key of it."""
+        return wrong(self.file, f"{self.place}, {key}" if key else self.place, message, expected, found, remedy)
 
 
 def recognise(root: Path) -> Recognised | None:
@@ -88,20 +89,7 @@ def recognise(root: Path) -> Recognised | None:
 
 
 def read(root: Path, subject: Subject, params: CaptureParams) -> Capture:
-    """See `read_transforms`."""
-    return read_transforms(root, subject)
-
-
-def read_transforms(root: Path, subject: Subject) -> Capture:
-    """Read everything but the pixels.
-
-    Args:
-        root: the folder with transforms.json, or that file.
-        subject: its `frames`, `pixel_centres` and `fps` are used.
-
-    Raises:
-        UserError: if the file is missing, garbled, lacks a key or has a matrix that is none; names the entry and key.
-    """
+    """Of the folder with transforms.json, or of that file."""
     path = root if root.suffix == ".json" and not is_folder(root) else root / "transforms.json"
     remedy = "point `path` at the folder that holds transforms.json, or make the file again"
     value = read_json(path, remedy=remedy)
@@ -109,44 +97,34 @@ def read_transforms(root: Path, subject: Subject) -> Capture:
         raise wrong(path, "top level", "no frames", "an object with a list `frames`", type(value).__name__)
     common = {key: entry for key, entry in value.items() if key != "frames"}
     entries = [_entry(e, common, path, f"frames[{i}]") for i, e in enumerate(value["frames"])]
-    left_out = [fact("image_missing", place=e.place, image=e.label) for e in entries if e.image is None]
-    present = [e for e in entries if e.image is not None]
+    present = [e for e in entries if is_there(e.image)]
+    left_out = [fact("image_missing", place=e.place, image=e.label) for e in entries if not is_there(e.image)]
     if not present:
-        raise wrong(
-            path,
-            "frames",
-            "none of the images exists",
-            f"{entries[0].label} beside transforms.json",
-            "no such file",
-            "copy the images there, or correct file_path",
-        )
+        expected, remedy = f"{entries[0].label} beside transforms.json", "copy the images there, or correct file_path"
+        raise wrong(path, "frames", "none of the images exists", expected, "no such file", remedy)
     arranged = arrange([_shot(entry) for entry in present], path)
-    what = f"`{path.name}`"
-    frames = select_frames(arranged.frames, subject.frames, path, what)
+    frames = select_frames(arranged.frames, subject.frames, path, f"`{path.name}`")
     centres = PIXEL_CENTRES if subject.pixel_centres is None else subject.pixel_centres
     members = {name: [present[i] for i in of] for name, of in arranged.cameras.items()}
-    each = [_calibrations(name, some, centres, path) for name, some in members.items()]
-    views = tuple(_view(mean_calibration(some)) for some in each)
+    means = [mean_calibration(_calibrations(name, some, centres)) for name, some in members.items()]
+    views = tuple(undistorted(one, one.K, one.w2c, one.size or (0, 0)) for one in means)
     position = {name: f for f, name in enumerate(frames)}
     images: dict[tuple[int, int], Picture] = {}
     for c, of in enumerate(arranged.cameras.values()):
         for i in of:
-            name, entry = arranged.frame_of[i], present[i]
-            if name in position and entry.image is not None:
-                if (c, position[name]) in images:
-                    raise wrong(
-                        path, entry.place, "an image appears twice", "one entry a camera and frame", entry.label
-                    )
-                images[c, position[name]] = FilePicture(entry.image)
+            if arranged.frame_of[i] in position:
+                key = c, position[arranged.frame_of[i]]
+                if key in images:
+                    raise present[i].wrong("an image appears twice", "one entry a camera and frame", present[i].label)
+                images[key] = FilePicture(present[i].image)
     rate = frame_rate(subject, FPS, len(frames))
     return Capture(path.parent, views, tuple(frames), rate, images, {}, None, tuple(left_out))
 
 
 def _entry(value: Any, common: dict[str, Any], path: Path, place: str) -> Entry:
     if not isinstance(value, dict):
-        raise wrong(
-            path, place, "an entry that is no object", "{file_path, transform_matrix, ...}", type(value).__name__
-        )
+        expected = "{file_path, transform_matrix, ...}"
+        raise wrong(path, place, "an entry that is no object", expected, type(value).__name__)
     label = value.get("file_path")
     if not isinstance(label, str) or not label:
         raise wrong(path, f"{place}, file_path", "a key is missing", "the path of an image", short(label))
@@ -156,14 +134,12 @@ def _entry(value: Any, common: dict[str, Any], path: Path, place: str) -> Entry:
     return Entry(path, place, label, _find(path.parent, label), common | value, _w2c(value, path, place))
 
 
-def _find(folder: Path, label: str) -> Path | None:
+def _find(folder: Path, label: str) -> Path:
     """The image's file; instant-ngp also writes paths without extension."""
-    candidates = [folder / label] + [
-        folder / f"{label}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".JPG", ".PNG")
-    ]
-    found = [candidate for candidate in candidates if is_regular(candidate)]
+    candidates = [folder / f"{label}{suffix}" for suffix in ("", ".png", ".jpg", ".jpeg", ".JPG", ".PNG")]
     # What is there but no file (a FIFO, a folder, a broken link) is refused when it is opened, not taken for missing.
-    return next(iter(found), None) or next((candidate for candidate in candidates if is_there(candidate)), None)
+    there = [candidate for candidate in candidates if is_there(candidate)]
+    return next((candidate for candidate in there if is_regular(candidate)), (there or candidates)[0])
 
 
 def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
@@ -174,13 +150,8 @@ def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
         raise wrong(path, place, "a camera matrix whose last row is not 0 0 0 1", "[0, 0, 0, 1]", c2w[3].tolist())
     rotation = c2w[:3, :3] @ np.diag([1.0, -1.0, -1.0])
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-        raise wrong(
-            path,
-            place,
-            "a camera matrix is no rotation and translation",
-            "orthonormal columns, determinant +1",
-            f"det = {np.linalg.det(c2w[:3, :3]):.6g}",
-        )
+        expected, found = "orthonormal columns, determinant +1", f"det = {np.linalg.det(c2w[:3, :3]):.6g}"
+        raise wrong(path, place, "a camera matrix is no rotation and translation", expected, found)
     inverse = closest_rotation(np.concatenate([rotation.T, np.zeros((3, 1))], 1))
     inverse[:, 3] = -inverse[:, :3] @ c2w[:3, 3]
     return inverse
@@ -188,83 +159,62 @@ def _w2c(value: dict[str, Any], path: Path, place: str) -> Array:
 
 def _shot(entry: Entry) -> Shot:
     path = PurePosixPath(entry.label)
-    name = path.name if entry.image is None or entry.image.suffix != path.suffix else path.stem
-    return Shot(name, path.parent.name, entry.time, entry.w2c)
+    time = None if entry.values.get("time") is None else entry.number("time")
+    return Shot(path.stem if entry.image.suffix == path.suffix else path.name, path.parent.name, time, entry.w2c)
 
 
-def _calibrations(name: str, entries: list[Entry], pixel_centres: float, path: Path) -> list[Calibration]:
+def _calibrations(name: str, entries: list[Entry], pixel_centres: float) -> list[Calibration]:
     """Those of a camera's entries; one where all are the same, as they mostly are."""
     keys = (*_KEYS, *_DISTORTION, *_FISHEYE)
     given = {(np.round(e.w2c, 7).tobytes(), *(repr(e.values.get(key)) for key in keys)) for e in entries}
-    return [_calibration(name, entry, pixel_centres, path) for entry in (entries if len(given) > 1 else entries[:1])]
+    return [_calibration(name, entry, pixel_centres) for entry in (entries if len(given) > 1 else entries[:1])]
 
 
-def _calibration(name: str, entry: Entry, pixel_centres: float, path: Path) -> Calibration:
+def _calibration(name: str, entry: Entry, pixel_centres: float) -> Calibration:
     """Of one entry; K in continuous pixel coordinates."""
-    assert entry.image is not None
-    width, height = image_size(entry.image, f"camera {name}")
-    fisheye = _is_fisheye(entry, path)
+    width, height = FilePicture(entry.image).size(f"camera {name}")
+    fisheye = _is_fisheye(entry)
     for key, size in (("w", width), ("h", height)):
-        if key in entry.values and _number(entry, key) != size:
-            raise wrong(
-                path,
-                f"{entry.place}, {key}",
-                "the image has another size than transforms.json says",
-                entry.values[key],
-                f"{width} x {height} in {entry.image}",
-                "use the images that the file was made for",
-            )
-    fx, fy = _focal(entry, width, height, path)
+        if entry.number(key, size) != size:
+            message = "the image has another size than transforms.json says"
+            found = f"{width} x {height} in {entry.image}"
+            raise entry.wrong(message, entry.values[key], found, key, "use the images that the file was made for")
+    fx, fy = _focal(entry, width, height)
     shift = 0.5 - pixel_centres
-    cx = _number(entry, "cx") + shift if "cx" in entry.values else width / 2
-    cy = _number(entry, "cy") + shift if "cy" in entry.values else height / 2
+    cx, cy = entry.number("cx", width / 2 - shift) + shift, entry.number("cy", height / 2 - shift) + shift
     K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    check_camera(Camera(name, K, entry.w2c, width, height), path, entry.place)
-    given = [_number(entry, key) if key in entry.values else 0.0 for key in (_FISHEYE if fisheye else _DISTORTION)]
-    return Calibration(name, K, entry.w2c, path, entry.place, np.array(given), fisheye, (width, height))
+    check_camera(Camera(name, K, entry.w2c, width, height), entry.file, entry.place)
+    given = [entry.number(key) for key in (_FISHEYE if fisheye else _DISTORTION)]
+    return Calibration(name, K, entry.w2c, entry.file, entry.place, np.array(given), fisheye, (width, height))
 
 
-def _view(calibration: Calibration) -> View:
-    """The camera of an entry, distortion taken out."""
-    c = calibration
-    assert c.size is not None
-    lens = make_lens(c.K, c.coefficients, *c.size, c.file, c.place, c.fisheye)
-    return View(Camera(c.name, c.K if lens is None else lens.pinhole, c.w2c, *c.size), lens)
-
-
-def _is_fisheye(entry: Entry, path: Path) -> bool:
+def _is_fisheye(entry: Entry) -> bool:
     model = str(entry.values.get("camera_model", "OPENCV")).upper()
     fisheye = entry.values.get("is_fisheye", False)
     if not isinstance(fisheye, bool):
-        raise wrong(path, f"{entry.place}, is_fisheye", "neither true nor false", "true or false", short(fisheye))
+        raise entry.wrong("neither true nor false", "true or false", short(fisheye), "is_fisheye")
     if fisheye or model == "OPENCV_FISHEYE":
         return True
-    fourth = entry.values.get("k4") is not None and _number(entry, "k4") != 0
+    fourth = entry.values.get("k4") is not None and entry.number("k4") != 0
     if model not in _PINHOLES or fourth:
-        raise wrong(
-            path,
-            entry.place,
-            "a camera model that is not read",
-            f"OPENCV_FISHEYE, {shorten(_PINHOLES)}; k1 k2 p1 p2 k3 at most, of a fisheye k1 k2 k3 k4",
-            "k4" if fourth else short(entry.values.get("camera_model")),
-            "undistort the images first",
-        )
+        expected = f"OPENCV_FISHEYE, {shorten(_PINHOLES)}; k1 k2 p1 p2 k3 at most, of a fisheye k1 k2 k3 k4"
+        found = "k4" if fourth else short(entry.values.get("camera_model"))
+        raise entry.wrong("a camera model that is not read", expected, found, remedy="undistort the images first")
     return False
 
 
-def _focal(entry: Entry, width: int, height: int, path: Path) -> tuple[float, float]:
+def _focal(entry: Entry, width: int, height: int) -> tuple[float, float]:
     """(fx, fy) in pixels, from fl_x / fl_y or the angles of view."""
-    values = entry.values
     focal = {}
     for axis, size in (("x", width), ("y", height)):
-        if f"fl_{axis}" in values:
-            focal[axis] = _number(entry, f"fl_{axis}")
-        elif f"camera_angle_{axis}" in values:
-            angle = _number(entry, f"camera_angle_{axis}")
+        if f"fl_{axis}" in entry.values:
+            focal[axis] = entry.number(f"fl_{axis}")
+        elif f"camera_angle_{axis}" in entry.values:
+            angle = entry.number(f"camera_angle_{axis}")
             if not 0 < angle < math.pi:
-                raise wrong(path, entry.place, f"camera_angle_{axis} is no angle of view", "radians in (0, pi)", angle)
+                raise entry.wrong(f"camera_angle_{axis} is no angle of view", "radians in (0, pi)", angle)
             focal[axis] = size / 2 / math.tan(angle / 2)
     if not focal:
-        raise wrong(path, entry.place, "no focal length", "fl_x (and fl_y) or camera_angle_x", "neither")
+        raise entry.wrong("no focal length", "fl_x (and fl_y) or camera_angle_x", "neither")
     fx = focal.get("x", focal.get("y", 0.0))
     return fx, focal.get("y", fx)

@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from facefolds_core.errors import UserError
 from tests.captures.fixtures import pattern, save
-from tests.filmed import check_same, film, reader, save_video, scene_of
+from tests.filmed import Reader, check_same, film, save_video, scene_of
 
-read = reader("easymocap")
+read = Reader("easymocap")
 
 
 def write_calibration(root: Path) -> None:
@@ -142,18 +141,16 @@ def test_labels_of_parts_are_opaque_and_opacity_stays(tmp_path: Path) -> None:
     assert np.unique(capture.mattes[1, 0].opacity("")).tolist() == [0, 130]
 
 
-def test_of_several_folders_of_masks_one_is_read_and_named(filmed: Path, tmp_path: Path) -> None:
-    root = Path(shutil.copytree(filmed, tmp_path / "two"))
-    shutil.copytree(root / "mask", root / "mask_cihp")
-    assert [str(one) for one in read(root).left_out] == [
+def test_of_several_folders_of_masks_one_is_read_and_named(copied: Path) -> None:
+    shutil.copytree(copied / "mask", copied / "mask_cihp")
+    assert [str(one) for one in read(copied).left_out] == [
         "note: masks are those of the folder mask; mask_cihp are not read"
     ]
 
 
-def test_a_camera_without_pictures_and_one_without_calibration_are_left_out(filmed: Path, tmp_path: Path) -> None:
-    root = Path(shutil.copytree(filmed, tmp_path / "some"))
-    (root / "images" / "A001").rename(root / "images" / "extra")
-    kinds = {(one.kind, one.camera) for one in read(root).left_out}
+def test_a_camera_without_pictures_and_one_without_calibration_are_left_out(copied: Path) -> None:
+    (copied / "images" / "A001").rename(copied / "images" / "extra")
+    kinds = {(one.kind, one.camera) for one in read(copied).left_out}
     assert kinds == {("no_images", "A001"), ("uncalibrated", "extra")}
 
 
@@ -178,15 +175,10 @@ BAD = [
 def test_what_is_wrong_with_the_calibration_is_said(
     tmp_path: Path, intri: str, extri: str, message: str, word: str
 ) -> None:
-    with pytest.raises(UserError) as caught:
-        read(write_example(tmp_path, intri, extri))
-    assert message in caught.value.message
-    assert word in str(caught.value)
+    read.refused(write_example(tmp_path, intri, extri), message, word)
 
 
 def test_neither_pictures_nor_videos_is_said(tmp_path: Path) -> None:
     write_calibration(tmp_path)
     (tmp_path / "annots.npy").touch()
-    with pytest.raises(UserError, match="neither pictures nor videos") as caught:
-        read(tmp_path)
-    assert "annots.npy is a pickle" in str(caught.value)
+    read.refused(tmp_path, "neither pictures nor videos", "annots.npy is a pickle")
