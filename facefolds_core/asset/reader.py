@@ -70,8 +70,6 @@ class AssetLevel:
         Raises:
             UserError: if its picture is damaged.
         """
-        if self.entry.reflection is not None:
-            refuse_changed(self.folder, self.entry.reflection)
         return read_reflection(self.folder, self.entry)
 
     @property

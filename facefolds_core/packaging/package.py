@@ -16,11 +16,11 @@ from facefolds_core.asset.audio import encode_sound
 from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.inputs import check_inputs
-from facefolds_core.asset.manifest import Level, Manifest
+from facefolds_core.asset.manifest import Level, Manifest, Reflection
 from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.asset.stored import stored_file
 from facefolds_core.asset.streams import make_streams
 from facefolds_core.asset.track_file import read_track
@@ -95,9 +95,9 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
                 levels.append(coded)
             level = coded_level(temporary, FULL, full, LevelSetting.of(params), meter, cameras)
         if export.reflection is not None:
-            picture = ReflectionPicture.of(export.reflection)
-            levels = [_with_reflection(temporary, one, picture) for one in levels]
-            level = _with_reflection(temporary, level, picture)
+            packed = pack_reflection(export.reflection)
+            levels = [_with_reflection(temporary, one, *packed) for one in levels]
+            level = _with_reflection(temporary, level, *packed)
         photos = _photos(temporary, scene, params)
         manifest = _with_extras(temporary, manifest_of(source, [*levels, level], temporary), scene, photos)
         if streamed:
@@ -118,11 +118,11 @@ def _check_order(levels: Sequence[LevelParams]) -> None:
             )
 
 
-def _with_reflection(folder: Path, level: Level, picture: ReflectionPicture) -> Level:
+def _with_reflection(folder: Path, level: Level, png: bytes, said: dict[str, Any]) -> Level:
     """Add the reflection to a level; each has its own copy, a few kB: a level is complete in itself."""
     path = folder / f"{level.name}_reflection.png"
-    path.write_bytes(picture.png())
-    entry = reflection_entry(picture, stored_file(path).model_dump())
+    path.write_bytes(png)
+    entry = Reflection(**stored_file(path).model_dump(), **said)
     return level.model_copy(update={"reflection": entry, "bytes": level.bytes + entry.bytes})
 
 

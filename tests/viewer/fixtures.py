@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset.manifest import Manifest
+from facefolds_core.asset.manifest import Manifest, Reflection
 from facefolds_core.asset.manifest_file import parse_manifest, write_manifest
-from facefolds_core.asset.reflection import ReflectionPicture, reflection_entry
+from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
 from tests.assets import make_asset
@@ -92,9 +92,10 @@ def random_reflection() -> ReflectionMaps:
 
 def reflection_of(folder: Path) -> dict[str, Any]:
     """Write the picture of `random_reflection`; what a level's manifest says of it."""
-    picture = ReflectionPicture.of(random_reflection())
-    (folder / "full_reflection.png").write_bytes(picture.png())
-    return reflection_entry(picture, file_entry(folder / "full_reflection.png")).model_dump(mode="json")
+    png, said = pack_reflection(random_reflection())
+    (folder / "full_reflection.png").write_bytes(png)
+    entry = Reflection.model_validate(file_entry(folder / "full_reflection.png") | said)
+    return entry.model_dump(mode="json")
 
 
 def add_reflection(folder: Path) -> None:
