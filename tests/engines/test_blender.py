@@ -9,7 +9,7 @@ import pytest
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.gltf.writing import write_layered
-from facefolds_core.engines.usd import STAGE, write_usd
+from facefolds_core.engines.usd import STAGE, export
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
@@ -37,7 +37,7 @@ def test_five_cameras_agree_with_the_reference(tmp_path: Path, kind: str) -> Non
     if kind == "glb":
         write_glb(tmp_path / "a.glb", asset.full, "caps", frame=frame)
     else:
-        write_usd(tmp_path / "usd", asset.full, "caps")
+        export(tmp_path / "usd", asset.full, "caps")
     found = pictures(tmp_path / "a.glb" if kind == "glb" else tmp_path / "usd" / STAGE, cameras, GREY_VALUE)
     expected = expected_pictures(asset, cameras, [frame])
     scores = {name: psnr(picture, expected[name, frame]) for name, picture in found.items()}

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.engines.godot import CONTENTS, write_godot
+from facefolds_core.engines.godot import CONTENTS, export
 from facefolds_core.rendering import AssetCaster, composite
 from facefolds_core.rendering.reference import room_from
 from facefolds_core.rendering.reflection import reflected_colours
@@ -39,7 +39,7 @@ def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 @pytest.fixture(scope="module")
 def exported(caps: Asset) -> Path:
     folder = caps.folder.parent / "godot"
-    write_godot(folder, caps.full, "caps")
+    export(folder, caps.full, "caps")
     return folder
 
 
@@ -76,7 +76,7 @@ def test_reflections_agree_with_the_reference(caps: Asset, tmp_path: Path) -> No
     shutil.copytree(caps.folder, tmp_path / "asset")
     add_reflection(tmp_path / "asset")
     level, cameras = read_asset(tmp_path / "asset").full, five_cameras(SIZE)[:2]
-    write_godot(tmp_path / "godot", level, "caps")
+    export(tmp_path / "godot", level, "caps")
     found = pictures(tmp_path / "godot", cameras, (2,), GREY_VALUE)
     maps, plain = level.reflection(), expected_pictures(caps, cameras, (2,))
     assert maps is not None
@@ -93,7 +93,7 @@ def test_a_head_that_moves_stands_where_it_stood_and_the_light_stays(caps: Asset
     shutil.copytree(caps.folder, tmp_path / "asset")
     add_reflection(tmp_path / "asset")
     level, camera, frame = with_track(read_asset(tmp_path / "asset").full, 40), five_cameras(SIZE)[1], 4
-    write_godot(tmp_path / "godot", level, "caps")
+    export(tmp_path / "godot", level, "caps")
     found = pictures(tmp_path / "godot", [camera], (frame,), GREY_VALUE)[camera.name, frame]
     maps, seen_by = level.reflection(), level.camera_in_head(camera, frame)
     assert maps is not None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset import Asset, read_asset
-from facefolds_core.engines.usd import STAGE, write_usd
+from facefolds_core.engines.usd import STAGE, export
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
 from tests.engines.tracks import with_track
@@ -32,7 +32,7 @@ def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 
 @pytest.fixture(scope="module")
 def exported(caps: Asset) -> Path:
-    write_usd(caps.folder.parent / "usd", caps.full, "caps")
+    export(caps.folder.parent / "usd", caps.full, "caps")
     return caps.folder.parent / "usd"
 
 
@@ -61,7 +61,7 @@ def test_the_checker_finds_a_missing_picture(exported: Path, tmp_path: Path) -> 
 
 
 def test_a_package_is_whole(caps: Asset, tmp_path: Path) -> None:
-    write_usd(tmp_path / "face.usdz", caps.full, "caps")
+    export(tmp_path / "face.usdz", caps.full, "caps")
     assert complaints(tmp_path / "face.usdz") == []
     assert [path.name for path in tmp_path.iterdir()] == ["face.usdz"]
 
@@ -129,7 +129,7 @@ def test_a_head_that_moves_has_its_pose_in_each_frame(caps: Asset, tmp_path: Pat
     from pxr import Gf, UsdGeom
 
     level = with_track(caps.full)
-    write_usd(tmp_path / "usd", level, "caps")
+    export(tmp_path / "usd", level, "caps")
     stage = opened(tmp_path / "usd" / STAGE)
     head = stage.GetPrimAtPath("/Face/Head")
     assert level.track is not None
@@ -143,5 +143,5 @@ def test_a_head_that_moves_has_its_pose_in_each_frame(caps: Asset, tmp_path: Pat
 def test_a_folder_with_other_files_is_left_alone(caps: Asset, tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("mine")
     with pytest.raises(UserError, match="not empty"):
-        write_usd(tmp_path, caps.full, "caps")
+        export(tmp_path, caps.full, "caps")
     assert (tmp_path / "precious").is_file()
