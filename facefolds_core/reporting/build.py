@@ -106,7 +106,7 @@ def context(subject: Subject) -> dict[str, Any]:
     """What the template prints, section by section; empty where there is nothing to show."""
     facts, manifest, scene = subject.facts, subject.asset.manifest, subject.scene
     key = headline(facts.metrics)
-    places = {camera.name: tables.place_of(camera) for camera in scene.cameras} if scene else {}
+    places = {camera.name: tables.degrees_from_front(camera) for camera in scene.cameras} if scene else {}
     poster, sheet = subject.asset.folder / "poster.jpg", subject.evaluation / "contact_sheet.png"
     return {
         "subject": facts.metrics.get("subject", manifest.subject),
@@ -180,7 +180,7 @@ def worst(subject: Subject) -> dict[str, str] | None:
 def films(subject: Subject) -> dict[str, Any]:
     """Films of the held-out cameras, as many as the page has room for."""
     scene = subject.scene
-    places = {camera.name: tables.place_of(camera).angle for camera in scene.cameras} if scene else {}
+    places = {camera.name: tables.degrees_from_front(camera) for camera in scene.cameras} if scene else {}
     kept, left, room = list[dict[str, Any]](), 0, MOST_FILM_BYTES
     for film in sorted(read_films(subject.evaluation), key=lambda one: places.get(one.camera, 0.0)):
         path = subject.evaluation / film.file

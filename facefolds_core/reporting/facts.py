@@ -13,26 +13,11 @@ import pyarrow.parquet as pq
 
 from facefolds_core.errors import UserError
 from facefolds_core.files.paths import SubjectFolders
-from facefolds_core.files.reading import check_regular, is_there, no_memory
+from facefolds_core.files.reading import STAGE_OUTPUTS, check_regular, is_there, no_memory
 from facefolds_core.files.writing import read_json
 from facefolds_core.scoring.panels import HEADLINES
 
 REMEDY = "make it with `dvc repro` (on a fresh machine: `make repro`)"
-
-STAGE_OUTPUTS: dict[str, tuple[str, ...]] = {
-    "capture": ("capture",),
-    "normalize": ("scene",),
-    "subject": ("subject",),
-    "train": ("model", "training"),
-    "sample": ("samples",),
-    "reconstruct": ("surfaces",),
-    "decimate": ("meshes",),
-    "texture": ("resampled",),
-    "bake": ("textures",),
-    "compress": ("asset", "asset.glb"),
-    "evaluate": ("evaluation", "metrics.json"),
-}
-"""What each stage leaves in data/<subject>, in the order in which they run."""
 
 
 @dataclass(frozen=True)
