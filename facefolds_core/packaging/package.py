@@ -8,8 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.audio import encode_sound
@@ -29,6 +27,7 @@ from facefolds_core.captures.scene import Scene
 from facefolds_core.errors import UserError
 from facefolds_core.files.frame_store import FrameStore
 from facefolds_core.files.writing import atomic_folder
+from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
@@ -140,14 +139,7 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))
     camera = write_poster(path, manifest, side, JPEG_QUALITY)
-    update["poster"] = Poster(
-        **stored_file(path).model_dump(),
-        width=camera.width,
-        height=camera.height,
-        K=_rows(camera.K),
-        w2c=_rows(camera.w2c),
-        background=BACKGROUND,
-    )
+    update["poster"] = Poster(**stored_file(path).model_dump(), **_taken_by(camera), background=BACKGROUND)
     return manifest.model_copy(update=update)
 
 
@@ -169,19 +161,12 @@ def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:
         path = folder / f"photo_{index:02d}.jpg"
         Image.fromarray(store.image(*key)).save(path, quality=JPEG_QUALITY)
         camera = scene.cameras[key[0]]
-        found.append(
-            Photo(
-                **stored_file(path).model_dump(),
-                width=camera.width,
-                height=camera.height,
-                camera=camera.name,
-                frame=key[1],
-                K=_rows(camera.K),
-                w2c=_rows(camera.w2c),
-            )
-        )
+        stored = stored_file(path).model_dump()
+        found.append(Photo(**stored, **_taken_by(camera), camera=camera.name, frame=key[1]))
     return found
 
 
-def _rows(matrix: NDArray[np.float64]) -> Any:
-    return tuple(tuple(float(x) for x in row) for row in matrix)
+def _taken_by(camera: Camera) -> dict[str, Any]:
+    """What a manifest says of a picture's size and camera."""
+    K, w2c = (tuple(map(tuple, matrix.tolist())) for matrix in (camera.K, camera.w2c))
+    return {"width": camera.width, "height": camera.height, "K": K, "w2c": w2c}
