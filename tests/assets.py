@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,18 @@ from facefolds_core.files.writing import atomic_folder
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
+from facefolds_core.geometry.track import Track
 from facefolds_core.params import CompressParams, MeshCodec, VideoCodec
+from tests.geometry.test_track import SHIFTS, TURNS
 
 CENTRE = (-0.25, 0.0, 0.0)
 WINDOW: Window = (-0.5, 0.5, -0.4, 0.4)
 SOURCE = AssetSource(
     "caps", 30.0, Similarity(2.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.3])), CENTRE
 )
+TRACK = Track.of(TURNS, SHIFTS)
+MOVING = replace(SOURCE, track=TRACK)
+"""A head that moves, for three frames."""
 
 PLAIN = CompressParams(
     mesh=MeshCodec(max_error_pixels=None, compression_level=0),

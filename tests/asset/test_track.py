@@ -17,21 +17,18 @@ from facefolds_core.asset.glb import write_glb
 from facefolds_core.asset.manifest_file import SCHEMA_PATH
 from facefolds_core.asset.validation import validate_asset
 from facefolds_core.errors import UserError
-from facefolds_core.geometry.track import Track
 from facefolds_core.rendering import render_asset
-from tests.assets import SOURCE, make_asset
-from tests.geometry.test_track import SHIFTS, TURNS
+from tests.assets import MOVING, TRACK, make_asset
+from tests.geometry.test_track import SHIFTS
 from tests.gltf_files import opened
 from tests.hostile.fuzz_assets import seal
 from tests.scenes import look_at_origin
-
-TRACK = Track.of(TURNS, SHIFTS)
 
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     folder = tmp_path_factory.mktemp("track") / "asset"
-    make_asset(folder, layers=2, frames=3, resolution=32, source=replace(SOURCE, track=TRACK))
+    make_asset(folder, layers=2, frames=3, resolution=32, source=MOVING)
     return read_asset(folder)
 
 
@@ -93,7 +90,7 @@ def test_a_damaged_track_is_refused(asset: Asset, tmp_path: Path) -> None:
 def test_a_picture_shows_the_head_where_it_stood(asset: Asset) -> None:
     """As the camera that moved against it would see a head that stands still."""
     camera = look_at_origin("side", 25, 10, 24)
-    still = replace(asset, levels=tuple(replace(level, track=None) for level in asset.levels))
+    still = replace(asset, track=None)
     assert asset.track is not None
     moved, _ = render_asset(asset, camera, 2)
     expected, _ = render_asset(still, camera.transformed(asset.track.at(2).inverse()), 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -17,8 +16,7 @@ from facefolds_core.rendering.pixels import SIDE, finer, pixel_means, render
 from facefolds_core.rendering.raster import cast_layers
 from facefolds_core.rendering.reference import Layered
 from facefolds_core.rendering.reflection import reflected_colours
-from tests.asset.test_track import TRACK
-from tests.assets import SOURCE, make_asset
+from tests.assets import MOVING, make_asset
 from tests.pictures import psnr
 from tests.rendering.test_raster import Meshes, bumpy
 from tests.scenes import look_at_origin
@@ -67,7 +65,7 @@ def test_an_asset_is_seen_with_its_reflection_and_without(tmp_path: Path) -> Non
 
 def test_the_plain_picture_and_the_compiled_one_are_the_same(tmp_path: Path) -> None:
     """More rows than are cast at once; an asset whose head turns, and a background that is a picture."""
-    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=48, source=replace(SOURCE, track=TRACK))
+    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=48, source=MOVING)
     asset, camera = read_asset(tmp_path / "asset"), look_at_origin("camera", 30, 10, 150)
     background = np.random.default_rng(0).uniform(0, 1, (150, 150, 3)).astype(np.float32)
     plain = render(asset, camera, 2, background)

@@ -17,7 +17,6 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
 from facefolds_core.system.locks import holding
 from tests.viewer.captured import captured
-from tests.viewer.fixtures import rich_asset
 
 PATIENCE = 60_000
 """Milliseconds for what takes one: software rendering on a busy machine."""
@@ -41,18 +40,6 @@ def player_folder(project_root: Path, tmp_path_factory: pytest.TempPathFactory) 
             subprocess.run([npm, "run", "--silent", "build"], cwd=source, check=True, capture_output=True)
             done.touch()
     return source / "dist"
-
-
-@pytest.fixture(scope="session")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An asset with all that the format knows, not to be changed."""
-    return rich_asset(tmp_path_factory.mktemp("rich") / "asset")
-
-
-@pytest.fixture
-def rich_copy(rich: Path, tmp_path: Path) -> Path:
-    """The same, to spoil."""
-    return Path(shutil.copytree(rich, tmp_path / "asset"))
 
 
 class Player:

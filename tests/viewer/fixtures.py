@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from facefolds_core.asset import Asset, read_asset
 from facefolds_core.asset.manifest import Manifest, Reflection
 from facefolds_core.asset.manifest_file import parse_manifest, write_manifest
 from facefolds_core.asset.reflection import pack_reflection
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.params import CompressParams, VideoCodec
-from tests.assets import make_asset
+from tests.assets import MOVING, make_asset
 from tests.scenes import look_at_origin
 
 THREE_CODECS = CompressParams(video=VideoCodec(codec=("h264", "vp9", "av1"), crf=8, preset="slow", keyframe_interval=4))
@@ -102,6 +103,13 @@ def add_reflection(folder: Path) -> None:
     """`random_reflection` in the full level."""
     entry = reflection_of(folder)
     change_manifest(folder, lambda value: value["levels"][-1].update(reflection=entry))
+
+
+def moving_asset(folder: Path, **options: Any) -> Asset:
+    """Three frames of a head that moves in the light of its room: all that the extension of glTF says."""
+    make_asset(folder, frames=3, source=MOVING, **options)
+    add_reflection(folder)
+    return read_asset(folder)
 
 
 def photo_entry(folder: Path, index: int, frame: int) -> dict[str, Any]:

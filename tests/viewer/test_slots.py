@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,7 @@ from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
 from facefolds_core.geometry.sphere_uv import uv_to_st
-from tests.asset.test_track import TRACK
-from tests.assets import SOURCE, make_asset
+from tests.assets import MOVING, TRACK, make_asset
 from tests.viewer.conftest import NewPlayer, Player, page_of_yours
 
 PLACE = (0.12, -0.1)
@@ -66,7 +64,7 @@ def test_a_hotspot_stands_at_its_place_from_every_side(new_player: NewPlayer, ri
 def test_a_hotspot_follows_a_head_that_moves(new_player: NewPlayer, tmp_path: Path) -> None:
     """From frame to frame, as it plays, and back to rest where the head is held still."""
     asset = tmp_path / "asset"
-    make_asset(asset, layers=3, frames=3, resolution=64, source=replace(SOURCE, track=TRACK))
+    make_asset(asset, layers=3, frames=3, resolution=64, source=MOVING)
     player = opened(new_player, asset, HOTSPOT, 'loop="false"')
     point = point_of(asset)
     places = [place_of(player, TRACK.at(frame).apply(point)) for frame in range(3)]
