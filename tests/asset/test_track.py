@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from dataclasses import replace
@@ -21,8 +20,9 @@ from facefolds_core.rendering import render_asset
 from tests.assets import MOVING, TRACK, make_asset
 from tests.geometry.test_track import SHIFTS
 from tests.gltf_files import opened
-from tests.hostile.fuzz_assets import seal
+from tests.hostile.fuzz_assets import edit, put
 from tests.scenes import look_at_origin
+from tests.viewer.fixtures import file_entry
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +69,7 @@ def test_a_wrong_track_is_a_problem(asset: Asset, row: list[float] | None, says:
     folder = Path(shutil.copytree(asset.folder, tmp_path / "asset"))
     poses = POSES[:2] if row is None else np.array([*POSES[:2], row], "<f4")
     (folder / "track.bin").write_bytes(poses.tobytes())
-    value = json.loads((folder / "manifest.json").read_text())
-    entry = {"file": "track.bin", "bytes": poses.nbytes, "sha256": hashlib.sha256(poses.tobytes()).hexdigest()}
-    seal(folder, value | {"track_file": entry})
+    edit(folder, put("track_file", to=file_entry(folder / "track.bin")))
     (found,) = validate_asset(folder)
     assert says in found
     with pytest.raises(UserError, match=says):
