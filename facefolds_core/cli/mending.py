@@ -64,7 +64,7 @@ def _while_dvc_waits(guard: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        lock.release()
+        lock.close()
 
 
 def is_lockfile(path: Path) -> bool:

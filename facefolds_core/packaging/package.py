@@ -15,7 +15,7 @@ from facefolds_core.asset.cropping import crop_layers
 from facefolds_core.asset.filmed import filmed_view
 from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest import Level, Manifest, Reflection
-from facefolds_core.asset.manifest_extras import Audio, FilmedView, Photo, Poster
+from facefolds_core.asset.manifest_extras import Audio, Photo, Poster
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
 from facefolds_core.asset.reader import read_level
 from facefolds_core.asset.reflection import pack_reflection
@@ -135,20 +135,16 @@ def _with_extras(folder: Path, manifest: Manifest, scene: Scene, photos: Sequenc
     train = scene.indices("train")
     if train:
         unseen = [scene.cameras[index] for index in scene.indices("holdout")]
-        update["view"] = _with_good(folder, manifest, filmed_view([scene.cameras[index] for index in train], unseen))
+        view = filmed_view([scene.cameras[index] for index in train], unseen)
+        if view is not None:
+            level = read_level(folder, manifest.full, read_track(folder, manifest))
+            view = view.model_copy(update={"good": good_view(Model.of(level), view)})
+        update["view"] = view
     path, first = folder / "poster.jpg", scene.cameras[0]
     side = min(POSTER_SIDE, max(first.width, first.height))
     camera = write_poster(path, manifest, side, JPEG_QUALITY)
     update["poster"] = Poster(**stored_file(path).model_dump(), **_taken_by(camera), background=BACKGROUND)
     return manifest.model_copy(update=update)
-
-
-def _with_good(folder: Path, manifest: Manifest, view: FilmedView | None) -> FilmedView | None:
-    """What was filmed, and from where the full level's picture is good."""
-    if view is None:
-        return None
-    level = read_level(folder, manifest.full, read_track(folder, manifest))
-    return view.model_copy(update={"good": good_view(Model.of(level), view)})
 
 
 def _photos(folder: Path, scene: Scene, params: CompressParams) -> list[Photo]:

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import av
 import numpy as np
 from numpy.typing import NDArray
 
+from facefolds_core.asset.audio import AAC_MIME, encode_sound
 from facefolds_core.asset.draco import attribute_ids
 from facefolds_core.asset.glb import (
     ARRAY_BUFFER,
@@ -30,12 +33,13 @@ from facefolds_core.asset.glb import (
     write_document,
 )
 from facefolds_core.asset.gltf.extension import DRACO, NAME, TEXTURE_VIDEO, Checksum, LayeredVideo, Reflection
-from facefolds_core.asset.gltf.sound import mime_with_sound, with_sound
+from facefolds_core.asset.manifest import Video
 from facefolds_core.asset.manifest_base import StoredFile
 from facefolds_core.asset.manifest_extras import Audio
 from facefolds_core.asset.opaque import opaque_where_covered
 from facefolds_core.asset.reader import AssetLevel, layer_bytes
 from facefolds_core.asset.stored import read_slice
+from facefolds_core.asset.streams import copy_packets
 from facefolds_core.geometry.reflections import window_to_window
 from facefolds_core.geometry.track import Track
 
@@ -116,9 +120,26 @@ def _video(builder: Builder, level: AssetLevel, sound: Audio | None) -> dict[str
     if sound is None:
         return {"bufferView": builder.view(data), "mimeType": video.mime}
     _stored(level, sound)
-    files = level.folder / video.file, level.folder / sound.file
-    data = with_sound(*files, sound.mime, texture.frames / texture.fps)
-    return {"bufferView": builder.view(data), "mimeType": mime_with_sound(video.mime)}
+    codec, heard = (mime.partition('codecs="')[2].rstrip('"') for mime in (video.mime, AAC_MIME))
+    mime = f'video/mp4; codecs="{codec}, {heard}"'
+    return {"bufferView": builder.view(_with_sound(level, video, sound)), "mimeType": mime}
+
+
+def _with_sound(level: AssetLevel, video: Video, sound: Audio) -> bytes:
+    """An MP4 with the pictures as they are, and the sound, as it is if it is AAC: readers play them in step.
+
+    Raises:
+        UserError: if the sound cannot be read.
+    """
+    texture, heard = level.entry.texture, level.folder / sound.file
+    with TemporaryDirectory() as folder:
+        encoded, joined = (Path(folder) / name for name in ("sound.mp4", "joined.mp4"))
+        if sound.mime != AAC_MIME:
+            encode_sound(encoded, heard, texture.frames / texture.fps)
+            heard = encoded
+        with av.open(str(joined), "w", format="mp4", options={"fflags": "bitexact", "movflags": "faststart"}) as made:
+            copy_packets(made, [level.folder / video.file, heard], texture.rate)
+        return joined.read_bytes()
 
 
 def _said(level: AssetLevel, still: int) -> LayeredVideo:
