@@ -34,8 +34,7 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.similarity import Similarity
 from facefolds_core.geometry.sphere_uv import Window, st_to_uv, uv_to_directions
 from facefolds_core.geometry.track import Track
-from facefolds_core.packaging.levels import Resampled
-from facefolds_core.packaging.rungs import write_rungs
+from facefolds_core.packaging.levels import Resampled, write_rungs
 from facefolds_core.params import CompressParams, LevelParams, MeshCodec, StreamParams, VideoCodec
 from facefolds_core.rendering.pixels import render
 from facefolds_core.rendering.reference import render_asset

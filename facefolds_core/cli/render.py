@@ -16,6 +16,7 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
+from facefolds_core.api.cameras import camera_named, cameras_of_asset
 from facefolds_core.asset import read_asset
 from facefolds_core.asset.codecs import CODECS
 from facefolds_core.asset.colour import rgb_to_yuv420
@@ -23,9 +24,8 @@ from facefolds_core.asset.filmed import direction_of, swing_filmed, unfilmed_wor
 from facefolds_core.asset.manifest_extras import FilmedView
 from facefolds_core.asset.reader import Asset, AssetLevel
 from facefolds_core.asset.video import encode_video
-from facefolds_core.cli.cameras import named_camera
 from facefolds_core.errors import UserError, report_user_errors
-from facefolds_core.files.writing import atomic_file
+from facefolds_core.files.writing import atomic_file, read_json
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.params import VideoCodec
 from facefolds_core.rendering.camera_paths import (
@@ -137,6 +137,36 @@ def pick_level(asset: Asset, name: str | None) -> AssetLevel:
     return asset.full
 
 
+def named_camera(asset: Asset, name: str) -> Camera:
+    """The camera of that name, in the world of the asset.
+
+    Raises:
+        UserError: if there is none, listing those that there are; or if the file holds none.
+    """
+    if name.endswith(".json"):
+        return _from_file(Path(name))
+    none = "FILE.json: this asset names no camera, and there is no scene beside it"
+    known = cameras_of_asset(asset, asset.folder.resolve().parent)
+    return camera_named(name, known, "--camera", none, ", or give a JSON file with K, w2c, width and height")
+
+
+def _from_file(path: Path) -> Camera:
+    remedy = "give one as an object with K by rows, w2c = (R | t) by rows, width, height"
+    value = read_json(path, remedy=remedy)
+    try:
+        K, w2c = np.array(value["K"], float), np.array(value["w2c"], float)
+        width, height = int(value["width"]), int(value["height"])
+        rotation = w2c[:, :3]
+        sound = K.shape == (3, 3) and w2c.shape == (3, 4) and np.isfinite(K).all() and np.isfinite(w2c).all()
+        sound = sound and min(width, height) >= 16 and max(width, height) <= 16_384 and K[0, 0] > 0 and K[1, 1] > 0
+        sound = sound and np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-2 and np.linalg.det(rotation) > 0
+    except (KeyError, TypeError, ValueError, IndexError):
+        sound = False
+    if not sound:
+        raise UserError("no camera in the file", file=path, expected="K, w2c, width and height", remedy=remedy)
+    return Camera(path.stem, K, w2c, width, height)
+
+
 def shrink(rgb: NDArray[np.float32], samples: int) -> NDArray[np.uint8]:
     """(samples H, samples W, 3) in [0, 1] -> (H, W, 3) bytes, means of samples x samples pixels."""
     return np.asarray(np.rint(np.clip(pixel_means(rgb, samples), 0, 1) * 255), np.uint8)
@@ -175,13 +205,6 @@ def film_path(view: FilmedView | None, kind: Kind, start: Eye, count: int, sweep
     if kind is Kind.FLY:
         return fly_through(start, count, sides, heights)
     return turntable(start, count, sides if sweep is None else (sweep, sweep))
-
-
-def warn_of_unfilmed(view: FilmedView | None, directions: Sequence[tuple[float, float]]) -> None:
-    """A line where pictures look from where no camera stood: azimuth and elevation, degrees."""
-    words = None if view is None else unfilmed_words(view, directions)
-    if words is not None:
-        typer.echo(f"render: warning: {words}", err=True)
 
 
 def command(
@@ -256,7 +279,8 @@ def command(
         if kind is not Kind.STILL:
             eyes = film_path(view, kind, start, max(2, round(seconds * rate)), sweep)
         seen = [direction_of(given)] if given is not None else [(eye.azimuth, eye.elevation) for eye in eyes]
-        warn_of_unfilmed(view, seen)
+        if view is not None and (words := unfilmed_words(view, seen)):
+            typer.echo(f"render: warning: {words}", err=True)
         turns = (
             [min(eyes, key=attrgetter("azimuth")), start, max(eyes, key=attrgetter("azimuth"))]
             if kind is Kind.TURNTABLE

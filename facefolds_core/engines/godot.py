@@ -14,8 +14,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from facefolds_core.asset.reader import AssetLevel
@@ -31,11 +29,6 @@ PICTURE = "frame_{:05d}.webp"
 _OF_A_REFLECTION = {"file", "width", "height", "environment_rect", "gloss_rect", "offset_rect", "normals_rect"}
 QUALITY = 95
 """Of the pictures: lossy WebP, 0..100. Lossless ones would be several times larger."""
-
-
-def y_up(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(..., 3) in the asset's axes -> Godot's: y up, the subject looks to +z, its left is +x. A rotation."""
-    return points[..., [1, 2, 0]]
 
 
 def export(out: Path, level: AssetLevel, subject: str) -> str:
@@ -86,6 +79,6 @@ def export(out: Path, level: AssetLevel, subject: str) -> str:
 
 
 def mesh_bytes(mesh: TexturedMesh) -> bytes:
-    """A layer as the add-on reads it."""
-    vertices = y_up(mesh.vertices).astype("<f4").tobytes()
+    """A layer as the add-on reads it, in Godot's axes: y up, the subject looks to +z, its left is +x."""
+    vertices = mesh.vertices[:, [1, 2, 0]].astype("<f4").tobytes()
     return vertices + mesh.st.astype("<f4").tobytes() + mesh.faces.astype("<u4").tobytes()

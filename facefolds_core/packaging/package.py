@@ -32,10 +32,9 @@ from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.reflections import ReflectionMaps
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level, make_meter
-from facefolds_core.packaging.levels import coarse_content
+from facefolds_core.packaging.levels import coarse_content, is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.limits import Model, good_view
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
-from facefolds_core.packaging.rungs import is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.settings import LevelSetting
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.spacing import spread

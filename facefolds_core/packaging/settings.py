@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from facefolds_core.asset.cropping import CroppedLayer
 from facefolds_core.geometry.cameras import Camera
-from facefolds_core.packaging.meshbits import position_bits, texture_coordinate_bits
 from facefolds_core.params import AttentionParams, CompressParams, LevelParams, MeshCodec, VideoCodec
+
+MOST_BITS = 20
 
 
 @dataclass(frozen=True)
@@ -51,3 +55,37 @@ class LevelSetting:
             "texture_coordinate_bits": texture_coordinate_bits(layers, error),
         }
         return replace(self, mesh=self.mesh.model_copy(update=bits))
+
+
+def position_bits(layers: Sequence[CroppedLayer], cameras: Sequence[Camera], pixels: float) -> int:
+    """The fewest bits with which no vertex in front of a camera moves by more than `pixels` in its picture.
+
+    A position moves by at most h = E / (2^b - 1) / 2 along each axis, E the longest side of the layer's box: by
+    sqrt(3) h in space, and by f sqrt(3) h / z (1 + |x| / f) in the picture, f the focal length, z the depth and |x| the
+    distance of the vertex' image from the principal point: the first term moves it across the axis, the second along.
+    Vertices outside of the picture count like those at its corner.
+    """
+    worst = 0.0
+    for layer in layers:
+        vertices = layer.mesh.vertices.astype(np.float64)
+        extent = float(np.ptp(vertices, axis=0).max())
+        for camera in cameras:
+            image, depth = camera.project(vertices)
+            ahead = depth > 1e-6
+            focal = float(max(camera.K[0, 0], camera.K[1, 1]))
+            away = np.linalg.norm(image[ahead] - camera.K[:2, 2], axis=1)
+            away = np.minimum(away, math.hypot(camera.width, camera.height))
+            slopes = (focal + away) / depth[ahead]
+            worst = max(worst, extent * float(slopes.max(initial=0)))
+    return _bits(math.sqrt(3) * worst / 2, pixels)
+
+
+def texture_coordinate_bits(layers: Sequence[CroppedLayer], texels: float) -> int:
+    """The fewest bits with which no texture coordinate moves by more than `texels` along s or t."""
+    worst = max(float(np.ptp(layer.mesh.st, axis=0).max()) * max(layer.crop[2:]) for layer in layers)
+    return _bits(worst / 2, texels)
+
+
+def _bits(range_: float, allowed: float) -> int:
+    """The least b with range_ / (2^b - 1) <= allowed, at most `MOST_BITS`."""
+    return min(MOST_BITS, max(1, math.ceil(math.log2(range_ / allowed + 1))))

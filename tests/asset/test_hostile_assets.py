@@ -17,9 +17,8 @@ from facefolds_core.asset import read_asset
 from facefolds_core.asset.checks import mesh_problems
 from facefolds_core.asset.draco import DracoError, decode_mesh
 from facefolds_core.asset.manifest_file import parse_manifest
-from facefolds_core.asset.nesting import lies_within
 from facefolds_core.asset.reader import read_level
-from facefolds_core.asset.validation import validate_asset
+from facefolds_core.asset.validation import lies_within, validate_asset
 from facefolds_core.errors import UserError
 from facefolds_core.geometry.meshes import TexturedMesh
 from tests.asset.filmed import filmed, packaged
