@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from facefolds_core.asset import Manifest
+from facefolds_core.asset import Asset, Manifest, read_asset
 from facefolds_core.asset.cropping import CroppedLayer, crop_layers
 from facefolds_core.asset.inputs import check_inputs
 from facefolds_core.asset.manifest_file import MANIFEST_NAME, write_manifest
@@ -122,9 +122,10 @@ def make_asset(
     resolution: int = 64,
     params: CompressParams | None = None,
     source: AssetSource = SOURCE,
-) -> Manifest:
-    """Write the synthetic asset to `folder` (its textures' store goes beside it)."""
+) -> Asset:
+    """Write the synthetic asset to `folder` (its textures' store goes beside it), and read it."""
     textures = np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)])
     store = write_store(folder.parent / f"{folder.name}-textures.arrow", textures)
     meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
-    return write_asset(folder, meshes, [WINDOW] * layers, store, source, params or PLAIN)
+    write_asset(folder, meshes, [WINDOW] * layers, store, source, params or PLAIN)
+    return read_asset(folder)

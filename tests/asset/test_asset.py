@@ -74,19 +74,17 @@ def test_same_input_same_bytes(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("resolution", [37, 50])
 def test_odd_resolutions(tmp_path: Path, resolution: int) -> None:
-    make_asset(tmp_path / "asset", layers=2, frames=2, resolution=resolution)
+    frame = make_asset(tmp_path / "asset", layers=2, frames=2, resolution=resolution).frame(1)
     assert validate_asset(tmp_path / "asset") == []
-    frame = read_asset(tmp_path / "asset").frame(1)
     crops = cap_crops(2, 2, resolution)
     for texture, crop, whole in zip(frame, crops, cap_textures(2, 1, resolution), strict=True):
         assert np.abs(texture.astype(float) - crop.cut(whole)).mean() < 8
 
 
 def test_static_scene(tmp_path: Path) -> None:
-    manifest = make_asset(tmp_path / "asset", frames=1, source=replace(SOURCE, fps=0.0))
-    assert (manifest.full.texture.frames, manifest.full.texture.fps) == (1, 1.0)
+    asset = make_asset(tmp_path / "asset", frames=1, source=replace(SOURCE, fps=0.0))
+    assert (asset.entry.texture.frames, asset.entry.texture.fps) == (1, 1.0)
     assert validate_asset(tmp_path / "asset") == []
-    asset = read_asset(tmp_path / "asset")
     assert len(list(asset.frames())) == 1
     assert len(asset.frame(0)) == 3
 

@@ -71,8 +71,7 @@ def test_levels_that_are_switched_share_meshes_and_places(whole: Path) -> None:
 
 
 def test_frames_are_those_of_the_same_take_in_one_piece(whole: Path, tmp_path: Path) -> None:
-    make_asset(tmp_path / "plain", layers=2, frames=FRAMES)
-    plain, stream = read_asset(tmp_path / "plain"), read_asset(whole)
+    plain, stream = make_asset(tmp_path / "plain", layers=2, frames=FRAMES), read_asset(whole)
     assert sum(1 for _ in stream.frames()) == FRAMES
     for index in (0, 5, 6, 13):
         for a, b in zip(plain.frame(index), stream.frame(index), strict=True):

@@ -27,9 +27,7 @@ from tests.viewer.fixtures import file_entry
 
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("track") / "asset"
-    make_asset(folder, layers=2, frames=3, resolution=32, source=MOVING)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("track") / "asset", layers=2, frames=3, resolution=32, source=MOVING)
 
 
 def test_the_track_comes_back_from_its_file(asset: Asset) -> None:

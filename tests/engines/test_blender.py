@@ -29,8 +29,7 @@ AGREE = 40.0
 def test_five_cameras_agree_with_the_reference(tmp_path: Path, kind: str) -> None:
     if find_blender() is None:
         pytest.skip(f"no Blender: {REMEDY}")
-    make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96)
-    asset, cameras = read_asset(tmp_path / "asset"), five_cameras(SIZE)
+    asset, cameras = make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96), five_cameras(SIZE)
     frame = FRAME if kind == "glb" else 0  # Blender's importer of USD knows no textures sampled in time
     if kind == "glb":
         write_glb(tmp_path / "a.glb", asset.full, "caps", frame=frame)
@@ -59,8 +58,7 @@ def test_the_add_on_plays_the_extensions_video(tmp_path: Path) -> None:
     """The importer with the add-on: layers in the place of the still, a frame of the movie, the head's motion."""
     if find_blender() is None:
         pytest.skip(f"no Blender: {REMEDY}")
-    make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96)
-    level = with_track(read_asset(tmp_path / "asset").full)
+    level = with_track(make_asset(tmp_path / "asset", layers=4, frames=3, resolution=96).full)
     write_layered(tmp_path / "face.glb", level, "caps")
     cameras = five_cameras(SIZE)
     found = pictures(tmp_path / "face.glb", cameras, GREY_VALUE, frame=FRAME)

@@ -28,9 +28,7 @@ AGREE = 40.0
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("caps") / "asset"
-    make_asset(folder, layers=4, frames=5, resolution=96)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=4, frames=5, resolution=96)
 
 
 @pytest.fixture(scope="module")

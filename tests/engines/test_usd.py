@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.engines.usd import STAGE, export
 from facefolds_core.errors import UserError
 from tests.assets import make_asset
@@ -25,9 +25,7 @@ FRAMES = 3
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("caps") / "asset"
-    make_asset(folder, layers=3, frames=FRAMES, resolution=64)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=3, frames=FRAMES, resolution=64)
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,8 @@ from facefolds_core.export.kept import KeptFrames
 from facefolds_core.files.frame_store import FrameStore, write_frames
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.kernels.hit_codes import SCALE
-from tests.export.rays_reference import composite, look_up
+from facefolds_core.model.compositing import compositing_weights
+from facefolds_core.training.explicit.reference import look_up
 from tests.scenes import look_at_origin
 
 
@@ -74,8 +75,9 @@ def test_weights_bound_what_errors_of_all_layers_do() -> None:
     def colour(layer: int, channel: int, change: float) -> np.ndarray:
         moved = texture.copy()
         moved[layer, :, :, channel] += change
-        seen = composite(look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved / 255)))
-        return np.asarray(seen[0, :3]) * 255
+        seen = look_up(torch.tensor(codes.astype(np.int32)), torch.tensor(moved.transpose(1, 2, 0, 3) / 255))
+        weights, _ = compositing_weights(seen[..., 3])
+        return np.asarray((weights[..., None] * seen[..., :3]).sum(1)[0]) * 255
 
     def derivative(layer: int, channel: int) -> np.ndarray:
         return np.asarray(colour(layer, channel, 10) - colour(layer, channel, -10)) / 20

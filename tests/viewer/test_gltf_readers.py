@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
-from facefolds_core.asset import Asset, read_asset
+from facefolds_core.asset import Asset
 from facefolds_core.asset.glb import container
 from facefolds_core.asset.gltf.extension import NAME
 from facefolds_core.asset.gltf.writing import write_layered
@@ -43,8 +43,7 @@ def exported(folder: Path, moving: bool = False) -> tuple[Asset, Path]:
     if moving:
         asset = moving_asset(folder / "asset", layers=4, resolution=96)
     else:
-        make_asset(folder / "asset", layers=4, frames=3, resolution=96)
-        asset = read_asset(folder / "asset")
+        asset = make_asset(folder / "asset", layers=4, frames=3, resolution=96)
     write_layered(folder / "face.glb", asset.full, "caps")
     return asset, folder / "face.glb"
 

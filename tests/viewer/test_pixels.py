@@ -29,9 +29,7 @@ One ray a pixel: 45.0 and 42.4 at grazing angles."""
 
 @pytest.fixture(scope="module")
 def caps(tmp_path_factory: pytest.TempPathFactory) -> Asset:
-    folder = tmp_path_factory.mktemp("caps") / "asset"
-    make_asset(folder, layers=5, frames=6, resolution=96)
-    return read_asset(folder)
+    return make_asset(tmp_path_factory.mktemp("caps") / "asset", layers=5, frames=6, resolution=96)
 
 
 def check(new_player: NewPlayer, asset: Asset, size: int = SIZE, script: str = "") -> None:
@@ -149,8 +147,7 @@ def exposed(rgba: NDArray[np.generic], factor: float) -> NDArray[np.float32]:
 
 
 def test_a_head_that_moves_stands_where_it_stood(new_player: NewPlayer, tmp_path: Path) -> None:
-    make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=MOVING)
-    asset = read_asset(tmp_path / "asset")
+    asset = make_asset(tmp_path / "asset", layers=3, frames=3, resolution=64, source=MOVING)
     player = new_player({"asset": asset.folder})
     player.open("asset")
     player.run("e.background = v; e.effects = false", GREY)
