@@ -57,8 +57,9 @@ def test_meshes_and_surfaces_round_trip_and_are_the_same_bytes_each_time(tmp_pat
     assert np.array_equal(back.vertices, TRIANGLE.vertices)
 
 
-def test_sheets_round_trip(tmp_path: Path, grids: Grids) -> None:
-    sheets = grid_sheets(grids, None)
+@pytest.mark.parametrize("belt", [None, Belt(0.2, 0.3)])
+def test_sheets_round_trip(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
+    sheets = replace(grid_sheets(grids, None), chart=Chart((0.1, 0.2, 0.3), belt))
     write_sheets(tmp_path / "sheets.npz", sheets)
     back = read_surfaces(tmp_path / "sheets.npz")
     assert isinstance(back, Sheets)
@@ -70,7 +71,7 @@ def test_sheets_round_trip(tmp_path: Path, grids: Grids) -> None:
 def test_the_chart_can_be_read_without_the_samples(tmp_path: Path, grids: Grids, belt: Belt | None) -> None:
     chart = Chart((0.1, 0.2, 0.3), belt)
     write_grids(tmp_path / "grids.npz", replace(grids, chart=chart))
-    assert read_places(tmp_path / "grids.npz")[1] == chart
+    assert read_places(tmp_path / "grids.npz")[1] == read_grids(tmp_path / "grids.npz").chart == chart
 
 
 @pytest.mark.parametrize("length", [0, 10, 500, 2000])
