@@ -84,10 +84,9 @@ class AssetLevel:
             UserError: if the video is damaged or has another number of frames than the manifest says.
         """
         count = 0
-        for frame in self._decode(0):
-            if count < self.num_frames:
+        for count, frame in enumerate(self._decode(0), 1):
+            if count <= self.num_frames:
                 yield frame
-            count += 1
         if count != self.num_frames:
             raise self._wrong_count(count)
 

@@ -73,6 +73,10 @@ class Kind(StrEnum):
     FLY = "fly"
 
 
+def _refused(option: str, message: str, expected: str, found: object, remedy: str) -> UserError:
+    return UserError(message, place=f"--{option}", expected=expected, found=found, remedy=remedy)
+
+
 def parse_size(text: str, film: bool) -> tuple[int, int]:
     """Width and height from "1280x720".
 
@@ -83,9 +87,7 @@ def parse_size(text: str, film: bool) -> tuple[int, int]:
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if min(size) < 16 or (film and (size[0] % 2 or size[1] % 2)):
         expected = f"WIDTHxHEIGHT in pixels, at least 16{', even' if film else ''}"
-        raise UserError(
-            "no size for a picture", place="--size", expected=expected, found=text, remedy="such as 1280x720"
-        )
+        raise _refused("size", "no size for a picture", expected, text, "such as 1280x720")
     return size
 
 
@@ -99,13 +101,7 @@ def check_limits(**options: float) -> None:
         option = name.replace("_", "-")
         low, high = LIMITS[option]
         if not low <= value <= high:
-            raise UserError(
-                "a number out of bounds",
-                place=f"--{option}",
-                expected=f"{low:g} to {high:g}",
-                found=value,
-                remedy="choose one within",
-            )
+            raise _refused(option, "a number out of bounds", f"{low:g} to {high:g}", value, "choose one within")
 
 
 def parse_colour(text: str) -> tuple[float, float, float]:
@@ -115,7 +111,7 @@ def parse_colour(text: str) -> tuple[float, float, float]:
         UserError: if it is no colour.
     """
     if not re.fullmatch(r"#?[0-9a-fA-F]{6}", text):
-        raise UserError("no colour", place="--background", expected="#rrggbb", found=text, remedy="such as #16181d")
+        raise _refused("background", "no colour", "#rrggbb", text, "such as #16181d")
     red, green, blue = bytes.fromhex(text.removeprefix("#"))
     return red / 255, green / 255, blue / 255
 
@@ -131,9 +127,7 @@ def pick_level(asset: Asset, name: str | None) -> AssetLevel:
             return level
     if name is not None:
         names = ", ".join(level.entry.name for level in asset.levels)
-        raise UserError(
-            "no such level of detail", place="--level", expected=names, found=name, remedy="choose one of these"
-        )
+        raise _refused("level", "no such level of detail", names, name, "choose one of these")
     return asset.full
 
 
@@ -252,9 +246,7 @@ def command(
         colour = parse_colour(background)
         if samples * max(width, height) > LARGEST_SIDE:
             expected = f"at most {LARGEST_SIDE // samples} pixels a side with --samples {samples}"
-            raise UserError(
-                "too large a picture", place="--size", expected=expected, found=size, remedy="a smaller one"
-            )
+            raise _refused("size", "too large a picture", expected, size, "a smaller one")
         check_limits(azimuth=azimuth, elevation=elevation, field_of_view=field_of_view)
         check_limits(distance=1.0 if distance is None else distance)
         check_limits(seconds=seconds, sweep=sweep or 0.0, fps=1.0 if fps is None else fps)
@@ -264,10 +256,7 @@ def command(
         read = read_asset(asset)
         shown = pick_level(read, level)
         if not 0 <= frame < shown.num_frames:
-            expected = f"0 to {shown.num_frames - 1}"
-            raise UserError(
-                "no such frame", place="--frame", expected=expected, found=frame, remedy="choose one of these"
-            )
+            raise _refused("frame", "no such frame", f"0 to {shown.num_frames - 1}", frame, "choose one of these")
         given = None if camera is None else named_camera(read, camera)
         if given is not None:
             width, height = given.width, given.height

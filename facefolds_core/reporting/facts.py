@@ -44,7 +44,6 @@ class Facts:
     Attributes:
         metrics: metrics.json.
         images: scores of the asset on each held-out image; empty without evaluation/per_image.parquet.
-        training: model/training.json.
         fit: model/fit.json, of presets that fit the scene first.
         curves: the training log.
         stages: seconds and bytes of each, in the order in which they run.
@@ -53,7 +52,6 @@ class Facts:
 
     metrics: dict[str, Any]
     images: tuple[ImageScores, ...]
-    training: dict[str, Any] | None
     fit: dict[str, Any] | None
     curves: dict[str, list[tuple[float, float]]]
     stages: dict[str, tuple[float | None, int | None]]
@@ -78,7 +76,6 @@ def read_facts(folders: SubjectFolders) -> Facts:
     return Facts(
         metrics=metrics,
         images=read_images(folders.evaluation / "per_image.parquet"),
-        training=read_mapping(folders.model / "training.json"),
         fit=read_mapping(folders.model / "fit.json"),
         curves=read_curves(folders.training_log / "plots" / "metrics"),
         stages={name: (seconds_of(folders, name), bytes_of(folders, name)) for name in STAGE_OUTPUTS},

@@ -47,7 +47,6 @@ def test_scores_alone_are_enough_to_read(tmp_path: Path) -> None:
     write_text(tmp_path / "metrics.json", '{"asset": {}, "cost": {}}')
     facts = read_facts(SubjectFolders(tmp_path))
     assert (facts.images, facts.curves, facts.config) == ((), {}, {})
-    assert facts.training is None
     assert all(seconds is None for seconds, _ in facts.stages.values())
 
 
