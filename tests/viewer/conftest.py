@@ -7,11 +7,12 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page
+from playwright.sync_api import Page, Route
 
 from facefolds_core.geometry.cameras import Camera
 from facefolds_core.serving.server import serving
@@ -70,9 +71,22 @@ class Player:
         """Wait until a JavaScript condition on the element `e` holds."""
         self.page.wait_for_function(f"() => {{ const e = {ELEMENT}; return {condition}; }}", timeout=PATIENCE)
 
-    def run(self, code: str, value: object = None) -> object:
+    def run(self, code: str, value: object = None) -> Any:
         """Run JavaScript with the element as `e` and `value` as `v`; returns its result."""
         return self.page.evaluate(f"async (v) => {{ const e = {ELEMENT}; {code} }}", value)
+
+    def hold(self, addresses: str) -> Callable[[], None]:
+        """Hold back what the page asks for there; what is returned waits until it does, and lets go of it."""
+        held: list[Route] = []
+        self.page.route(addresses, lambda route: held.append(route))
+
+        def release() -> None:
+            while not held:
+                self.page.wait_for_timeout(20)
+            for route in held:
+                route.continue_()
+
+        return release
 
     def button(self, name: str) -> None:
         """Press the first visible button with that accessible name."""
@@ -125,6 +139,7 @@ def listening(page: Page) -> tuple[list[str], list[str]]:
 
 
 NewPlayer = Callable[..., Player]
+Show = Callable[..., Player]
 
 
 @pytest.fixture
@@ -160,3 +175,15 @@ def new_player(new_page: Callable[..., Page], serve: Callable[[dict[str, Path]],
         player.page.close()
         unexpected = [line for line in player.said if not any(part in line for part in allow)]
         assert unexpected == []
+
+
+@pytest.fixture
+def show(new_player: NewPlayer, rich: Path) -> Show:
+    """The page with `rich` on it; takes what `Player.open` and `new_player` take."""
+
+    def shown(view: str = "frame=0", full: bool = False, **options: object) -> Player:
+        player = new_player({"asset": rich}, **options)
+        player.open("asset", view, full=full)
+        return player
+
+    return shown

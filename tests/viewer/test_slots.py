@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Route
 
 from facefolds_core.asset import read_asset
 from facefolds_core.geometry.sphere_uv import uv_to_st
@@ -108,17 +107,14 @@ def test_the_surface_under_a_point_gives_a_hotspot_there(new_player: NewPlayer, 
 
 def test_a_poster_and_a_bar_of_the_page_go_when_there_is_a_picture(new_player: NewPlayer, rich: Path) -> None:
     player = new_player({"asset": rich}, viewport={"width": 400, "height": 300})
-    held: list[Route] = []
-    player.page.route("**/manifest.json", lambda route: held.append(route))
+    release = player.hold("**/manifest.json")
     inner = '<p slot="poster" id="poster">Wait</p><p slot="progress-bar" id="bar">Coming</p>'
     page_of_yours(player, f'<facefolds-player src="asset/" style="height: 300px">{inner}</facefolds-player>')
     bar, poster = player.page.locator("#bar"), player.page.locator("#poster")
     bar.wait_for(state="visible")
     assert poster.is_visible()
     assert not player.run("return e.shadowRoot.querySelector('.spinner').checkVisibility()")
-    while not held:
-        player.page.wait_for_timeout(50)
-    held[0].continue_()
+    release()
     player.wait("e.ready")
     assert not bar.is_visible()
     player.page.wait_for_function("() => getComputedStyle(document.querySelector('#poster')).opacity === '0'")
