@@ -170,14 +170,10 @@ class _Sheet:
         (left, top), (right, bottom) = np.asarray(uv_to_st(corners, grid.window)).tolist()
         self._projection = Projection(grid.shape, (len(valid), len(valid)), (top, bottom, left, right))
 
-    def texels(self, frame: int) -> NDArray[np.float32]:
-        """(M, 4) RGBA in [0, 1]: the model's own texels where it has any, else what it shows at the layer's."""
-        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
-        return _texels(self._model, uv, self._layer, frame)
-
     def image(self, frame: int) -> NDArray[np.uint8]:
         """(R, R, 4) RGBA: of a model with texels, those that interpolate to what it shows; of others, its values."""
-        values = self.texels(frame)
+        uv = torch.as_tensor(self._uv).to(self._model.centre.detach())
+        values = _texels(self._model, uv, self._layer, frame)
         if self._grid is not None:
             values = self._projection(values.reshape(*self._grid.shape, 4))[self._valid]
         image = np.zeros((*self._valid.shape, 4), np.uint8)
