@@ -23,7 +23,7 @@ from facefolds_core.geometry.cameras import Camera
 from facefolds_core.geometry.meshes import TexturedMesh
 from facefolds_core.geometry.sphere_uv import Window
 from facefolds_core.packaging.coding import coded_level
-from facefolds_core.packaging.settings import LevelSetting
+from facefolds_core.packaging.settings import level_params
 from facefolds_core.packaging.views import ViewMeter
 from facefolds_core.params import CompressParams, LevelParams, StreamParams
 
@@ -90,12 +90,12 @@ def write_rungs(
     """Write the levels of a stream, coarsest first, the full one last; their key frames are `segment_seconds` apart."""
     interval = max(1, round(params.stream.segment_seconds * full.rate))
     full = replace(full, part_frames=interval)
-    finest = coded_level(folder, FULL, full, LevelSetting.of(params, interval=interval), meter, cameras)
+    finest = coded_level(folder, FULL, full, level_params(params, interval=interval), meter, cameras)
     resolution = full.textures.image(full.layers[0].source, 0).shape[0]
     levels = []
     for level in params.levels:
         content = _smaller(full, _factor(level, resolution), resolution)
-        setting = LevelSetting.of(params, level, interval)
+        setting = level_params(params, level, interval)
         levels.append(coded_level(folder, level.name, content, setting, meter, cameras, finest))
     together = [*levels, finest]
     return [level.model_copy(update={"switchable": FULL}) for level in together] if levels else together

@@ -35,7 +35,7 @@ from facefolds_core.packaging.coding import coded_level, make_meter
 from facefolds_core.packaging.levels import coarse_content, is_streamed, stream_unit, write_rungs
 from facefolds_core.packaging.limits import Model, good_view
 from facefolds_core.packaging.poster import BACKGROUND, write_poster
-from facefolds_core.packaging.settings import LevelSetting
+from facefolds_core.packaging.settings import level_params
 from facefolds_core.params import CompressParams, LevelParams
 from facefolds_core.spacing import spread
 
@@ -89,9 +89,9 @@ def package(folder: Path, export: Export, scene: Scene, params: CompressParams) 
         else:
             for coarse in params.levels:
                 content = coarse_content(full, export.windows, coarse, export.coarser[coarse.mesh_resolution])
-                coded = coded_level(temporary, coarse.name, content, LevelSetting.of(params, coarse), meter, cameras)
+                coded = coded_level(temporary, coarse.name, content, level_params(params, coarse), meter, cameras)
                 levels.append(coded)
-            level = coded_level(temporary, FULL, full, LevelSetting.of(params), meter, cameras)
+            level = coded_level(temporary, FULL, full, level_params(params), meter, cameras)
         if export.reflection is not None:
             packed = pack_reflection(export.reflection)
             levels = [_with_reflection(temporary, one, *packed) for one in levels]
