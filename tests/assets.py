@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -51,10 +51,14 @@ def cap_mesh(radius: float, vertices_a_side: int = 12, window: Window = WINDOW) 
     s, t = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n))
     st = np.stack([s, t], -1).reshape(-1, 2)
     points = np.array(CENTRE) + radius * uv_to_directions(st_to_uv(st, window))
-    index = np.arange(n * n).reshape(n, n)
+    return TexturedMesh(points.astype(np.float32), grid_faces(n), st.astype(np.float32))
+
+
+def grid_faces(n: int) -> NDArray[np.int32]:
+    """(2 (n - 1)^2, 3) over n x n vertices, row by row."""
+    index = np.arange(n * n, dtype=np.int32).reshape(n, n)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
-    faces = np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
-    return TexturedMesh(points.astype(np.float32), faces.astype(np.int32), st.astype(np.float32))
+    return np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
 
 
 def cap_texture(layer: int, frame: int, resolution: int) -> NDArray[np.uint8]:
@@ -87,16 +91,21 @@ def write_store(path: Path, frames: NDArray[np.uint8]) -> FrameStore:
     return FrameStore(path)
 
 
+@dataclass(frozen=True)
+class Store:
+    """Textures (K, N, R, R, 4)."""
+
+    frames: NDArray[np.uint8]
+
+    def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
+        return np.asarray(self.frames[frame, layer])
+
+
 def cap_crops(layers: int, frames: int, resolution: int) -> tuple[CroppedLayer, ...]:
     """What the writer makes of the layers of `make_asset`."""
-    textures = [cap_textures(layers, frame, resolution) for frame in range(frames)]
-
-    class Store:
-        def image(self, layer: int, frame: int, /) -> NDArray[np.uint8]:
-            return np.asarray(textures[frame][layer])
-
+    textures = Store(np.stack([cap_textures(layers, frame, resolution) for frame in range(frames)]))
     meshes = [cap_mesh(radius_of(layer)) for layer in range(layers)]
-    return crop_layers(meshes, [WINDOW] * layers, Store(), frames)
+    return crop_layers(meshes, [WINDOW] * layers, textures, frames)
 
 
 def write_asset(
